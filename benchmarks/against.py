@@ -1,11 +1,13 @@
 """This tree beside another commit: both computed in turn, by their processor time.
 
-    make bench BENCH="--against COMMIT"        or        python benchmarks/against.py COMMIT [--rounds N] [--only TASK ...]
+    make bench BENCH="--against COMMIT"        or        python benchmarks/against.py COMMIT
+    [--rounds N] [--only TASK ...]
 
-Each tree computes in a process of its own, with the same Python and packages; the tasks are those of `tasks/trees.py`. Within a
-round every task is computed by one tree and at once by the other one, and the next round begins with the other. The least time of
-many rounds is what a tree needs when nothing disturbs it. Two runs of one tree (COMMIT is HEAD, and nothing is changed) tell
-how far ratios are to be believed.
+Each tree computes in a process of its own, with the same Python and packages; the tasks are those
+of `tasks/trees.py`. Within a round every task is computed by one tree and at once by the other one,
+and the next round begins with the other. The least time of many rounds is what a tree needs when
+nothing disturbs it. Two runs of one tree (COMMIT is HEAD, and nothing is changed) tell how far
+ratios are to be believed.
 """
 
 from __future__ import annotations
@@ -45,7 +47,12 @@ class Tree:
         """The processor time of a task, or from the start to the end of a process of its own."""
         if task in PROCESSES:
             before = _children()
-            subprocess.run([sys.executable, *PROCESSES[task]], env=self.environment, check=True, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                [sys.executable, *PROCESSES[task]],
+                env=self.environment,
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
             return _children() - before
         _pipe(self.process.stdin).write(task + "\n")
         _pipe(self.process.stdin).flush()
@@ -74,7 +81,9 @@ def _children() -> float:
 def sources_of(commit: str) -> Iterator[Path]:
     """The sources of a commit in a folder that is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
-        packed = subprocess.run(["git", "archive", commit, "src"], cwd=ROOT, check=True, capture_output=True).stdout
+        packed = subprocess.run(
+            ["git", "archive", commit, "src"], cwd=ROOT, check=True, capture_output=True
+        ).stdout
         subprocess.run(["tar", "x", "-C", folder], input=packed, check=True)
         sources = Path(folder) / "src"
         for folder_of_sources in (sources, ROOT / "src"):  # as an installation has them
@@ -82,7 +91,9 @@ def sources_of(commit: str) -> Iterator[Path]:
         yield sources
 
 
-def measured(before: Tree, now: Tree, tasks: list[str], rounds: int) -> dict[str, tuple[list[float], list[float]]]:
+def measured(
+    before: Tree, now: Tree, tasks: list[str], rounds: int
+) -> dict[str, tuple[list[float], list[float]]]:
     """The seconds of each task in every round, of the other commit and of this tree."""
     found: dict[str, tuple[list[float], list[float]]] = {task: ([], []) for task in tasks}
     for task in tasks:  # what is compiled and filled once
@@ -101,7 +112,14 @@ def told(found: dict[str, tuple[list[float], list[float]]]) -> str:
     rows = []
     for task, (before, now) in found.items():
         ratio = min(now) / min(before)
-        rows.append([task, number(min(before)), number(min(now)), f"{ratio:.3f}" + (" slower" if ratio > BOUND else "")])
+        rows.append(
+            [
+                task,
+                number(min(before)),
+                number(min(now)),
+                f"{ratio:.3f}" + (" slower" if ratio > BOUND else ""),
+            ]
+        )
     return table(["task", "s before", "s now", "now / before"], rows)
 
 

@@ -1,8 +1,9 @@
-"""What runs in a process of its own, because it may hang, because it must start cold, or because its memory is measured.
+"""What runs in a process of its own, because it may hang, because it must start cold, or because
+its memory is measured.
 
-python child.py first MODULE PEER [VARIANT]     the first motion of a peer after the interpreter has started
-python child.py zeno MODULE PEER ENOUGH         an accumulation of impacts
-python child.py grid N PERIODS TOL              N x N states by lanes on all cores
+python child.py first MODULE PEER [VARIANT]     the first motion of a peer after the interpreter has
+started python child.py zeno MODULE PEER ENOUGH         an accumulation of impacts python child.py
+grid N PERIODS TOL              N x N states by lanes on all cores
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ def find(module: str, name: str) -> Any:
 
 
 def first(module: str, name: str, variant: str = "") -> dict[str, Any]:
-    """Seconds for the first motion at 1e-10, after the imports; a variant of the system is for saltus only."""
+    """Seconds for the first motion at 1e-10, after the imports; a variant of the system is for
+    saltus only.
+    """
     home = importlib.import_module(f"peers.{module}")
     if module.startswith("saltus"):  # what its first use imports
         import saltus
@@ -50,9 +53,15 @@ def grid(n: str, periods: str, tol: str) -> dict[str, Any]:
     import saltus
 
     def run(side: int) -> Any:
-        theta, velocity = np.meshgrid(np.linspace(-1.5, 1.5, side), np.linspace(-1.5, 1.5, side), indexing="ij")
+        theta, velocity = np.meshgrid(
+            np.linspace(-1.5, 1.5, side), np.linspace(-1.5, 1.5, side), indexing="ij"
+        )
         return saltus.simulate_many(
-            system(), theta=theta.ravel(), velocity=velocity.ravel(), periods=int(periods), tol=float(tol)
+            system(),
+            theta=theta.ravel(),
+            velocity=velocity.ravel(),
+            periods=int(periods),
+            tol=float(tol),
         )
 
     run(4)
@@ -68,7 +77,9 @@ def grid(n: str, periods: str, tol: str) -> dict[str, Any]:
 
 def peak() -> int:
     """The largest memory of this process so far, in bytes."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+        1 if sys.platform == "darwin" else 1024
+    )
 
 
 if __name__ == "__main__":

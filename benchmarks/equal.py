@@ -21,17 +21,24 @@ AT_LEAST = {
 
 
 def at_equal_error(work: list[dict[str, Any]]) -> dict[str, list[float]]:
-    """Microseconds for one motion over one period at each of TARGETS, by peer; NaN where a code does not get there."""
+    """Microseconds for one motion over one period at each of TARGETS, by peer; NaN where a code
+    does not get there.
+    """
     columns: dict[str, list[float]] = {}
     for name in dict.fromkeys(row["peer"] for row in work):
         rows = [row for row in work if row["peer"] == name and row["error"] < LOST]
-        columns[name] = equal_error([r["error"] for r in rows], [r["median"] for r in rows], TARGETS).tolist()
+        columns[name] = equal_error(
+            [r["error"] for r in rows], [r["median"] for r in rows], TARGETS
+        ).tolist()
     return columns
 
 
 def ratios(table: dict[str, list[float]], ours: str) -> dict[str, list[float]]:
     """How many times longer each peer takes than `ours`, at each of TARGETS."""
-    return {name: [theirs / own for theirs, own in zip(times, table[ours], strict=True)] for name, times in table.items()}
+    return {
+        name: [theirs / own for theirs, own in zip(times, table[ours], strict=True)]
+        for name, times in table.items()
+    }
 
 
 def asked(results: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -44,7 +51,13 @@ def asked(results: dict[str, Any]) -> list[tuple[str, str, str]]:
             found = [x for x in against.get(name, []) if math.isfinite(x)]
             if found:
                 wanted = f"at equal error at least {least:g} times {name}"
-                lines.append((wanted, f"{min(found):.3g} to {max(found):.3g} times", _verdict(min(found) >= least)))
+                lines.append(
+                    (
+                        wanted,
+                        f"{min(found):.3g} to {max(found):.3g} times",
+                        _verdict(min(found) >= least),
+                    )
+                )
     return lines + [line for row in results["startup"] for line in _asked_of_a_start(row)]
 
 
@@ -53,15 +66,31 @@ def _asked_of_a_start(row: dict[str, Any]) -> list[tuple[str, str, str]]:
         return []
     peer, seconds, after = row["peer"], row["median"], row["after_imports"]
     if row["start"] == OTHER_STRUCTURE:
-        return [(f"{peer}: a structure compiled under 10 s", f"{after:.1f} s after the imports", _verdict(after < 10))]
+        return [
+            (
+                f"{peer}: a structure compiled under 10 s",
+                f"{after:.1f} s after the imports",
+                _verdict(after < 10),
+            )
+        ]
     if row["start"] == OTHER_NUMBERS:
         files = row["new_files"]
-        return [(f"{peer}: nothing compiled for other numbers", f"{files} files added", _verdict(not files))]
+        return [
+            (
+                f"{peer}: nothing compiled for other numbers",
+                f"{files} files added",
+                _verdict(not files),
+            )
+        ]
     if row["start"] == CACHED:
         wanted = f"{peer}: a cached start under {START:g} s"
         return [
             (f"{wanted}, its packages imported", f"{after:.2f} s", _verdict(after < START)),
-            (f"{wanted}, Python and all imports included", f"{seconds:.2f} s", _verdict(seconds < START)),
+            (
+                f"{wanted}, Python and all imports included",
+                f"{seconds:.2f} s",
+                _verdict(seconds < START),
+            ),
         ]
     return []
 

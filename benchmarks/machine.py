@@ -20,8 +20,12 @@ def about(packages: Iterable[str], **settings: Any) -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "widest vectors": next((name for name in VECTORS if name in _cpuinfo("flags", "Features").split()), "unknown"),
-        "load average at the start": ", ".join(f"{x:.2f}" for x in os.getloadavg()) if hasattr(os, "getloadavg") else "unknown",
+        "widest vectors": next(
+            (name for name in VECTORS if name in _cpuinfo("flags", "Features").split()), "unknown"
+        ),
+        "load average at the start": ", ".join(f"{x:.2f}" for x in os.getloadavg())
+        if hasattr(os, "getloadavg")
+        else "unknown",
         "system": f"{platform.system()} {platform.release()}",
         "Python": platform.python_version(),
         "versions": ", ".join(f"{p} {_version(p)}" for p in dict.fromkeys(packages)),
@@ -33,7 +37,9 @@ def about(packages: Iterable[str], **settings: Any) -> dict[str, Any]:
 def _cpuinfo(*keys: str) -> str:
     path = Path("/proc/cpuinfo")
     lines = path.read_text().splitlines() if path.exists() else []
-    return next((line.split(":", 1)[1].strip() for line in lines if line.split(":")[0].strip() in keys), "")
+    return next(
+        (line.split(":", 1)[1].strip() for line in lines if line.split(":")[0].strip() in keys), ""
+    )
 
 
 def _processor() -> str:
@@ -42,6 +48,7 @@ def _processor() -> str:
 
 def _version(package: str) -> str:
     try:
-        return __version__ if package == "saltus" else version(package)  # a checkout's own, not that of its last installation
+        # a checkout's own, not that of its last installation
+        return __version__ if package == "saltus" else version(package)
     except PackageNotFoundError:
         return "(not installed)"

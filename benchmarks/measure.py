@@ -1,7 +1,8 @@
 """Measuring side by side on a machine that is not quiet, and comparing at equal achieved error.
 
-The tasks take turns, round after round, so that a machine whose speed drifts slows them alike. The median over the rounds is
-the figure, the quartiles its spread, and the least time what the machine can do when left alone.
+The tasks take turns, round after round, so that a machine whose speed drifts slows them alike. The
+median over the rounds is the figure, the quartiles its spread, and the least time what the machine
+can do when left alone.
 """
 
 from __future__ import annotations
@@ -31,7 +32,14 @@ class Timing:
     def per(self, count: float, unit: float = 1e6) -> Timing:
         """The same for one of `count` things, in microseconds unless told otherwise."""
         factor = unit / count
-        return Timing(self.median * factor, self.low * factor, self.high * factor, self.least * factor, self.cores, self.rounds)
+        return Timing(
+            self.median * factor,
+            self.low * factor,
+            self.high * factor,
+            self.least * factor,
+            self.cores,
+            self.rounds,
+        )
 
     def as_dict(self) -> dict[str, float]:
         """For JSON."""
@@ -45,11 +53,17 @@ def summary(times: Sequence[float], cores: float = float("nan")) -> Timing:
 
 
 def interleave(
-    tasks: Mapping[Key, Callable[[], object]], rounds: int, *, warm: bool = True, one_core: bool = False
+    tasks: Mapping[Key, Callable[[], object]],
+    rounds: int,
+    *,
+    warm: bool = True,
+    one_core: bool = False,
 ) -> dict[Key, Timing]:
-    """Run every task once a round, in turn; with `warm` an untimed round comes first, to compile and to fill caches.
+    """Run every task once a round, in turn; with `warm` an untimed round comes first, to compile
+    and to fill caches.
 
-    Tasks that use one core are timed by their processor time, which does not count what else runs on the machine.
+    Tasks that use one core are timed by their processor time, which does not count what else runs
+    on the machine.
     """
     wall: dict[Key, list[float]] = {key: [] for key in tasks}
     cpu: dict[Key, list[float]] = {key: [] for key in tasks}
@@ -63,23 +77,34 @@ def interleave(
             task()
             wall[key].append(time.perf_counter() - start)
             cpu[key].append(time.process_time() - busy)
-    return {key: summary(cpu[key] if one_core else wall[key], sum(cpu[key]) / sum(wall[key])) for key in tasks}
+    return {
+        key: summary(cpu[key] if one_core else wall[key], sum(cpu[key]) / sum(wall[key]))
+        for key in tasks
+    }
 
 
 def front(errors: Sequence[float], times: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """The points that no other one beats in both error and time, the largest error and the shortest time first."""
+    """The points that no other one beats in both error and time, the largest error and the shortest
+    time first.
+    """
     best: list[tuple[float, float]] = []
-    for cost, error in sorted((t, e) for e, t in zip(errors, times, strict=True) if np.isfinite(e) and np.isfinite(t)):
+    for cost, error in sorted(
+        (t, e) for e, t in zip(errors, times, strict=True) if np.isfinite(e) and np.isfinite(t)
+    ):
         if not best or error < best[-1][0]:
             best.append((max(error, 1e-300), cost))
     kept = np.array(best).reshape(-1, 2)
     return kept[:, 0], kept[:, 1]
 
 
-def equal_error(errors: Sequence[float], times: Sequence[float], targets: Sequence[float]) -> np.ndarray:
-    """The time that a code needs for an error of at most each target: log-log interpolation along its front.
+def equal_error(
+    errors: Sequence[float], times: Sequence[float], targets: Sequence[float]
+) -> np.ndarray:
+    """The time that a code needs for an error of at most each target: log-log interpolation along
+    its front.
 
-    A target looser than anything measured costs what the cheapest point costs; one that the code never reached is NaN.
+    A target looser than anything measured costs what the cheapest point costs; one that the code
+    never reached is NaN.
     """
     error, cost = front(errors, times)
     if not len(error):

@@ -1,8 +1,9 @@
-"""The page that computes, measured in a real Chromium: written to results/pages.md with the rest, or alone by `python pages.py`.
+"""The page that computes, measured in a real Chromium: written to results/pages.md with the rest,
+or alone by `python pages.py`.
 
-A page is opened from disk; its slider is moved at various instants of a frame; the mechanism plays; basins are computed in
-workers. Each figure is taken in several rounds, and the best one is said beside the median: other work on the machine slows a
-browser more than it slows Python.
+A page is opened from disk; its slider is moved at various instants of a frame; the mechanism plays;
+basins are computed in workers. Each figure is taken in several rounds, and the best one is said
+beside the median: other work on the machine slows a browser more than it slows Python.
 """
 
 from __future__ import annotations
@@ -19,13 +20,22 @@ import numpy as np
 import saltus
 from saltus.files import write_text
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "tests"), str(Path(__file__).parents[1] / "tests" / "web")]
+sys.path[:0] = [
+    str(Path(__file__).parents[1] / "tests"),
+    str(Path(__file__).parents[1] / "tests" / "web"),
+]
 
 LIMITS = {
     "size": (200.0, "kB of one file"),
     "first picture": (1.0, "s after it is opened from disk"),
-    "slider": (25.0, "ms from a move of the slider to the drawn frame, 95 of 100 moves, 60 forcing periods"),
-    "slider, processor time": (25.0, "ms of the page's own thread for a move, in the mean, whatever else the machine does"),
+    "slider": (
+        25.0,
+        "ms from a move of the slider to the drawn frame, 95 of 100 moves, 60 forcing periods",
+    ),
+    "slider, processor time": (
+        25.0,
+        "ms of the page's own thread for a move, in the mean, whatever else the machine does",
+    ),
     "frame": (1000 / 60, "ms between two frames while the mechanism moves, 95 of 100"),
     "work": (1000 / 60, "ms of work in a frame while the mechanism moves, 95 of 100"),
     "readable": (1.0, "s until a 200 x 200 basin of 100 periods is known at every eighth cell"),
@@ -76,7 +86,9 @@ BASINS = """(async () => {
 
 
 def system() -> saltus.System:
-    """The tristable cell of the paper, shaken a little: orbits about both buckled states, impacts between them, and rest."""
+    """The tristable cell of the paper, shaken a little: orbits about both buckled states, impacts
+    between them, and rest.
+    """
     model = saltus.Metainterface(beta0=math.radians(80), damping=0.1)
     load = saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.1), vertical=-1.5)
     return saltus.System(model=model, load=load, impact=saltus.VelocityReduction(0.8))
@@ -96,11 +108,15 @@ def measured(rounds: int) -> dict[str, list[float]] | None:
         page("Performance.enable", timeDomain="threadTicks")
         for _ in range(rounds):
             page.open(file, 1440, 1000)
-            found["first picture"].append(page.evaluate(f"{READY}.then(() => saltusPage.drawnAt / 1000)"))
+            found["first picture"].append(
+                page.evaluate(f"{READY}.then(() => saltusPage.drawnAt / 1000)")
+            )
             before = _processor_time(page)
             times = page.evaluate(MOVES)
             found["slider"].append(_late(times))
-            found["slider, processor time"].append(1000 * (_processor_time(page) - before) / len(times))
+            found["slider, processor time"].append(
+                1000 * (_processor_time(page) - before) / len(times)
+            )
             between, work = page.evaluate(PLAYS)
             found["frame"].append(_late(between))
             found["work"].append(_late(work))
@@ -122,13 +138,20 @@ def _late(times: list[float]) -> float:
     return float(np.percentile(times, 95))
 
 
-def beside_pages(head: dict[str, Any], quick: bool, folder: Path, tell: Callable[[str], object] = print) -> None:
+def beside_pages(
+    head: dict[str, Any], quick: bool, folder: Path, tell: Callable[[str], object] = print
+) -> None:
     """Measure, and write `pages.md` into a folder."""
     found = measured(1 if quick else 5)
     if found is None:
         tell("pages: no Chromium is installed here")
         return
-    lines = ["# The page that computes, in Chromium", "", *(f"* {name}: {value}" for name, value in head.items()), ""]
+    lines = [
+        "# The page that computes, in Chromium",
+        "",
+        *(f"* {name}: {value}" for name, value in head.items()),
+        "",
+    ]
     lines += ["| what | is to stay below | best round | median |", "|---|---|---|---|"]
     for name, (limit, meaning) in LIMITS.items():
         best, median = min(found[name]), float(np.median(found[name]))

@@ -7,7 +7,8 @@ from typing import Any
 
 from saltus.plots.conventions import LOOK, new_figure, panel_label, style
 
-# Okabe and Ito's colours, near ones for one package; and a marker for each code, for greyscale and the colour-blind
+# Okabe and Ito's colours, near ones for one package; and a marker for each code, for greyscale and
+# the colour-blind
 LOOKS = {
     "saltus lanes": ("#0072B2", "o", "-"),
     "saltus scalar": ("#56B4E9", "s", "-"),
@@ -29,10 +30,19 @@ def draw(results: dict[str, Any]) -> bytes:
         for name in dict.fromkeys(row["peer"] for row in results["work"]):
             _work_precision(left, name, [row for row in results["work"] if row["peer"] == name])
             _throughput(right, name, [row for row in results["throughput"] if row["peer"] == name])
-        left.set(xscale="log", yscale="log", xlabel="largest error over 16 motions (rad, rad per unit time)")
+        left.set(
+            xscale="log",
+            yscale="log",
+            xlabel="largest error over 16 motions (rad, rad per unit time)",
+        )
         left.set_ylabel(r"processor time a trajectory-period ($\mu$s)")
         left.invert_xaxis()
-        right.set(xscale="log", yscale="log", xlabel="tolerance asked for", ylabel="trajectory-periods a second, all cores")
+        right.set(
+            xscale="log",
+            yscale="log",
+            xlabel="tolerance asked for",
+            ylabel="trajectory-periods a second, all cores",
+        )
         right.invert_xaxis()
         for ax, label in ((left, "a"), (right, "b")):
             ax.grid(True, color=LOOK.faint, linewidth=0.4)
@@ -46,16 +56,30 @@ def draw(results: dict[str, Any]) -> bytes:
 
 def _look(name: str) -> dict[str, Any]:
     color, marker, dashes = LOOKS.get(name, ("#000000", "o", ":"))
-    return {"color": color, "marker": marker, "linestyle": dashes, "markersize": 4.5, "markerfacecolor": "white"}
+    return {
+        "color": color,
+        "marker": marker,
+        "linestyle": dashes,
+        "markersize": 4.5,
+        "markerfacecolor": "white",
+    }
 
 
 def _work_precision(ax: Any, name: str, rows: list[dict[str, Any]]) -> None:
     spread = [[r["median"] - r["low"] for r in rows], [r["high"] - r["median"] for r in rows]]
-    ax.errorbar([r["error"] for r in rows], [r["median"] for r in rows], yerr=spread, label=name, capsize=1.5, **_look(name))
+    ax.errorbar(
+        [r["error"] for r in rows],
+        [r["median"] for r in rows],
+        yerr=spread,
+        label=name,
+        capsize=1.5,
+        **_look(name),
+    )
 
 
 def _throughput(ax: Any, name: str, rows: list[dict[str, Any]]) -> None:
     look = _look(name)
     if rows and rows[0]["measured"]:
-        look["markerfacecolor"] = look["color"]  # filled: measured on all cores; hollow: extrapolated from one
+        # filled: measured on all cores; hollow: extrapolated from one
+        look["markerfacecolor"] = look["color"]
     ax.plot([r["tol"] for r in rows], [r["rate"] for r in rows], **look)

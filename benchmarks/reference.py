@@ -1,9 +1,10 @@
 """The case that is measured, and its exact answer.
 
-The paper's system under load (i) (`loadpatha`) at beta0 = 80 deg, C = 0.1, V = -0.5, H = 0.5, Omega = 1, with e = 1: sixteen
-motions over 20 forcing periods, the first from theta = 0.3 at rest, the others from states drawn in a box. Their ends are in
-reference.json to 40 digits, where two orders of an arbitrary-precision Taylor method agree; `python benchmarks/reference.py`
-computes them anew in three minutes.
+The paper's system under load (i) (`loadpatha`) at beta0 = 80 deg, C = 0.1, V = -0.5, H = 0.5, Omega
+= 1, with e = 1: sixteen motions over 20 forcing periods, the first from theta = 0.3 at rest, the
+others from states drawn in a box. Their ends are in reference.json to 40 digits, where two orders
+of an arbitrary-precision Taylor method agree; `python benchmarks/reference.py` computes them anew
+in three minutes.
 """
 
 from __future__ import annotations
@@ -35,38 +36,58 @@ def states(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def exact() -> dict[str, Any]:
-    """The ends of the first MOTIONS motions, the first one after one period, and its derivative to the amplitude."""
-    return {key: np.array(value, dtype=float) for key, value in json.loads(FILE.read_text()).items()}
+    """The ends of the first MOTIONS motions, the first one after one period, and its derivative to
+    the amplitude.
+    """
+    return {
+        key: np.array(value, dtype=float) for key, value in json.loads(FILE.read_text()).items()
+    }
 
 
 def errors(theta: Sequence[float], velocity: Sequence[float]) -> np.ndarray:
     """The error of each end state, the larger one of theta and theta'."""
     known, n = exact(), min(len(theta), MOTIONS)
-    return np.maximum(np.abs(theta[:n] - known["theta"][:n]), np.abs(velocity[:n] - known["velocity"][:n]))
+    return np.maximum(
+        np.abs(theta[:n] - known["theta"][:n]), np.abs(velocity[:n] - known["velocity"][:n])
+    )
 
 
 # --- the answer in 40 digits
 
 
-def _series(t: Any, x: Any, v: Any, side: int, amplitude: Any, order: int) -> tuple[list[Any], list[Any]]:
-    """Taylor coefficients of theta and theta' at time t on a side; every parameter is the double that the codes are given."""
+def _series(
+    t: Any, x: Any, v: Any, side: int, amplitude: Any, order: int
+) -> tuple[list[Any], list[Any]]:
+    """Taylor coefficients of theta and theta' at time t on a side; every parameter is the double
+    that the codes are given.
+    """
     from mpmath import cos, fdot, mpf, pi, sin
 
     beta0, damping, vertical, w = map(mpf, (BETA0, DAMPING, VERTICAL, FREQUENCY))
     xs, vs = [x], [v]
     sine, cosine, push = [sin(side * x + beta0)], [cos(side * x + beta0)], [amplitude * sin(w * t)]
     for n in range(order):
-        vs.append((fdot(sine, push[::-1]) + side * vertical * cosine[n] - damping * vs[n] - xs[n]) / (n + 1))
+        vs.append(
+            (fdot(sine, push[::-1]) + side * vertical * cosine[n] - damping * vs[n] - xs[n])
+            / (n + 1)
+        )
         xs.append(vs[n] / (n + 1))
-        turn = side * fdot(vs[: n + 1], cosine[::-1]) / (n + 1), -side * fdot(vs[: n + 1], sine[::-1]) / (n + 1)
+        turn = (
+            side * fdot(vs[: n + 1], cosine[::-1]) / (n + 1),
+            -side * fdot(vs[: n + 1], sine[::-1]) / (n + 1),
+        )
         sine.append(turn[0])
         cosine.append(turn[1])
-        push.append(amplitude * w ** (n + 1) * sin(w * t + (n + 1) * pi / 2) / math.factorial(n + 1))
+        push.append(
+            amplitude * w ** (n + 1) * sin(w * t + (n + 1) * pi / 2) / math.factorial(n + 1)
+        )
     return xs, vs
 
 
 def _first_root(gap: list[Any], h: Any) -> Any:
-    """The first root of a polynomial (constant term first) in (0, h], found on a scan of 32 pieces, or None."""
+    """The first root of a polynomial (constant term first) in (0, h], found on a scan of 32 pieces,
+    or None.
+    """
     from mpmath import polyval
 
     value, pieces = gap[::-1], 32
@@ -85,7 +106,9 @@ def _first_root(gap: list[Any], h: Any) -> Any:
     return None
 
 
-def motion(theta: float, velocity: float, horizon: float, *, amplitude: Any = AMPLITUDE, order: int = 40) -> tuple[Any, Any, int]:
+def motion(
+    theta: float, velocity: float, horizon: float, *, amplitude: Any = AMPLITUDE, order: int = 40
+) -> tuple[Any, Any, int]:
     """The end of a motion in mpmath's numbers, and its impacts."""
     from mpmath import mpf, polyval
 
@@ -95,7 +118,10 @@ def motion(theta: float, velocity: float, horizon: float, *, amplitude: Any = AM
     while t < end:
         xs, vs = _series(t, x, v, side, amplitude, order)
         h = min(
-            (tol / abs(vs[order])) ** (mpf(1) / order), (tol / abs(vs[order - 1])) ** (mpf(1) / (order - 1)), mpf(1) / 2, end - t
+            (tol / abs(vs[order])) ** (mpf(1) / order),
+            (tol / abs(vs[order - 1])) ** (mpf(1) / (order - 1)),
+            mpf(1) / 2,
+            end - t,
         )
         root = _first_root([side * c for c in (xs[1:] if x == 0 else xs)], h)
         tau = h if root is None else root
@@ -106,14 +132,21 @@ def motion(theta: float, velocity: float, horizon: float, *, amplitude: Any = AM
 
 
 def compute() -> dict[str, list[str]]:
-    """Everything that reference.json holds, as decimal strings; refuses a digit on which the orders 40 and 46 differ."""
+    """Everything that reference.json holds, as decimal strings; refuses a digit on which the orders
+    40 and 46 differ.
+    """
     from mpmath import mp, mpf, nstr
 
     mp.dps = 45
-    ends = [(motion(*state, HORIZON), motion(*state, HORIZON, order=46)) for state in zip(*states(MOTIONS), strict=True)]
+    ends = [
+        (motion(*state, HORIZON), motion(*state, HORIZON, order=46))
+        for state in zip(*states(MOTIONS), strict=True)
+    ]
     assert all(abs(a[i] - b[i]) < mpf(10) ** -25 for a, b in ends for i in (0, 1))
     step = mpf(10) ** -12
-    ahead, behind = (motion(0.3, 0.0, HORIZON, amplitude=mpf(AMPLITUDE) + sign * step) for sign in (1, -1))
+    ahead, behind = (
+        motion(0.3, 0.0, HORIZON, amplitude=mpf(AMPLITUDE) + sign * step) for sign in (1, -1)
+    )
     columns: dict[str, list[Any]] = {
         "theta": [a[0] for a, _ in ends],
         "velocity": [a[1] for a, _ in ends],

@@ -55,7 +55,8 @@ def _about(results: dict[str, Any]) -> str:
     lines = [f"* {key}: {value}" for key, value in about.items()]
     return (
         "The case: the paper's system under load (i), beta0 = 80 deg, C = 0.1, V = -0.5, H = 0.5, Omega = 1, e = 1, over 20 "
-        "forcing periods; one trajectory-period is one motion over one of them.\n\n" + "\n".join(lines)
+        "forcing periods; one trajectory-period is one motion over one of them.\n\n"
+        + "\n".join(lines)
     )
 
 
@@ -79,7 +80,8 @@ def _equal_error(work: list[dict[str, Any]]) -> str:
         "## At equal achieved error, on one core\n\n"
         "Microseconds of processor time for a trajectory-period, and in brackets how many times that of "
         f"{ours}. The error is the largest over sixteen motions whose ends are known to 25 digits; times are interpolated in "
-        "log-log between the tolerances of each code.\n\n" + table(("code", *(f"{t:.0e}" for t in TARGETS)), rows)
+        "log-log between the tolerances of each code.\n\n"
+        + table(("code", *(f"{t:.0e}" for t in TARGETS)), rows)
     )
 
 
@@ -94,7 +96,9 @@ def _one_motion(rows: list[dict[str, Any]] | None) -> str:
     for code in codes:
         for periods in PERIODS:
             own = [row for row in rows if (row["code"], row["periods"]) == (code, periods)]
-            times[code, periods] = equal_error([row["error"] for row in own], [row["least"] for row in own], LOOSE)
+            times[code, periods] = equal_error(
+                [row["error"] for row in own], [row["least"] for row in own], LOOSE
+            )
 
     def cell(code: str, periods: int, i: int) -> str:
         own, theirs = times[code, periods][i], times[CODES[0], periods][i]
@@ -126,7 +130,8 @@ def _throughput(rows: list[dict[str, Any]]) -> str:
         for row in shown
     ]  # fmt: skip
     return "## Throughput on all cores\n\n" + table(
-        ("code", "tol", "million trajectory-periods / s", "third quartile to best", "measured on"), cells
+        ("code", "tol", "million trajectory-periods / s", "third quartile to best", "measured on"),
+        cells,
     )
 
 
@@ -137,14 +142,29 @@ def _derivatives(rows: list[dict[str, Any]]) -> str:
         for row in rows
     ]  # fmt: skip
     return "## Derivatives, at tol 1e-10 on one core\n\n" + table(
-        ("code", "without, us", "with, us", "ratio", "relative error of d(end)/dH", "derivatives to"), cells
+        (
+            "code",
+            "without, us",
+            "with, us",
+            "ratio",
+            "relative error of d(end)/dH",
+            "derivatives to",
+        ),
+        cells,
     )
 
 
 def _fits(rows: list[dict[str, Any]] | None) -> str:
     if not rows:
         return ""
-    head = ("unknowns", "saltus.fit, ms", "two-point differences, ms", "ratio", "standard errors missed", "and by differences")
+    head = (
+        "unknowns",
+        "saltus.fit, ms",
+        "two-point differences, ms",
+        "ratio",
+        "standard errors missed",
+        "and by differences",
+    )
     cells = [
         [str(row["unknowns"]), *(number(row[name]) for name in ("exact", "differences", "ratio"))]
         + [f"{row[name]:.0e}" for name in ("missed", "missed_by_differences")]
@@ -164,7 +184,13 @@ def _startup(rows: list[dict[str, Any]]) -> str:
         spread = f"{row['median']:.2f} ({row['least']:.2f} to {row['high']:.2f})"
         return [spread, f"{row['after_imports']:.2f}", str(row.get("new_files", "nothing kept"))]
 
-    head = ("code", "start", "seconds: median (least to third quartile)", "after the imports", "files added to the cache")
+    head = (
+        "code",
+        "start",
+        "seconds: median (least to third quartile)",
+        "after the imports",
+        "files added to the cache",
+    )
     lines = [[row["peer"], row["start"], *cells(row)] for row in rows]
     return "## From the start of Python to the end of the first motion\n\n" + table(head, lines)
 
@@ -174,7 +200,12 @@ def _paper_way(rows: list[dict[str, Any]], work: list[dict[str, Any]]) -> str:
     ours = OURS if OURS in times else next(iter(times))
     cheapest = min(row["median"] for row in work if row["peer"] == ours)
     cells = [
-        [number(row["sharpness"]), f"{row['error']:.1e}", number(row["median"]), number(row["median"] * 1e6 / cheapest)]
+        [
+            number(row["sharpness"]),
+            f"{row['error']:.1e}",
+            number(row["median"]),
+            number(row["median"] * 1e6 / cheapest),
+        ]
         for row in rows
     ]
     return (
@@ -202,7 +233,11 @@ def _grid(row: dict[str, Any] | None) -> str:
         f"{row['rate'] / 1e6:.2f} million trajectory-periods a second; peak memory {row['peak'] / 2**20:.0f} MiB, of which "
         f"{row['peak_before'] / 2**20:.0f} before it began and {row['bytes_of_result'] / 2**20:.0f} of results."
     )
-    return "## A grid of initial states\n\n" + text + ("" if row["finite"] else " Some results are not finite.")
+    return (
+        "## A grid of initial states\n\n"
+        + text
+        + ("" if row["finite"] else " Some results are not finite.")
+    )
 
 
 def _work(work: list[dict[str, Any]]) -> str:
@@ -217,5 +252,9 @@ def _work(work: list[dict[str, Any]]) -> str:
 
 def _peers(results: dict[str, Any]) -> str:
     lines = [f"* {peer['name']}: {peer['about']}." for peer in results["peers"]]
-    lines += [f"* {name}: absent ({reason})." for name, reason in results["absent"].items() if name != "prototype"]
+    lines += [
+        f"* {name}: absent ({reason})."
+        for name, reason in results["absent"].items()
+        if name != "prototype"
+    ]
     return "## What each code does\n\n" + "\n".join(lines)

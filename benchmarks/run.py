@@ -1,8 +1,11 @@
-"""Measure saltus beside its peers, and write the report, the numbers and the picture to benchmarks/results/.
+"""Measure saltus beside its peers, and write the report, the numbers and the picture to
+benchmarks/results/.
 
-    make bench        or        python benchmarks/run.py [--rounds N] [--quick] [--grid] [--only PEER ...]
+    make bench        or        python benchmarks/run.py [--rounds N] [--quick] [--grid] [--only
+    PEER ...]
 
-Everything runs in one session, the codes in turn; a peer that is not installed, or that fails, is reported as such.
+Everything runs in one session, the codes in turn; a peer that is not installed, or that fails, is
+reported as such.
 """
 
 from __future__ import annotations
@@ -36,7 +39,8 @@ from tasks.zeno import zeno
 from saltus.files import write_bytes, write_text
 
 RESULTS = Path(__file__).parent / "results"
-QUICK = Path(__file__).parent.parent / "results" / "benchmarks"  # not tracked: a quick look changes no published figure
+# not tracked: a quick look changes no published figure
+QUICK = Path(__file__).parent.parent / "results" / "benchmarks"
 GRID = ("1000", "100", "1e-8")
 
 
@@ -44,12 +48,17 @@ def measure(peers: list[Peer], rounds: int, quick: bool) -> dict[str, Any]:
     """Every task, each with a line that says how long it took."""
     tasks = {
         "work": lambda: work_precision(peers, rounds, quick),
-        **({"one_motion": lambda: one_motion(rounds)} if any(p.module == "heyoka_scalar" for p in peers) else {}),
+        **(
+            {"one_motion": lambda: one_motion(rounds)}
+            if any(p.module == "heyoka_scalar" for p in peers)
+            else {}
+        ),
         "throughput": lambda: throughput(peers, min(rounds, 3), quick),
         "derivatives": lambda: derivative_cost(peers, rounds),
         "fits": lambda: fits(rounds),
         "startup": lambda: startup(
-            [p for p in peers if not quick or p.module != "saltus_scalar"], 1 if quick else min(rounds, 3)
+            [p for p in peers if not quick or p.module != "saltus_scalar"],
+            1 if quick else min(rounds, 3),
         ),
         "paper_way": lambda: paper_way(1 if quick else 2, quick),
         "zeno": lambda: zeno(peers),
@@ -66,16 +75,35 @@ def measure(peers: list[Peer], rounds: int, quick: bool) -> dict[str, Any]:
 def options() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=None, help="rounds over which medians are taken (9, with --quick 3)")
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=None,
+        help="rounds over which medians are taken (9, with --quick 3)",
+    )
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="one method a package, and fewer motions, tolerances and rounds: about two minutes on two quiet cores",
+        help=(
+            "one method a package, and fewer motions, tolerances and rounds: about two minutes "
+            "on two quiet cores"
+        ),
     )
-    parser.add_argument("--grid", action="store_true", help="also a 1000 x 1000 grid of states over 100 periods")
-    parser.add_argument("--only", nargs="+", choices=MODULES, default=MODULES, help="these peers alone")
-    parser.add_argument("--against", default="", metavar="COMMIT", help="instead this tree beside that one, in turn (against.py)")
-    parser.add_argument("--prototype", default="", help="a folder with nb_lanes.py, to be measured beside the lanes")
+    parser.add_argument(
+        "--grid", action="store_true", help="also a 1000 x 1000 grid of states over 100 periods"
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=MODULES, default=MODULES, help="these peers alone"
+    )
+    parser.add_argument(
+        "--against",
+        default="",
+        metavar="COMMIT",
+        help="instead this tree beside that one, in turn (against.py)",
+    )
+    parser.add_argument(
+        "--prototype", default="", help="a folder with nb_lanes.py, to be measured beside the lanes"
+    )
     return parser.parse_args()
 
 
@@ -92,7 +120,11 @@ def main() -> None:
         peers = firsts(peers)
     packages = ("saltus", "numpy", *(package for peer in peers for package in peer.packages))
     head = about(packages, rounds=rounds, **({"quick": "yes"} if chosen.quick else {}))
-    results = {"about": head, "peers": [{"name": p.name, "about": p.about} for p in peers], "absent": absent}
+    results = {
+        "about": head,
+        "peers": [{"name": p.name, "about": p.about} for p in peers],
+        "absent": absent,
+    }
     results |= measure(peers, rounds, chosen.quick)
     if chosen.grid:
         results["grid"] = run_child("grid", *GRID, limit=3600.0)

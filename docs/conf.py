@@ -1,4 +1,7 @@
-"""How the site is built: `make docs`. Pages are Markdown, the reference comes from the code, the gallery from examples/."""
+"""How the site is built: `make docs`.
+
+Pages are Markdown, the reference comes from the code, the gallery from examples/.
+"""
 
 import sys
 from importlib.util import find_spec
@@ -9,7 +12,11 @@ sys.path.insert(0, str(HERE / "_extensions"))
 
 import saltus  # noqa: E402
 
-project, author, copyright = "saltus", "The saltus developers", "the saltus developers, BSD-3-Clause"
+project, author, copyright = (
+    "saltus",
+    "The saltus developers",
+    "the saltus developers, BSD-3-Clause",
+)
 version = release = saltus.__version__
 
 extensions = [
@@ -23,10 +30,18 @@ extensions = [
     "saltus_reference",  # docs/_extensions
     "living_pages",
 ]
-exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5", "gallery/*.json", "_extensions"]
+exclude_patterns = [
+    "_build",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+    "gallery/*.md5",
+    "gallery/*.json",
+    "_extensions",
+]
 default_role = "code"  # docstrings write `name` for code
 nitpicky = True
-# What others define has no page here, and type variables none anywhere; every name of saltus is looked up.
+# What others define has no page here, and type variables none anywhere; every name of saltus is
+# looked up.
 nitpick_ignore_regex = [(r"py:.*", r"(?!saltus).*")]
 suppress_warnings = ["config.cache"]
 
@@ -44,13 +59,15 @@ maximum_signature_line_length = 100
 toc_object_entries_show_parents = "hide"  # the contents at the right are narrow
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-napoleon_custom_sections = [("Attributes", "params_style")]  # of results, whose fields are shown as arguments are
+# of results, whose fields are shown as arguments are
+napoleon_custom_sections = [("Attributes", "params_style")]
 
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "ignore_pattern": r"__init__\.py" if find_spec("optax") else r"__init__\.py|in_jax\.py",  # JAX is not installed for the site
+    # JAX is not installed for the site
+    "ignore_pattern": r"__init__\.py" if find_spec("optax") else r"__init__\.py|in_jax\.py",
     "plot_gallery": "True",
     "within_subsection_order": "gallery_order.InOrder",
     "image_scrapers": ("matplotlib",),

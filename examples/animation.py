@@ -2,8 +2,9 @@
 A mechanism that moves
 ======================
 
-A motion of the metainterface as a film, its phase portrait beside it. A GIF and a page are written without other programs, an MP4
-where ffmpeg is installed. The bars of the cell stay rigid: their lengths in all states of the motion are the same to rounding.
+A motion of the metainterface as a film, its phase portrait beside it. A GIF and a page are written
+without other programs, an MP4 where ffmpeg is installed. The bars of the cell stay rigid: their
+lengths in all states of the motion are the same to rounding.
 """
 
 import matplotlib.pyplot as plt
@@ -28,7 +29,12 @@ for ax, time in zip(axes.flat, (0.0, 5.0, 10.0, 15.0), strict=True):
             ax.plot(*shape.points.T, color="k" if shape.role == "bar" else "C0")
     bars = [shape.points for shape in drawing_of(system, [theta]) if shape.role == "bar"]
     lengths.append([np.hypot(*(end - start)) for start, end in bars])
-    ax.set(title=rf"$\tau={time:g}$, $\theta={theta:.2f}$ rad", aspect="equal", xlim=(-1.4, 2.8), ylim=(-0.8, 2.6))
+    ax.set(
+        title=rf"$\tau={time:g}$, $\theta={theta:.2f}$ rad",
+        aspect="equal",
+        xlim=(-1.4, 2.8),
+        ylim=(-0.8, 2.6),
+    )
     ax.axis("off")
 print(f"the lengths of the bars differ by {np.ptp(lengths, axis=0).max():.0e}")
 assert np.ptp(lengths, axis=0).max() < 1e-14

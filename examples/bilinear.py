@@ -2,8 +2,8 @@
 A bilinear oscillator of your own
 =================================
 
-x'' + k(x) x = F, with k = 1 for x > 0 and k = K for x < 0: a crack that opens and closes, a mooring line, a cable. Its free
-period is pi (1 + 1 / sqrt(K)), whatever its amplitude.
+x'' + k(x) x = F, with k = 1 for x > 0 and k = K for x < 0: a crack that opens and closes, a mooring
+line, a cable. Its free period is pi (1 + 1 / sqrt(K)), whatever its amplitude.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,8 @@
 A chain of four cells
 =====================
 
-Four cells in a row, of which the first is let go: how its motion reaches the last one through the springs between them."""
+Four cells in a row, of which the first is let go: how its motion reaches the last one through the
+springs between them."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,12 +11,15 @@ import numpy as np
 import saltus
 
 model = saltus.CellChain(beta0=np.deg2rad(80), cells=4, coupling=0.5, mass_ratio=0.2, damping=0.05)
-system = saltus.System(model=model, load=saltus.Load(vertical=-0.1), impact=saltus.NewtonImpact(e=0.3))
+system = saltus.System(
+    model=model, load=saltus.Load(vertical=-0.1), impact=saltus.NewtonImpact(e=0.3)
+)
 start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.5}
 motion = saltus.simulate(system, **start, velocity=(0.0,) * 8, duration=60)
 
 times = np.linspace(0.0, motion.time, 6001)
-opening = np.abs(motion.at(times)[0]).reshape(4, 2, -1).max(axis=1)  # of the layer that is open wider
+# of the layer that is open wider
+opening = np.abs(motion.at(times)[0]).reshape(4, 2, -1).max(axis=1)
 for cell, theta in enumerate(opening, 1):
     first, widest = times[np.argmax(theta > 1e-9)], times[theta.argmax()]
     print(f"cell {cell}: opens first at {first:.2f}, widest by {theta.max():.3f} at {widest:.2f}")
@@ -28,5 +32,6 @@ for cell in range(4):
 ax.set(xlabel="time", ylabel="opening of the cells, one above another")
 ax.legend(loc="center right")
 
-assert (np.diff(opening.argmax(axis=1)) > 0).all()  # each cell is widest open after the one before it
+# each cell is widest open after the one before it
+assert (np.diff(opening.argmax(axis=1)) > 0).all()
 assert len(motion.closed) == 8

@@ -2,9 +2,11 @@
 Infinitely many impacts in a finite time
 ========================================
 
-Infinitely many impacts in a finite time: the free metainterface with impact loss comes to rest, exactly (Zeno).
+Infinitely many impacts in a finite time: the free metainterface with impact loss comes to rest,
+exactly (Zeno).
 
-The paper's `finaltime` gives the same instant for small amplitudes: (1 + e)/(1 - e)/4 of the undamped period.
+The paper's `finaltime` gives the same instant for small amplitudes: (1 + e)/(1 - e)/4 of the
+undamped period.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +25,9 @@ motion = saltus.simulate(system, theta=start, duration=20.0)
 period = theory.linear_period(start, beta0=beta0, vertical=vertical)
 expected = theory.final_time(period=period, e=e)
 
-print(f"{len(motion.impacts)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}")
+print(
+    f"{len(motion.impacts)} impacts followed one by one, at rest from tau = {motion.rest_time:.12f}"
+)
 print(f"the paper's closed form for small amplitudes: {expected:.12f}")
 figure, (left, right) = plt.subplots(1, 2, figsize=(6.6, 3.6), layout="constrained")
 times = np.linspace(0.0, motion.rest_time, 4000)

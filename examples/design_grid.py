@@ -2,8 +2,9 @@
 A design grid, stopped and gone on with
 =======================================
 
-Which dashpot and which stops harvest most: a quantity of one's own over three parameters. The run is stopped half way, as a key
-or a power cut would do it, and the same call goes on. With the widest damping nothing is hit: P = c (W X)^2 / 2.
+Which dashpot and which stops harvest most: a quantity of one's own over three parameters. The run
+is stopped half way, as a key or a power cut would do it, and the same call goes on. With the widest
+damping nothing is hit: P = c (W X)^2 / 2.
 """
 
 import tempfile
@@ -12,7 +13,9 @@ import numpy as np
 
 import saltus
 
-harvester = saltus.System(model=saltus.TwoStops(), load=saltus.Load(frequency=1.0, ground=saltus.Harmonic(amplitude=0.3)))
+harvester = saltus.System(
+    model=saltus.TwoStops(), load=saltus.Load(frequency=1.0, ground=saltus.Harmonic(amplitude=0.3))
+)
 calls = []
 
 
@@ -20,12 +23,27 @@ def harvested(frequency, damping, restitution):
     calls.append(frequency)
     if len(calls) == 250:  # as the key does it
         raise KeyboardInterrupt
-    system = harvester.with_({"load.frequency": frequency, "model.damping": damping, "impact": saltus.NewtonImpact(restitution)})
-    return {"power": saltus.energies(saltus.simulate(system, x=0.0, periods=60)).power.sel(part="damping")}
+    system = harvester.with_(
+        {
+            "load.frequency": frequency,
+            "model.damping": damping,
+            "impact": saltus.NewtonImpact(restitution),
+        }
+    )
+    return {
+        "power": saltus.energies(saltus.simulate(system, x=0.0, periods=60)).power.sel(
+            part="damping"
+        )
+    }
 
 
-grid = {"frequency": np.linspace(0.5, 2.0, 16), "damping": 0.05 * 2.0 ** np.arange(5), "restitution": np.linspace(0, 1, 5)}
-settings = {"store": tempfile.mkdtemp() + "/grid.zarr", "chunk": {"frequency": 16}}  # workers=2 computes in two processes
+grid = {
+    "frequency": np.linspace(0.5, 2.0, 16),
+    "damping": 0.05 * 2.0 ** np.arange(5),
+    "restitution": np.linspace(0, 1, 5),
+}
+# workers=2 computes in two processes
+settings = {"store": tempfile.mkdtemp() + "/grid.zarr", "chunk": {"frequency": 16}}
 try:
     saltus.map_over(harvested, grid, **settings)
 except KeyboardInterrupt:
@@ -35,6 +53,10 @@ found.power.mean("frequency").plot.line("o-", x="damping")
 W = found.frequency.values
 linear = 0.4 * (W * 0.3 * W**2 / np.abs(1 - W**2 + 0.8j * W)) ** 2
 error = np.abs(found.power.sel(damping=0.8).isel(restitution=3).values / linear - 1).max()
-print(f"{len(calls)} calls for 400 points; without impacts the power is that of the formula to {error:.0e}")
-assert 400 < len(calls) <= 400 + 1 + 16  # one for the shape of what is returned, and the chunk that was stopped
+print(
+    f"{len(calls)} calls for 400 points; without impacts the power is that of the formula to "
+    f"{error:.0e}"
+)
+# one for the shape of what is returned, and the chunk that was stopped
+assert 400 < len(calls) <= 400 + 1 + 16
 assert error < 1e-8

@@ -2,7 +2,8 @@
 A model of your own: the Duffing oscillator
 ===========================================
 
-A model of one's own: the Duffing oscillator, x'' + c x' + x + b x^3 = F(tau). duffing.toml runs it; so does this script."""
+A model of one's own: the Duffing oscillator, x'' + c x' + x + b x^3 = F(tau). duffing.toml runs it;
+so does this script."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -2,10 +2,12 @@
 A chart of lift-off from an ensemble
 ====================================
 
-A chart of the metainterface at rest: which forces H sin(tau) lift it off under which vertical forces V.
+A chart of the metainterface at rest: which forces H sin(tau) lift it off under which vertical
+forces V.
 
-The theory knows the border: rest lasts while H sin(beta0) <= abs(V) cos(beta0), `critical_horizontal`. What follows beyond it
-is only known by computing it; here, how many impacts a forcing period has at the end.
+The theory knows the border: rest lasts while H sin(beta0) <= abs(V) cos(beta0),
+`critical_horizontal`. What follows beyond it is only known by computing it; here, how many impacts
+a forcing period has at the end.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,9 @@
 The square root beside a grazing
 ================================
 
-A motion that just fails to touch a wall and one that just hits it part like the square root of what lies between them. This is
-why multipliers have no limit at a grazing, and why no step of a smooth method gets through it unharmed.
+A motion that just fails to touch a wall and one that just hits it part like the square root of what
+lies between them. This is why multipliers have no limit at a grazing, and why no step of a smooth
+method gets through it unharmed.
 """
 
 import matplotlib.pyplot as plt
@@ -11,11 +12,13 @@ import numpy as np
 
 import saltus
 
-# Free oscillation x = A cos(t) below a wall at x = 1: it touches for A = 1, and hits with the speed sqrt(A^2 - 1) beyond.
+# Free oscillation x = A cos(t) below a wall at x = 1: it touches for A = 1, and hits with the speed
+# sqrt(A^2 - 1) beyond.
 system = saltus.System(model=saltus.WallOscillator(wall=1.0), impact=saltus.VelocityReduction(0.5))
 excess = 10.0 ** -np.arange(2.0, 11.0)
 ends = saltus.simulate_many(system, x=-(1 + excess), velocity=0.0, duration=2 * np.pi, tol=1e-14)
-apart = np.hypot(ends.x - -1.0, ends.velocity)  # from the motion that touches, which comes back to x = -1
+# from the motion that touches, which comes back to x = -1
+apart = np.hypot(ends.x - -1.0, ends.velocity)
 order = np.polyfit(np.log(excess), np.log(apart), 1)[0]
 print(f"distance after the impact ~ excess^{order:.4f}")
 

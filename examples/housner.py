@@ -2,8 +2,8 @@
 How a rocking block decays
 ==========================
 
-Each impact keeps the share r of the energy. For a slender block Housner (1963) gives the largest tilt after n impacts,
-phi_n = 1 - sqrt(1 - r^n (1 - (1 - phi_0)^2)) with phi = theta / alpha.
+Each impact keeps the share r of the energy. For a slender block Housner (1963) gives the largest
+tilt after n impacts, phi_n = 1 - sqrt(1 - r^n (1 - (1 - phi_0)^2)) with phi = theta / alpha.
 """
 
 from itertools import pairwise
@@ -27,7 +27,11 @@ print("Housner's formula:      ", law.round(4))
 
 figure, ax = plt.subplots()
 ax.plot(times, motion.at(times)[0] / alpha)
-ax.plot(0.5 * (impacts[:11] + impacts[1:12]), law * np.sign(motion.at(0.5 * (impacts[:11] + impacts[1:12]))[0]), "ko")
+ax.plot(
+    0.5 * (impacts[:11] + impacts[1:12]),
+    law * np.sign(motion.at(0.5 * (impacts[:11] + impacts[1:12]))[0]),
+    "ko",
+)
 ax.set(xlabel=r"time $p\,t$", ylabel=r"$\theta/\alpha$", title="dots: Housner's formula")
 
 assert np.abs(peaks - law).max() < 1e-4  # the formula's own error is of the order of alpha^2

@@ -2,8 +2,9 @@
 Damping, restitution and angle from a noisy record
 ==================================================
 
-Three seconds of the angle of a metainterface, with noise, give its damping, its restitution and its geometry with their errors;
-a random walk with the likelihood, as emcee or PyMC would do it, finds the same distribution."""
+Three seconds of the angle of a metainterface, with noise, give its damping, its restitution and its
+geometry with their errors; a random walk with the likelihood, as emcee or PyMC would do it, finds
+the same distribution."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,10 +19,18 @@ cell = saltus.System(
 times = np.linspace(0.0, 3.0, 300) / 0.25  # 3 s by the unit of time of this cell (see PhysicalCell)
 rng = np.random.default_rng(1)
 clean = saltus.simulate(cell, theta=0.3, duration=times[-1]).at(times)[0]
-record = saltus.Measurement(start={"theta": 0.3}, time=times, values={"theta": clean + rng.normal(0.0, 0.02, 300)}, sigma=0.02)
+record = saltus.Measurement(
+    start={"theta": 0.3},
+    time=times,
+    values={"theta": clean + rng.normal(0.0, 0.02, 300)},
+    sigma=0.02,
+)
 
-guess = cell.with_({"model.damping": 0.3, "impact.e": 0.7, "model.beta0": 1.2})  # with it there are fewer impacts
-found = saltus.fit(guess, record, {"model.damping": (0.0, 0.5), "impact.e": (0.6, 1.0), "model.beta0": (1.1, 1.56)})
+# with it there are fewer impacts
+guess = cell.with_({"model.damping": 0.3, "impact.e": 0.7, "model.beta0": 1.2})
+found = saltus.fit(
+    guess, record, {"model.damping": (0.0, 0.5), "impact.e": (0.6, 1.0), "model.beta0": (1.1, 1.56)}
+)
 print(found)
 # A random walk on the likelihood (flat priors within the bounds), with steps as the errors say.
 names, x = list(found.values), np.array(list(found.values.values()))
@@ -35,6 +44,12 @@ for _ in range(1500):
 saltus.plot(found, ax=plt.gca())
 errors = np.array(list(found.errors.values()))
 deviations = (np.array(list(found.values.values())) - [0.1, 0.9, np.deg2rad(80)]) / errors
-print("off by", deviations.round(2), "standard errors;", "walk / fit errors:", (np.std(walk, axis=0) / errors).round(2))
+print(
+    "off by",
+    deviations.round(2),
+    "standard errors;",
+    "walk / fit errors:",
+    (np.std(walk, axis=0) / errors).round(2),
+)
 assert np.abs(deviations).max() < 3
 assert np.abs(np.std(walk, axis=0) / errors - 1).max() < 0.35

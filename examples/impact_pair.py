@@ -2,7 +2,8 @@
 An impact damper
 ================
 
-An impact damper: a loose mass in a case on a spring takes the case's resonance down by its impacts."""
+An impact damper: a loose mass in a case on a spring takes the case's resonance down by its
+impacts."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,7 +14,9 @@ LOAD = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=0.05))
 
 
 def steady(mass_ratio: float, clearance: float) -> float:
-    """The largest displacement of the case in the last ten of 200 forcing periods, at its resonance."""
+    """The largest displacement of the case in the last ten of 200 forcing periods, at its
+    resonance.
+    """
     model = saltus.ImpactPair(mass_ratio=mass_ratio, clearance=clearance, damping=0.02)
     system = saltus.System(model=model, load=LOAD, impact=saltus.NewtonImpact(e=0.6))
     motion = saltus.simulate(system, z=0.0, x=0.0, velocity=(0.0, 0.1), periods=200)

@@ -2,8 +2,9 @@
 A fit by optax, in JAX
 ======================
 
-Gradients of motions with impacts in JAX: an optimiser of optax finds damping, restitution and start of a metainterface; and the
-gradient of a mean over 200 motions, which lanes follow together. It needs `pip install "saltus[jax]" optax`."""
+Gradients of motions with impacts in JAX: an optimiser of optax finds damping, restitution and start
+of a metainterface; and the gradient of a mean over 200 motions, which lanes follow together. It
+needs `pip install "saltus[jax]" optax`."""
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +22,8 @@ system = saltus.System(
     impact=saltus.VelocityReduction(0.9),
 )
 times = np.linspace(0.0, 8.0, 81)
-theta = saltus.simulate(system, theta=0.3, velocity=0.1, duration=8.0).at(times)[0]  # what was measured
+# what was measured
+theta = saltus.simulate(system, theta=0.3, velocity=0.1, duration=8.0).at(times)[0]
 states = saltus.to_jax(system, times=times)
 
 
@@ -30,7 +32,9 @@ def misfit(unknown):
     return jnp.mean((states(unknown["values"], unknown["start"])[:, 0] - theta) ** 2)
 
 
-unknown = jax.tree.map(jnp.asarray, {"values": {"model.damping": 0.2, "impact.e": 0.8}, "start": np.array([0.35, 0.0])})
+unknown = jax.tree.map(
+    jnp.asarray, {"values": {"model.damping": 0.2, "impact.e": 0.8}, "start": np.array([0.35, 0.0])}
+)
 optimiser = optax.lbfgs()
 
 
@@ -38,7 +42,9 @@ optimiser = optax.lbfgs()
 def improved(unknown, state):
     """What is unknown after one more step, with the misfit before it."""
     value, gradient = optax.value_and_grad_from_state(misfit)(unknown, state=state)
-    moves, state = optimiser.update(gradient, state, unknown, value=value, grad=gradient, value_fn=misfit)
+    moves, state = optimiser.update(
+        gradient, state, unknown, value=value, grad=gradient, value_fn=misfit
+    )
     return optax.apply_updates(unknown, moves), state, value
 
 
@@ -50,11 +56,17 @@ print(f"after {len(history) - 1} steps: {jax.tree.map(np.asarray, unknown)}")
 figure, ax = plt.subplots()
 ax.semilogy(history[1:], "o-")
 ax.set(xlabel="step of L-BFGS", ylabel="mean square of the misfit")
-assert np.allclose([*unknown["values"].values(), *unknown["start"]], [0.9, 0.1, 0.3, 0.1], atol=1e-9)
+assert np.allclose(
+    [*unknown["values"].values(), *unknown["start"]], [0.9, 0.1, 0.3, 0.1], atol=1e-9
+)
 
 starts = jnp.stack([jnp.linspace(0.05, 0.8, 200), jnp.zeros(200)], axis=1)
-ends = jax.vmap(saltus.to_jax(system, periods=2), in_axes=(None, 0))  # in lanes, as simulate_many, with its derivatives
+# in lanes, as simulate_many, with its derivatives
+ends = jax.vmap(saltus.to_jax(system, periods=2), in_axes=(None, 0))
 slope = jax.grad(lambda e: jnp.mean(ends({"impact.e": e}, starts)[:, 0] ** 2))(0.9)
 losses = {"impact.e": np.array([[0.9 - 1e-5], [0.9 + 1e-5]])}
-mean = (saltus.simulate_many(system, parameters=losses, theta=np.array(starts[:, 0]), periods=2).theta ** 2).values.mean(axis=1)
+mean = (
+    saltus.simulate_many(system, parameters=losses, theta=np.array(starts[:, 0]), periods=2).theta
+    ** 2
+).values.mean(axis=1)
 assert np.isclose(slope, np.diff(mean) / 2e-5, rtol=1e-6)

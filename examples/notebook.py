@@ -2,7 +2,8 @@
 Results in a notebook
 =====================
 
-Each cell ends in a result, which shows itself as a table. The link at the end of the page downloads it as a notebook.
+Each cell ends in a result, which shows itself as a table. The link at the end of the page downloads
+it as a notebook.
 """
 
 import matplotlib.pyplot as plt

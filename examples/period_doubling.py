@@ -2,8 +2,9 @@
 Period doublings and Feigenbaum's constant
 ==========================================
 
-The symmetric motion of the metainterface loses its symmetry, then doubles its period again and again. Each doubling is solved for
-on the exact equations; the ratios of their distances tend to 4.669...
+The symmetric motion of the metainterface loses its symmetry, then doubles its period again and
+again. Each doubling is solved for on the exact equations; the ratios of their distances tend to
+4.669...
 """
 
 import matplotlib.pyplot as plt
@@ -33,7 +34,10 @@ ax.plot(one.parameters, one.amplitudes, label="unsymmetric, period 1")
 for place in cascade.parameters:
     ax.axvline(place, color="tab:red", linewidth=0.7)
 ax.set(
-    xlabel=r"amplitude $\hat{H}$ of the load", ylabel=r"amplitude of $\theta$ (rad)", xlim=(1.4, 1.8), title="lines: doublings"
+    xlabel=r"amplitude $\hat{H}$ of the load",
+    ylabel=r"amplitude of $\theta$ (rad)",
+    xlim=(1.4, 1.8),
+    title="lines: doublings",
 )
 ax.legend()
 

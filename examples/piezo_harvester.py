@@ -2,7 +2,8 @@
 A harvester with a voltage
 ==========================
 
-A mass on a shaken base hits a stop; its piezoelectric voltage, a coordinate of first order, feeds a resistance."""
+A mass on a shaken base hits a stop; its piezoelectric voltage, a coordinate of first order, feeds a
+resistance."""
 
 from dataclasses import dataclass
 
@@ -25,14 +26,18 @@ class Harvester(saltus.ContactModel):
 
     def force(self, t, q, velocity, load):
         (x, u), v = q, velocity[0]
-        return -x - 0.05 * v - self.coupling * u - load.ground.acceleration(t), self.coupling * v - u / self.resistance
+        return -x - 0.05 * v - self.coupling * u - load.ground.acceleration(
+            t
+        ), self.coupling * v - u / self.resistance
 
 
 load = saltus.Load(frequency=0.7, ground=saltus.Harmonic(0.2))
 system = saltus.System(model=Harvester(), load=load, impact=saltus.NewtonImpact(0.7))
 orbit = saltus.find_orbit(system, x=0.0, voltage=0.0)
 branch = saltus.continue_orbit(orbit, "load.frequency", (0.7, 1.4))
-power = [float(saltus.energies(each).power.sel(part="first_order.voltage")) for each in branch.orbits]
+power = [
+    float(saltus.energies(each).power.sel(part="first_order.voltage")) for each in branch.orbits
+]
 frequency = np.array([each.frequency for each in branch.orbits])
 plt.plot(frequency, power, "o-", ms=3)
 plt.gca().set(xlabel=r"frequency $\Omega$", ylabel="mean electric power")
@@ -45,10 +50,14 @@ def linear(W):
     return np.abs(X), np.abs(ratio * X)
 
 
-# Until the orbit grazes the stop its power is abs(U)^2 / (2 R), and it grazes it where abs(X) is 0.6.
+# Until the orbit grazes the stop its power is abs(U)^2 / (2 R), and it grazes it where abs(X) is
+# 0.6.
 free = np.array([each.impact_count == 0 for each in branch.orbits])
 error = np.abs(np.array(power)[free] / (linear(frequency[free])[1] ** 2 / 2.8) - 1).max()
 grazing = next(point for point in branch.special if point.kind == "GR")
-print(f"power of {free.sum()} orbits without impacts: that of the formula to {error:.1e}; special points {branch.special}")
+print(
+    f"power of {free.sum()} orbits without impacts: that of the formula to {error:.1e}; special "
+    f"points {branch.special}"
+)
 assert error < 1e-10
 assert abs(linear(grazing.parameter)[0] - 0.6) < 1e-9

@@ -2,8 +2,8 @@
 Three wells: a tristable metainterface
 ======================================
 
-Under a strong vertical load the metainterface has three stable states. Their potential has a corner at theta = 0, equilibria
-where its slope vanishes, and motions that keep their energy to rounding.
+Under a strong vertical load the metainterface has three stable states. Their potential has a corner
+at theta = 0, equilibria where its slope vanishes, and motions that keep their energy to rounding.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +12,9 @@ import numpy as np
 import saltus
 from saltus import theory
 
-system = saltus.System(model=saltus.Metainterface(beta0=np.deg2rad(80)), load=saltus.Load(vertical=-1.5))
+system = saltus.System(
+    model=saltus.Metainterface(beta0=np.deg2rad(80)), load=saltus.Load(vertical=-1.5)
+)
 states = theory.equilibria(system)
 for state in states:
     print(f"theta = {state.theta:+.9f} rad, {state.stability}, energy {state.energy:.9f}")

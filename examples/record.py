@@ -2,8 +2,9 @@
 A measured load
 ===============
 
-A record of samples as the load of an oscillator: between its samples it is linear, so that the exact motion of a linear
-oscillator follows from SciPy's `lsim`, whose matrix exponential is exact for such inputs.
+A record of samples as the load of an oscillator: between its samples it is linear, so that the
+exact motion of a linear oscillator follows from SciPy's `lsim`, whose matrix exponential is exact
+for such inputs.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,8 @@
 A response spectrum with a detached loop
 ========================================
 
-A response spectrum at H = 1: the branch of period 1 and, found by search alone, a detached loop of period 3."""
+A response spectrum at H = 1: the branch of period 1 and, found by search alone, a detached loop of
+period 3."""
 
 import tempfile
 from pathlib import Path
@@ -23,11 +24,17 @@ spectrum = response_spectrum(system, bounds=(2.0, 2.6), max_period=3, values=[2.
 for number in range(spectrum["branches"].sizes["branch"]):
     branch = saltus.branch_of(spectrum, number)
     low, high = float(branch.parameter.min()), float(branch.parameter.max())
-    print(f"branch {number}: period {int(branch.period[0])}, Omega {low:.4f} to {high:.4f}, ends {branch.attrs['ends']}")
+    print(
+        f"branch {number}: period {int(branch.period[0])}, Omega {low:.4f} to {high:.4f}, ends "
+        f"{branch.attrs['ends']}"
+    )
     for kind, place in zip(branch.kind.values, branch.special_parameter.values, strict=True):
         print(f"  {kind:16} {place:.9f}")
     stable, worst = int(branch.stable.sum()), float(branch.kept.max())
-    print(f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by at most {worst:.0e}")
+    print(
+        f"  {stable} of {branch.sizes['point']} orbits are stable, and after 20 periods off by "
+        f"at most {worst:.0e}"
+    )
 figure, ax = plt.subplots()
 for number in range(spectrum["branches"].sizes["branch"]):
     branch = saltus.branch_of(spectrum, number)
@@ -37,7 +44,8 @@ ax.legend()
 
 dots = spectrum["attractors"]
 print(
-    f"simulation settled at Omega = {dots.parameter.values} on periods {dots.period.values}, amplitudes {dots.amplitude.values}"
+    f"simulation settled at Omega = {dots.parameter.values} on periods {dots.period.values}, "
+    f"amplitudes {dots.amplitude.values}"
 )
 
 with tempfile.TemporaryDirectory() as folder:  # a file keeps the orbits themselves
@@ -52,4 +60,7 @@ assert loop.attrs["closed"]
 assert all(orbit.admissible for orbit in orbits)
 assert float(loop.kept.max()) < 1e-8
 folds = np.sort(loop.special_parameter.values[loop.kind.values == "LP"])
-assert np.abs(folds - [2.1304272516, 2.3228679307, 3.0430772685, 3.0513452905, 3.1064546343]).max() < 1e-9
+assert (
+    np.abs(folds - [2.1304272516, 2.3228679307, 3.0430772685, 3.0513452905, 3.1064546343]).max()
+    < 1e-9
+)

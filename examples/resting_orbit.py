@@ -2,8 +2,8 @@
 A motion that rests for a part of each period
 =============================================
 
-With a loss at impact a periodic motion may come to rest after infinitely many impacts, until the load opens the contact again.
-The instant of release is known: there H sin(Omega tau) reaches Hcr.
+With a loss at impact a periodic motion may come to rest after infinitely many impacts, until the
+load opens the contact again. The instant of release is known: there H sin(Omega tau) reaches Hcr.
 """
 
 import matplotlib.pyplot as plt
@@ -22,7 +22,10 @@ orbit = saltus.find_orbit(system, theta=0.3)
 critical = theory.critical_horizontal(np.deg2rad(80), -0.5)
 release = np.arcsin(critical / H) / frequency
 print(orbit)
-print(f"at rest for {100 * orbit.rest_share:.2f} % of the time; releases at {orbit.releases}, theory {release:.12f}")
+print(
+    f"at rest for {100 * orbit.rest_share:.2f} % of the time; releases at {orbit.releases}, "
+    f"theory {release:.12f}"
+)
 
 motion = orbit.motion()
 times = np.linspace(motion.time - orbit.duration, motion.time, 4000)

@@ -2,8 +2,9 @@
 A ball on a shaking table
 =========================
 
-The gap between a ball and a table that shakes is x - a sin(t). The bounce with one impact a period is born where the table can
-give back what the impacts take, and loses its stability by a doubling of its period; both have closed forms."""
+The gap between a ball and a table that shakes is x - a sin(t). The bounce with one impact a period
+is born where the table can give back what the impacts take, and loses its stability by a doubling
+of its period; both have closed forms."""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ class Ball(saltus.ContactModel):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("ground",)
-    contacts: ClassVar[tuple[saltus.Contact, ...]] = (saltus.Contact(name="table", coordinate={"x": 1.0, "ground": -1.0}),)
+    contacts: ClassVar[tuple[saltus.Contact, ...]] = (
+        saltus.Contact(name="table", coordinate={"x": 1.0, "ground": -1.0}),
+    )
 
     def force(self, t, x, velocity, load):
         return -1.0
@@ -35,7 +38,9 @@ system = saltus.System(model=Ball(), load=load, impact=saltus.NewtonImpact(e=E))
 
 phase = math.acos(born / AMPLITUDE)  # of the impacts, at which the table has the speed `born`
 height = AMPLITUDE * math.sin(phase)
-motion = saltus.simulate(system, x=height, velocity=math.pi, time=phase, duration=6 * math.pi - phase)
+motion = saltus.simulate(
+    system, x=height, velocity=math.pi, time=phase, duration=6 * math.pi - phase
+)
 orbit = saltus.find_orbit(system, x=motion.x, velocity=motion.velocity)
 branch = saltus.continue_orbit(orbit, "load.ground.amplitude", (0.7, 1.6))
 places = {str(point.kind): point.parameter for point in branch.special}

@@ -2,8 +2,8 @@
 A soft stop with two coordinates
 ================================
 
-A mass with a soft stop, and a smaller one on a spring to it. The response touches the stop where linear theory says, and bends to
-a fold, before which there are two attractors."""
+A mass with a soft stop, and a smaller one on a spring to it. The response touches the stop where
+linear theory says, and bends to a fold, before which there are two attractors."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,11 +17,15 @@ import saltus
 
 @dataclass(frozen=True, kw_only=True)
 class SoftStop(saltus.ContactModel):
-    """x'' = F - x - 0.1 x' + p, less 20 (x - 1/2) + 0.3 x' beyond 1/2, and 0.2 y'' = -p with p = 0.3 (y - x) + 0.02 (y' - x')."""
+    """x'' = F - x - 0.1 x' + p, less 20 (x - 1/2) + 0.3 x' beyond 1/2, and 0.2 y'' = -p with p =
+    0.3 (y - x) + 0.02 (y' - x').
+    """
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    surfaces: ClassVar[tuple[saltus.Surface, ...]] = (saltus.Surface(name="stop", coordinate="x", position=0.5),)
+    surfaces: ClassVar[tuple[saltus.Surface, ...]] = (
+        saltus.Surface(name="stop", coordinate="x", position=0.5),
+    )
 
     def mass_matrix(self, q):
         return [[1.0, 0.0], [0.0, 0.2]]
@@ -35,7 +39,10 @@ class SoftStop(saltus.ContactModel):
 def beyond(w):
     """The amplitude of x by which the linear system would reach beyond the stop, at a frequency."""
     stiff, damp = np.array([[1.3, -0.3], [-0.3, 0.3]]), np.array([[0.12, -0.02], [-0.02, 0.02]])
-    return abs(np.linalg.solve(stiff - w**2 * np.diag([1.0, 0.2]) + 1j * w * damp, [0.3, 0.0])[0]) - 0.5
+    return (
+        abs(np.linalg.solve(stiff - w**2 * np.diag([1.0, 0.2]) + 1j * w * damp, [0.3, 0.0])[0])
+        - 0.5
+    )
 
 
 touched = [brentq(beyond, 0.5, 0.6, xtol=1e-15), brentq(beyond, 0.95, 1.05, xtol=1e-15)]
@@ -45,14 +52,18 @@ fold = max(point.parameter for point in branch.special if point.kind == "LP")
 sweep = saltus.frequency_sweep(soft, np.linspace(0.9, 1.1, 41), x=0.0, y=0.0)
 before = soft.with_({"load.frequency": 0.5 * (touched[1] + fold)})
 verdict, found = saltus.classify(before, x=0.0, y=0.0), saltus.find_attractors(before, starts=64)
-basins = saltus.basins_of_attraction(before, found=found, x=np.linspace(-2, 0.5, 40), x_velocity=np.linspace(-2, 2, 40))
+basins = saltus.basins_of_attraction(
+    before, found=found, x=np.linspace(-2, 0.5, 40), x_velocity=np.linspace(-2, 2, 40)
+)
 print(f"touches at {touched[1]:.12f}, fold at {fold:.12f}; {verdict}; {found}")
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 saltus.plot(branch, ax=axes[0])
 saltus.plot(basins, ax=axes[1])
 
-assert np.allclose([point.parameter for point in branch.special if point.kind == "SW"], touched, rtol=0, atol=1e-10)
+assert np.allclose(
+    [point.parameter for point in branch.special if point.kind == "SW"], touched, rtol=0, atol=1e-10
+)
 up = sweep.sel(jump=sweep.jump_direction == "up")
 assert up.jump_before - 1e-4 < fold < up.jump_after + 1e-4  # the experiment jumps at the fold
 assert len(found) == 2

@@ -2,8 +2,9 @@
 A stability chart and the border of rest
 ========================================
 
-How large is the largest stable motion beside rest, under each pair of loads? Below the line the theory says that a static load of
-this size would leave the cell closed; motions exist there all the same.
+How large is the largest stable motion beside rest, under each pair of loads? Below the line the
+theory says that a static load of this size would leave the cell closed; motions exist there all the
+same.
 """
 
 import matplotlib.pyplot as plt

@@ -2,10 +2,12 @@
 Both layers as they move
 ========================
 
-Both layers as they really move: how far the reduced model, whose other layer never opens, is from them.
+Both layers as they really move: how far the reduced model, whose other layer never opens, is from
+them.
 
-Under Omega = 1, V = -0.5, C = 0.1 the reduced motion is exact for small loads. At H = 0.2 the closed layer opens for a moment
-before each crossing, so that the impact law never acts, and the steady amplitude is 0.5694 in place of 0.5856.
+Under Omega = 1, V = -0.5, C = 0.1 the reduced motion is exact for small loads. At H = 0.2 the
+closed layer opens for a moment before each crossing, so that the impact law never acts, and the
+steady amplitude is 0.5694 in place of 0.5856.
 """
 
 import matplotlib.pyplot as plt
@@ -17,7 +19,9 @@ BETA0, PERIODS = np.deg2rad(80), 60
 
 
 def load(amplitude: float) -> saltus.Load:
-    return saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude))
+    return saltus.Load(
+        frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude)
+    )
 
 
 def steady(motion: saltus.Motion) -> float:
@@ -27,7 +31,9 @@ def steady(motion: saltus.Motion) -> float:
 
 
 def reduced(amplitude: float) -> float:
-    system = saltus.System(model=saltus.Metainterface(beta0=BETA0, damping=0.1), load=load(amplitude))
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=BETA0, damping=0.1), load=load(amplitude)
+    )
     return steady(saltus.simulate(system, theta=0.1, periods=PERIODS))
 
 
@@ -39,12 +45,17 @@ def both(amplitude: float) -> saltus.Motion:
 for amplitude in (0.1, 0.2, 0.5):
     motion = both(amplitude)
     opened = sum(event.kind == "release" for event in motion.events)
-    print(f"H = {amplitude}: {steady(motion):.4f} with both layers, {reduced(amplitude):.4f} reduced, {opened} releases")
+    print(
+        f"H = {amplitude}: {steady(motion):.4f} with both layers, {reduced(amplitude):.4f} "
+        f"reduced, {opened} releases"
+    )
 
 figure, ax = plt.subplots()
 motion = both(0.5)
 times = np.linspace(motion.time - 4 * np.pi, motion.time, 3000)
-for angle, name in zip(motion.at(times)[0], (r"$\theta_1$, lower", r"$\theta_2$, upper"), strict=True):
+for angle, name in zip(
+    motion.at(times)[0], (r"$\theta_1$, lower", r"$\theta_2$, upper"), strict=True
+):
     ax.plot(times, angle, label=name)
 ax.set(xlabel=r"$\tau$", ylabel="angle (rad)", title="both layers at $H = 0.5$")
 ax.legend()

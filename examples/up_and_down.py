@@ -2,8 +2,9 @@
 A frequency swept up and down
 =============================
 
-An oscillator beside a wall, swept as on a shaker: the response jumps down at a fold on the way up, and jumps up where the linear
-motion grazes the wall on the way down. Between the two there is hysteresis."""
+An oscillator beside a wall, swept as on a shaker: the response jumps down at a fold on the way up,
+and jumps up where the linear motion grazes the wall on the way down. Between the two there is
+hysteresis."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,7 +19,9 @@ oscillator = saltus.System(
 )
 sweep = saltus.frequency_sweep(oscillator, np.linspace(1.02, 1.5, 49), x=0.1)
 for jump in range(sweep.sizes["jump"]):
-    way, before, after = (sweep[f"jump_{name}"].values[jump] for name in ("direction", "before", "after"))
+    way, before, after = (
+        sweep[f"jump_{name}"].values[jump] for name in ("direction", "before", "after")
+    )
     print(f"{way}: a jump between {before:.6f} and {after:.6f}")
 
 figure, ax = plt.subplots(layout="constrained")

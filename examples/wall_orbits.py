@@ -2,8 +2,9 @@
 The impact oscillator and its closed form
 =========================================
 
-Orbits of a linear oscillator that hits a wall once a period are known in closed form: the amplitude of the load as a function of
-the impact's speed. The exact motion that begins on such an orbit knows nothing of it, and comes back to where it began.
+Orbits of a linear oscillator that hits a wall once a period are known in closed form: the amplitude
+of the load as a function of the impact's speed. The exact motion that begins on such an orbit knows
+nothing of it, and comes back to where it began.
 """
 
 import matplotlib.pyplot as plt
@@ -24,7 +25,10 @@ phase = orbit.impact_time + 0.5
 x, velocity = orbit.state(phase)
 motion = saltus.simulate(system, x=x, velocity=velocity, time=phase, periods=1, tol=1e-14)
 print(f"closed form: one impact a period with the speed {speed:.12f}")
-print(f"simulation:  {motion.impacts.velocity_before[0]:.12f}, back at its start to {abs(motion.x - x):.0e}")
+print(
+    f"simulation:  {motion.impacts.velocity_before[0]:.12f}, back at its start to "
+    f"{abs(motion.x - x):.0e}"
+)
 
 speeds = np.linspace(0.0, 2 * speed, 400)
 figure, ax = plt.subplots()

@@ -1,8 +1,9 @@
 """Build the wheel and the source archive, and try the wheel in empty environments: `make dist`.
 
-Each Python on the path that saltus allows, with the newest packages, and the oldest Python also with the lowest packages that
-pyproject.toml allows, which newer ones may not have, gets an environment of its own with nothing but the wheel and what it needs.
-There `saltus doctor` compares a motion with its closed form, a study is run and read back, the reproduction of the paper is added
+Each Python on the path that saltus allows, with the newest packages, and the oldest Python also
+with the lowest packages that pyproject.toml allows, which newer ones may not have, gets an
+environment of its own with nothing but the wheel and what it needs. There `saltus doctor` compares
+a motion with its closed form, a study is run and read back, the reproduction of the paper is added
 and makes a part, and with --tests the tests of both run.
 """
 
@@ -39,14 +40,23 @@ class Trial:
     def run(self, wheel: Path, paper: Path, folder: Path, tests: bool) -> str:
         """Install and try; the row of the table that says how it went."""
         python = folder / "venv" / "bin" / "python"
-        uv("venv", "--quiet", "--python", shutil.which(f"python{self.python}") or "", folder / "venv")
+        uv(
+            "venv",
+            "--quiet",
+            "--python",
+            shutil.which(f"python{self.python}") or "",
+            folder / "venv",
+        )
         install = ("pip", "install", "--quiet", "--python", python)
         resolution = "lowest-direct" if self.lowest else "highest"
         extras = ("--extra", "cluster", "--extra", "test") if tests else ()
-        uv(*install, "--resolution", resolution, *extras, "-r", ROOT / "pyproject.toml")  # what the wheel needs is direct here
+        # what the wheel needs is direct here
+        uv(*install, "--resolution", resolution, *extras, "-r", ROOT / "pyproject.toml")
         uv(*install, "--no-deps", wheel)
         uv("pip", "check", "--quiet", "--python", python)
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
+        }
         environment["SALTUS_CACHE_DIR"] = str(folder / "cache")
 
         def call(*command: str | Path) -> str:
@@ -61,7 +71,8 @@ class Trial:
             )
             if done.returncode:
                 raise SystemExit(
-                    f"{self.title}: {' '.join(map(str, command))} ended with {done.returncode}\n{done.stdout[-4000:]}"
+                    f"{self.title}: {' '.join(map(str, command))} ended with "
+                    f"{done.returncode}\n{done.stdout[-4000:]}"
                 )
             return done.stdout
 
@@ -75,11 +86,25 @@ class Trial:
         passed = "not run"
         if tests:
             shutil.copytree(ROOT / "tests", folder / "checkout" / "tests")
-            for name in ("examples", "docs", "reproduction", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"):
+            for name in (
+                "examples",
+                "docs",
+                "reproduction",
+                "README.md",
+                "CHANGELOG.md",
+                "CONTRIBUTING.md",
+                "pyproject.toml",
+            ):
                 source, target = ROOT / name, folder / "checkout" / name
                 shutil.copytree(source, target) if source.is_dir() else shutil.copy(source, target)
-            passed = call("-m", "pytest", "-q", folder / "checkout", "--rootdir", folder / "checkout").splitlines()[-1]
-        return f"| {self.title} | " + " | ".join(f"{value}" for value in found.values()) + f" | {passed} |"
+            passed = call(
+                "-m", "pytest", "-q", folder / "checkout", "--rootdir", folder / "checkout"
+            ).splitlines()[-1]
+        return (
+            f"| {self.title} | "
+            + " | ".join(f"{value}" for value in found.values())
+            + f" | {passed} |"
+        )
 
     @property
     def title(self) -> str:
@@ -95,16 +120,25 @@ def uv(*arguments: str | Path) -> None:
 def works(python: str) -> bool:
     """Whether this machine has a Python; a command of its name may be a pointer to none."""
     command = shutil.which(f"python{python}")
-    return command is not None and subprocess.run([command, "-c", ""], capture_output=True, check=False).returncode == 0
+    return (
+        command is not None
+        and subprocess.run([command, "-c", ""], capture_output=True, check=False).returncode == 0
+    )
 
 
 def build(target: Path) -> tuple[Path, Path]:
-    """Build both archives of saltus, and those of the reproduction, from what is committed; the two wheels."""
+    """Build both archives of saltus, and those of the reproduction, from what is committed; the two
+    wheels.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+        archive = subprocess.run(
+            ["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE
+        )
         subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
         for project in (Path(folder), Path(folder) / "reproduction"):
-            subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", target], cwd=project, check=True)
+            subprocess.run(
+                [sys.executable, "-m", "hatchling", "build", "-d", target], cwd=project, check=True
+            )
     (wheel,), (paper,) = target.glob("saltus-*.whl"), target.glob("saltus_paper-*.whl")
     return wheel, paper
 
@@ -113,7 +147,9 @@ def main() -> None:
     """Build, then try all that can be had here."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=PYTHONS, help="try this Python alone")
-    parser.add_argument("--tests", action="store_true", help="run the tests in each environment as well")
+    parser.add_argument(
+        "--tests", action="store_true", help="run the tests in each environment as well"
+    )
     options = parser.parse_args()
     target = ROOT / "dist"
     shutil.rmtree(target, ignore_errors=True)
@@ -125,7 +161,9 @@ def main() -> None:
     for python in there:
         for lowest in (False, True) if python == PYTHONS[0] else (False,):
             with tempfile.TemporaryDirectory() as folder:
-                print(Trial(python, lowest).run(wheel, paper, Path(folder), options.tests), flush=True)
+                print(
+                    Trial(python, lowest).run(wheel, paper, Path(folder), options.tests), flush=True
+                )
     missing = [python for python in PYTHONS if python not in there]
     if missing:
         print(f"Not tried here: Python {', '.join(missing)}.")

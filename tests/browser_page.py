@@ -1,4 +1,6 @@
-"""A page in a Chromium without a window, by its DevTools protocol over a pipe: the tests need nothing else for it."""
+"""A page in a Chromium without a window, by its DevTools protocol over a pipe: the tests need
+nothing else for it.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +10,37 @@ import os
 from pathlib import Path
 from typing import Any
 
-OPTIONS = ["--headless", "--disable-gpu", "--no-first-run", "--hide-scrollbars", "--remote-debugging-pipe", "--mute-audio"]
+OPTIONS = [
+    "--headless",
+    "--disable-gpu",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--remote-debugging-pipe",
+    "--mute-audio",
+]
 
 
 class BrowserPage:
-    """One page, open from `__init__` to `close`; `errors` are its scripts' exceptions and what it could not load."""
+    """One page, open from `__init__` to `close`; `errors` are its scripts' exceptions and what it
+    could not load.
+    """
 
     def __init__(self, browser: str, profile: Path) -> None:
         (read, self._commands), (self._answers, write) = os.pipe(), os.pipe()
-        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (read, write)]  # out of the way of 3 and 4
-        actions = [(os.POSIX_SPAWN_DUP2, end, place) for end, place in zip(ends, (3, 4), strict=True)]
+        # out of the way of 3 and 4
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (read, write)]
+        actions = [
+            (os.POSIX_SPAWN_DUP2, end, place) for end, place in zip(ends, (3, 4), strict=True)
+        ]
         actions += [(os.POSIX_SPAWN_OPEN, place, os.devnull, os.O_WRONLY, 0) for place in (1, 2)]
-        options = [*OPTIONS, f"--user-data-dir={profile}", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
-        self._process = os.posix_spawn(browser, [browser, *options], os.environ, file_actions=actions)
+        options = [
+            *OPTIONS,
+            f"--user-data-dir={profile}",
+            *(["--no-sandbox"] if os.geteuid() == 0 else []),
+        ]
+        self._process = os.posix_spawn(
+            browser, [browser, *options], os.environ, file_actions=actions
+        )
         for end in (read, write, *ends):
             os.close(end)
         self._number, self._session, self._buffer = 0, None, b""
@@ -69,7 +89,13 @@ class BrowserPage:
 
     def open(self, path: Path, width: int, height: int = 800) -> None:
         """Load a file into a window of this size, in pixels."""
-        self("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        self(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=width < 600,
+        )
         self.go(path.as_uri())
 
     def go(self, address: str) -> None:
@@ -100,19 +126,32 @@ class BrowserPage:
 
     def click(self, selector: str) -> None:
         """Click in the middle of an element, as a pointer does."""
-        place = f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}}); "
-        place += "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+        place = (
+            f"(() => {{ const e = document.querySelector({json.dumps(selector)}); "
+            f"e.scrollIntoView({{block: 'center'}}); "
+        )
+        place += (
+            "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height "
+            "/ 2]; })()"
+        )
         x, y = self.evaluate(place)
         for kind in ("mousePressed", "mouseReleased"):
             self("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def point(self, kind: str, x: float, y: float, **more: Any) -> None:
-        """An event of the mouse at a place of the window: `mouseMoved`, `mousePressed`, `mouseReleased` or `mouseWheel`."""
-        pressed = {"button": "left", "clickCount": 1} if kind in ("mousePressed", "mouseReleased") else {}
+        """An event of the mouse at a place of the window: `mouseMoved`, `mousePressed`,
+        `mouseReleased` or `mouseWheel`.
+        """
+        pressed = (
+            {"button": "left", "clickCount": 1} if kind in ("mousePressed", "mouseReleased") else {}
+        )
         self("Input.dispatchMouseEvent", type=kind, x=x, y=y, **pressed, **more)
 
     def type(self, selector: str, text: str) -> None:
         """Put a text into a field and press Enter, as a reader does."""
-        self.evaluate(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.focus(); e.select(); }})()")
+        self.evaluate(
+            f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.focus(); "
+            f"e.select(); }})()"
+        )
         self("Input.insertText", text=text)
         self.press("Enter", 13)

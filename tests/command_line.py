@@ -22,7 +22,9 @@ def started():
     processes = []
 
     def start(command, **options):
-        processes.append(subprocess.Popen(command, text=True, preexec_fn=_heed_interrupts, **options))
+        processes.append(
+            subprocess.Popen(command, text=True, preexec_fn=_heed_interrupts, **options)
+        )
         return processes[-1]
 
     yield start
@@ -37,11 +39,17 @@ def saltus(monkeypatch):
     """Run `saltus` with arguments, in this process; a traceback fails the test."""
     from saltus.cli.app import app
 
-    # The runner builds all commands anew for each call, which takes twice as long as what most of these tests ask.
+    # The runner builds all commands anew for each call, which takes twice as long as what most of
+    # these tests ask.
     monkeypatch.setattr("typer.testing._get_command", _built_once, raising=False)
 
     def run(*arguments):
-        result = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="saltus", env={"COLUMNS": "160", "NO_COLOR": "1"})
+        result = CliRunner().invoke(
+            app,
+            [str(a) for a in arguments],
+            prog_name="saltus",
+            env={"COLUMNS": "160", "NO_COLOR": "1"},
+        )
         if result.exception is not None and not isinstance(result.exception, SystemExit):
             raise result.exception
         return result

@@ -1,4 +1,6 @@
-"""Compile what nearly every test needs, two parts at a time: workers that start together would each compile it for themselves."""
+"""Compile what nearly every test needs, two parts at a time: workers that start together would each
+compile it for themselves.
+"""
 
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial

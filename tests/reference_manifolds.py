@@ -1,7 +1,8 @@
-"""The stable and unstable manifolds of the saddles under a constant load: the separatrices of a phase portrait.
+"""The stable and unstable manifolds of the saddles under a constant load: the separatrices of a
+phase portrait.
 
-Arcs are integrated here and not by `saltus.flow`, because a stable manifold is followed backward in time, where the damping
-and the velocity factor (1/e) leave the range that models accept.
+Arcs are integrated here and not by `saltus.flow`, because a stable manifold is followed backward in
+time, where the damping and the velocity factor (1/e) leave the range that models accept.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ ACCURACY = {"rtol": 1e-12, "atol": 1e-14}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifold:
-    """A branch of an invariant manifold from its saddle on: arrays (n,) with NaN where the velocity jumps.
+    """A branch of an invariant manifold from its saddle on: arrays (n,) with NaN where the velocity
+    jumps.
 
     `time` runs from 0 and away from the saddle: negative along a stable manifold.
     """
@@ -49,19 +51,25 @@ def manifold(
     crossings: int = 40,
     step: float = 0.08,
 ) -> Manifold:
-    """The branch that leaves `saddle` away from (`outward`) or towards theta = 0, followed for at most `span` of time, to
-    abs(theta) = `bound`, through at most `crossings` of contact, or until it comes close to one of `saddles`.
+    """The branch that leaves `saddle` away from (`outward`) or towards theta = 0, followed for at
+    most `span` of time, to abs(theta) = `bound`, through at most `crossings` of contact, or until
+    it comes close to one of `saddles`.
 
     Raises
     ------
     ParameterError
         An equilibrium that is not a saddle, or an impact law without v+ = e v-, e > 0.
     """
-    if saddle.eigenvalues is None or not saddle.eigenvalues[0].real > 0 > saddle.eigenvalues[1].real:
+    if (
+        saddle.eigenvalues is None
+        or not saddle.eigenvalues[0].real > 0 > saddle.eigenvalues[1].real
+    ):
         raise ParameterError(f"theta = {saddle.theta:g} is not a saddle, so it has no separatrices")
     if not isinstance(system.impact, VelocityReduction) or system.impact.e <= 0:
         raise ParameterError("manifolds are followed backward through v+ = e v- with e > 0 only")
-    rate, clock = (saddle.eigenvalues[1].real, -1.0) if stable else (saddle.eigenvalues[0].real, 1.0)
+    rate, clock = (
+        (saddle.eigenvalues[1].real, -1.0) if stable else (saddle.eigenvalues[0].real, 1.0)
+    )
     side = math.copysign(1.0, saddle.theta)
     away = side if outward else -side
     state = np.array([saddle.theta + away * OFFSET, away * OFFSET * rate])
@@ -81,11 +89,25 @@ def manifold(
             pieces.append(np.array([[clock * now], [math.nan], [math.nan]]))
         state, side = np.array([0.0, velocity]), -side
     time, theta, velocities = np.hstack(pieces)
-    return Manifold(saddle=saddle.theta, stable=stable, time=time, theta=theta, velocity=velocities, ends_at=ends_at)
+    return Manifold(
+        saddle=saddle.theta,
+        stable=stable,
+        time=time,
+        theta=theta,
+        velocity=velocities,
+        ends_at=ends_at,
+    )
 
 
 def _arc(
-    system: System, state: np.ndarray, side: float, clock: float, span: float, bound: float, saddles: Sequence[float], step: float
+    system: System,
+    state: np.ndarray,
+    side: float,
+    clock: float,
+    span: float,
+    bound: float,
+    saddles: Sequence[float],
+    step: float,
 ) -> tuple[np.ndarray, str]:
     """One arc on one side, rows (elapsed time, theta, velocity), and what ended it."""
     from scipy.integrate import solve_ivp
@@ -105,8 +127,14 @@ def _arc(
     events = [contact, leaves, arrives]
     for event in events:
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    solution = solve_ivp(rates, (0.0, span), state, method="DOP853", events=events, max_step=step, **ACCURACY)
-    kinds = [kind for kind, times in zip(("contact", "bound", "saddle"), solution.t_events, strict=True) if times.size]
+    solution = solve_ivp(
+        rates, (0.0, span), state, method="DOP853", events=events, max_step=step, **ACCURACY
+    )
+    kinds = [
+        kind
+        for kind, times in zip(("contact", "bound", "saddle"), solution.t_events, strict=True)
+        if times.size
+    ]
     piece = np.vstack([solution.t, solution.y])
     if kinds == ["contact"]:
         piece[1, -1] = 0.0

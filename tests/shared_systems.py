@@ -1,6 +1,8 @@
-"""The systems that tests of several rooms share: few structures, each compiled once; what differs is numbers.
+"""The systems that tests of several rooms share: few structures, each compiled once; what differs
+is numbers.
 
-Symbols are those of the paper: H and V the amplitude of the horizontal and the constant vertical load, W = Omega, C, k, m, c, e.
+Symbols are those of the paper: H and V the amplitude of the horizontal and the constant vertical
+load, W = Omega, C, k, m, c, e.
 """
 
 import math
@@ -41,10 +43,21 @@ def forced(
     impact=None,
     smoothing=None,
 ):
-    """Load (i) of the paper: a metainterface under mean + H sin(W t + phase) and a constant V, both on the upper mass."""
+    """Load (i) of the paper: a metainterface under mean + H sin(W t + phase) and a constant V, both
+    on the upper mass.
+    """
     return System(
-        model=Metainterface(beta0=beta0, damping=C, stiffness_ratio=k, mass_ratio=m, dissipation_ratio=c, smoothing=smoothing),
-        load=Load(frequency=W, horizontal=Harmonic(amplitude=H, mean=mean, phase=phase), vertical=V),
+        model=Metainterface(
+            beta0=beta0,
+            damping=C,
+            stiffness_ratio=k,
+            mass_ratio=m,
+            dissipation_ratio=c,
+            smoothing=smoothing,
+        ),
+        load=Load(
+            frequency=W, horizontal=Harmonic(amplitude=H, mean=mean, phase=phase), vertical=V
+        ),
         impact=impact or VelocityReduction(e),
     )
 
@@ -60,13 +73,19 @@ def under(*, C=0.1, smoothing=None, impact=None, W=1.0, **channels):
 
 def steady(V=-1.5, C=0.1, e=1.0, *, H=0.0, beta0=BETA80):
     """The metainterface under constant loads."""
-    return System(model=Metainterface(beta0=beta0, damping=C), load=Load(horizontal=H, vertical=V), impact=VelocityReduction(e))
+    return System(
+        model=Metainterface(beta0=beta0, damping=C),
+        load=Load(horizontal=H, vertical=V),
+        impact=VelocityReduction(e),
+    )
 
 
 def shaken(zeta=0.3, nu=0.05, r=0.9, m=0.2, W=1.1):
     """Unequal layers on a ground that moves both ways, with a restitution of energy."""
     return System(
-        model=Metainterface(beta0=BETA80, damping=0.1, stiffness_ratio=1.2, mass_ratio=m, dissipation_ratio=0.8),
+        model=Metainterface(
+            beta0=BETA80, damping=0.1, stiffness_ratio=1.2, mass_ratio=m, dissipation_ratio=0.8
+        ),
         load=Load(
             frequency=W,
             ground_horizontal=Harmonic(amplitude=zeta),
@@ -87,7 +106,9 @@ def walled(A=0.2, W=1.3, wall=1.0, e=0.8, *, k=1.0, c=0.1, mean=0.0, phase=math.
 
 
 def rocking(a=1.5, W=5.0, alpha=0.25):
-    """A rocking block with Housner's impacts; the ground moves with the acceleration -a alpha sin(W t)."""
+    """A rocking block with Housner's impacts; the ground moves with the acceleration -a alpha sin(W
+    t).
+    """
     return System(
         model=RockingBlock(alpha=alpha),
         load=Load(frequency=W, ground_horizontal=Harmonic(amplitude=a * alpha / W**2)),
@@ -97,7 +118,9 @@ def rocking(a=1.5, W=5.0, alpha=0.25):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hinge(OneContactModel):
-    """A user's model: a cubic spring and a bias s f at x = `edge`, which the motion goes through, the gap in units of its own."""
+    """A user's model: a cubic spring and a bias s f at x = `edge`, which the motion goes through,
+    the gap in units of its own.
+    """
 
     edge: float = 0.4
     cubic: float = 0.2
@@ -154,8 +177,9 @@ def paired(force=0.5, W=1.2, **numbers):
 
 
 class Falling(BeltOscillator):
-    """The friction falls with the sliding speed, as in the forced oscillators of Popp and Stelter (Phil. Trans. R. Soc. A 332
-    (1990) 89), whose motions may be chaotic: mu N / (1 + 2 (x' - w)^2)."""
+    """The friction falls with the sliding speed, as in the forced oscillators of Popp and Stelter
+    (Phil. Trans. R. Soc. A 332 (1990) 89), whose motions may be chaotic: mu N / (1 + 2 (x' -
+    w)^2)."""
 
     def normal_forces(self, t, x, velocity, load):
         sliding = velocity - self.belt_speed

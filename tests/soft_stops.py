@@ -1,4 +1,6 @@
-"""An oscillator with a soft stop, for tests of contacts that are passed: its spring, damper and preload begin at x = edge."""
+"""An oscillator with a soft stop, for tests of contacts that are passed: its spring, damper and
+preload begin at x = edge.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,11 @@ def soft_stop(model=SoftStop, *, amplitude=0.5, frequency=0.8, mean=0.0, e=1.0, 
 
 
 def variational_map(system, state, longest=np.inf):
-    """The state after a forcing period and its derivative to the state, by DOP853 with a restart at every passage (e = 1).
+    """The state after a forcing period and its derivative to the state, by DOP853 with a restart at
+    every passage (e = 1).
 
-    A passage and its end within one step, of at most `longest`, are not seen. The derivative is that of the variational equation,
-    which has a kink at a passage by the damper alone.
+    A passage and its end within one step, of at most `longest`, are not seen. The derivative is
+    that of the variational equation, which has a kink at a passage by the damper alone.
     """
     model, load = system.model, system.load
     end, t = load.period, 0.0
@@ -58,10 +61,19 @@ def variational_map(system, state, longest=np.inf):
 
     def rate(t, y):
         x, v, *phi = y.tolist()  # a list of six numbers takes a third of the time of arrays
-        push, damping = (model.stop, model.damping + model.damper) if beyond else (0.0, model.damping)
+        push, damping = (
+            (model.stop, model.damping + model.damper) if beyond else (0.0, model.damping)
+        )
         a = load.force(t) - damping * v - model.stiffness * x - push * (x - model.edge)
         slope = model.stiffness + push
-        return [v, a, phi[2], phi[3], -slope * phi[0] - damping * phi[2], -slope * phi[1] - damping * phi[3]]
+        return [
+            v,
+            a,
+            phi[2],
+            phi[3],
+            -slope * phi[0] - damping * phi[2],
+            -slope * phi[1] - damping * phi[3],
+        ]
 
     def edge(t, y):
         return y[0] - model.edge
@@ -69,7 +81,16 @@ def variational_map(system, state, longest=np.inf):
     edge.terminal = True
     while t < end:
         edge.direction = -1.0 if beyond else 1.0
-        part = solve_ivp(rate, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-14, events=edge, max_step=longest)
+        part = solve_ivp(
+            rate,
+            (t, end),
+            y,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=edge,
+            max_step=longest,
+        )
         t, y = float(part.t[-1]), part.y[:, -1].copy()
         if part.status == 1:
             # dt = -u / v: z+ = z + (a_old - a_new) dt, and a_old - a_new = +-damper v

@@ -1,4 +1,6 @@
-"""The benchmark beside Siconos: what it is told, what it answers, and what is said where it is not installed."""
+"""The benchmark beside Siconos: what it is told, what it answers, and what is said where it is not
+installed.
+"""
 
 import ctypes
 import sys
@@ -29,7 +31,9 @@ def test_the_equations_given_to_siconos_are_those_of_the_model(tmp_path: Path) -
         out = np.zeros(size)
         places = [ctypes.c_void_p(a.ctypes.data) for a in (*arrays, out)]
         time = [] if name == "mass" else [ctypes.c_double(t)]
-        getattr(library, name)(*time, 2, *places, len(numbers), ctypes.c_void_p(numbers.ctypes.data))
+        getattr(library, name)(
+            *time, 2, *places, len(numbers), ctypes.c_void_p(numbers.ctypes.data)
+        )
         return out
 
     for _ in range(5):
@@ -58,7 +62,10 @@ def test_siconos_comes_to_our_motions_at_first_order() -> None:
         exact = one.end(beside.EXACT)
         errors = [float(np.abs(np.array(next(answers)["state"]) - exact).max()) for _ in counts]
         assert errors[-1] < 2e-3
-        steps = [{"step": one.duration / count, "error": error} for count, error in zip(counts, errors, strict=True)]
+        steps = [
+            {"step": one.duration / count, "error": error}
+            for count, error in zip(counts, errors, strict=True)
+        ]
         assert 0.7 < beside.order(steps) < 1.4
 
 
@@ -76,7 +83,8 @@ class Heap(saltus.ContactModel):
     def contacts(self):
         floor = saltus.Contact(name="floor", coordinate="a", position=self.size)
         return floor, *(
-            saltus.Contact(name=high + low, coordinate={high: 1.0, low: -1.0}, position=self.size) for low, high in ("ab", "bc")
+            saltus.Contact(name=high + low, coordinate={high: 1.0, low: -1.0}, position=self.size)
+            for low, high in ("ab", "bc")
         )
 
     def mass_matrix(self, q):
@@ -97,7 +105,9 @@ class Heap(saltus.ContactModel):
         (0.8, 0.0, 0.5),
     ],
 )
-def test_siconos_comes_to_our_motions_of_bodies_that_touch_at_first_order(e: tuple[float, ...]) -> None:
+def test_siconos_comes_to_our_motions_of_bodies_that_touch_at_first_order(
+    e: tuple[float, ...],
+) -> None:
     counts, duration = (1000, 2000, 4000, 8000, 16000), 0.9
     begin, speeds = (0.5, 1.1, 1.6), (-1.0, 0.3, -0.5)
     task = {
@@ -117,24 +127,44 @@ def test_siconos_comes_to_our_motions_of_bodies_that_touch_at_first_order(e: tup
     except AbsentError as reason:
         pytest.skip(str(reason))
     system = saltus.System(model=Heap(), impact=saltus.NewtonImpact(e=e))
-    motion = saltus.simulate(system, **dict(zip("abc", begin, strict=True)), velocity=speeds, duration=duration)
+    motion = saltus.simulate(
+        system, **dict(zip("abc", begin, strict=True)), velocity=speeds, duration=duration
+    )
     assert {event.contact for event in motion.events} >= {"floor", "ba", "cb"}
-    errors = [float(np.abs(np.array(answer["state"]) - motion.final_state).max()) for answer in answers]
+    errors = [
+        float(np.abs(np.array(answer["state"]) - motion.final_state).max()) for answer in answers
+    ]
     assert errors[-1] < 1e-3
-    steps = [{"step": duration / count, "error": error} for count, error in zip(counts, errors, strict=True)]
+    steps = [
+        {"step": duration / count, "error": error}
+        for count, error in zip(counts, errors, strict=True)
+    ]
     assert 0.7 < beside.order(steps) < 1.4
 
 
 def test_the_times_at_equal_error_are_those_of_power_laws(tmp_path: Path) -> None:
-    """Seconds 1e-6 / step and an error of 2 steps: 1e-3 takes 2e-3 s, and 1e-5, beyond the smallest step, 0.2 s."""
+    """Seconds 1e-6 / step and an error of 2 steps: 1e-3 takes 2e-3 s, and 1e-5, beyond the smallest
+    step, 0.2 s.
+    """
     steps = [{"step": h, "error": 2 * h, "seconds": 1e-6 / h} for h in (1e-2, 1e-3, 1e-4)]
-    ours = [{"tol": 1e-6, "error": 1e-8, "seconds": 1e-3}, {"tol": 1e-8, "error": 1e-10, "seconds": 2e-3}]
+    ours = [
+        {"tol": 1e-6, "error": 1e-8, "seconds": 1e-3},
+        {"tol": 1e-8, "error": 1e-10, "seconds": 2e-3},
+    ]
     equal = [beside._at(target, steps, ours) for target in beside.TARGETS]
     assert [at["siconos"] for at in equal] == pytest.approx([2e-3, 0.2])
     assert [at["step"] for at in equal] == pytest.approx([5e-4, 5e-6])
     assert [at["reached"] for at in equal] == [True, False]
     rows = [
-        {"about": one.about, "impacts": 1, "order": 1.0, "siconos": steps, "saltus": ours, "equal": equal} for one in case.CASES
+        {
+            "about": one.about,
+            "impacts": 1,
+            "order": 1.0,
+            "siconos": steps,
+            "saltus": ours,
+            "equal": equal,
+        }
+        for one in case.CASES
     ]
     text = beside.report({"about": {}, "version": "0", "cases": rows})
     assert text.count("| 1e-05 | 1.00 | 200* | 5.00e-06* | 200* |") == len(case.CASES)
@@ -142,7 +172,9 @@ def test_the_times_at_equal_error_are_those_of_power_laws(tmp_path: Path) -> Non
     assert (tmp_path / "siconos.png").stat().st_size > 10_000
 
 
-def test_a_machine_without_siconos_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_machine_without_siconos_is_told_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     def absent() -> str:
         raise AbsentError(f"no Python here has Siconos: {program.INSTALL}")
 

@@ -37,20 +37,34 @@ HINTS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: saltus.simulate_many(SYSTEM, theta=0.3, periods=1, n_jobs=2),
         "n_jobs.*known here: theta; the arguments are .*sensitivities.*threads",
     ),
-    "a misspelt argument": (lambda: saltus.simulate(SYSTEM, theta=0.3, periods=1, stopat=()), "did you mean 'stop_at'"),
-    "a state without its name": (lambda: saltus.simulate(SYSTEM, 0.3, periods=1), "by their names: theta=0.3$"),
+    "a misspelt argument": (
+        lambda: saltus.simulate(SYSTEM, theta=0.3, periods=1, stopat=()),
+        "did you mean 'stop_at'",
+    ),
+    "a state without its name": (
+        lambda: saltus.simulate(SYSTEM, 0.3, periods=1),
+        "by their names: theta=0.3$",
+    ),
     "arrays for each with each": (
         lambda: saltus.simulate_many(SYSTEM, theta=np.zeros(3), velocity=np.zeros(4), periods=1),
         r"theta=xr.DataArray\(values, dims='theta'\)",
     ),
-    "a number as an impact law": (lambda: SYSTEM.with_(impact=0.9), r"VelocityReduction\(e\).*NewtonImpact\(e\)"),
-    "a path without its part": (lambda: SYSTEM.with_(damping=0.2), r"no parameter 'damping'; did you mean 'model.damping'"),
+    "a number as an impact law": (
+        lambda: SYSTEM.with_(impact=0.9),
+        r"VelocityReduction\(e\).*NewtonImpact\(e\)",
+    ),
+    "a path without its part": (
+        lambda: SYSTEM.with_(damping=0.2),
+        r"no parameter 'damping'; did you mean 'model.damping'",
+    ),
     "a branch in a model": (
         lambda: saltus.simulate(saltus.System(model=Branching()), x=0.3, duration=1.0),
         "OneContactModel, whose `side`",
     ),
     "too many motions": (
-        lambda: saltus.simulate_many(SYSTEM, theta=np.zeros((100_000, 1)), velocity=np.zeros(100_000), periods=1),
+        lambda: saltus.simulate_many(
+            SYSTEM, theta=np.zeros((100_000, 1)), velocity=np.zeros(100_000), periods=1
+        ),
         "1e\\+10 motions need about .* GB",
     ),
 }
@@ -64,7 +78,9 @@ def test_the_refusal_says_how_it_is_meant(what: str) -> None:
 
 
 def test_a_name_that_lives_in_a_room_is_answered_with_the_room() -> None:
-    with pytest.raises(AttributeError, match=r"^saltus has no 'uncertainty_exponent'; it is in saltus\.attractors$"):
+    with pytest.raises(
+        AttributeError, match=r"^saltus has no 'uncertainty_exponent'; it is in saltus\.attractors$"
+    ):
         _ = saltus.uncertainty_exponent
     assert callable(saltus.attractors.uncertainty_exponent)
 
@@ -75,7 +91,10 @@ def test_a_motion_names_its_coordinates() -> None:
 
 
 def test_angles_that_look_like_degrees_are_noticed_and_others_are_not() -> None:
-    with pytest.warns(UserWarning, match=r"phase = 90 is read in radians; 90 degrees are np.radians\(90\) = 1.5708"):
+    with pytest.warns(
+        UserWarning,
+        match=r"phase = 90 is read in radians; 90 degrees are np.radians\(90\) = 1.5708",
+    ):
         saltus.Harmonic(amplitude=1.0, phase=90)
     with pytest.warns(UserWarning, match="theta = 30 is read in radians"):
         saltus.simulate(SYSTEM, theta=30, periods=0)
@@ -93,7 +112,11 @@ def test_a_record_in_milliseconds_is_noticed() -> None:
         cell.load(saltus.Load(ground_horizontal=record))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        cell.load(saltus.Load(ground_horizontal=saltus.Record(time=seconds, value=values, quantity="acceleration")))
+        cell.load(
+            saltus.Load(
+                ground_horizontal=saltus.Record(time=seconds, value=values, quantity="acceleration")
+            )
+        )
 
 
 def test_numbers_without_an_end_are_refused() -> None:

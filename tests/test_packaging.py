@@ -21,7 +21,11 @@ PAPER = tomllib.loads((ROOT / "reproduction" / "pyproject.toml").read_text())["p
 def wheel(tmp_path_factory):
     """The names of the files in a wheel that is built here."""
     folder = tmp_path_factory.mktemp("dist")
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder], cwd=ROOT, check=True)
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder],
+        cwd=ROOT,
+        check=True,
+    )
     (path,) = folder.glob("*.whl")
     with zipfile.ZipFile(path) as archive:
         return archive.namelist()
@@ -29,10 +33,15 @@ def wheel(tmp_path_factory):
 
 def test_the_wheel_holds_every_file_of_the_package(wheel):
     source = ROOT / "src"
-    there = {path.relative_to(source).as_posix() for path in (source / "saltus").rglob("*") if path.is_file()}
+    there = {
+        path.relative_to(source).as_posix()
+        for path in (source / "saltus").rglob("*")
+        if path.is_file()
+    }
     there = {name for name in there if "__pycache__" not in name}
     assert there <= set(wheel)
-    assert {"saltus/py.typed", "saltus/__init__.pyi"} <= there  # without which no type checker sees a type
+    # without which no type checker sees a type
+    assert {"saltus/py.typed", "saltus/__init__.pyi"} <= there
 
 
 def test_the_wheel_holds_nothing_else(wheel):
@@ -60,7 +69,10 @@ def test_what_saltus_imports_it_also_requires():
     required = {re.match(r"[\w-]+", text)[0] for text in texts}
     allowed = {names.get(name, name) for name in required} | {"saltus", *sys.stdlib_module_names}
     statement = re.compile(r"^\s*(?:from|import) ([A-Za-z_]\w*)", re.M)
-    code = [re.sub(r'""".*?"""', "", path.read_text(), flags=re.S) for path in (ROOT / "src").rglob("*.py")]
+    code = [
+        re.sub(r'""".*?"""', "", path.read_text(), flags=re.S)
+        for path in (ROOT / "src").rglob("*.py")
+    ]
     imported = {name for text in code for name in statement.findall(text)}
     assert "numba" in imported
     assert imported - allowed == {"llvmlite"}  # of one release with numba, which fixes its version

@@ -22,22 +22,31 @@ class Unheard(saltus.Model):
         return np.sin(load.force(t) - x) / (3.0 + x**2)
 
 
-def test_compiling_is_said_by_name_in_any_function_and_the_fraction_never_falls(monkeypatch, tmp_path):
+def test_compiling_is_said_by_name_in_any_function_and_the_fraction_never_falls(
+    monkeypatch, tmp_path
+):
     known = saltus.System(model=saltus.TwoStops(), load=saltus.Load(force=0.1))
-    saltus.simulate(saltus.System(model=saltus.WallOscillator()), x=0.1, duration=1.0)  # loads the kernels
+    # loads the kernels
+    saltus.simulate(saltus.System(model=saltus.WallOscillator()), x=0.1, duration=1.0)
     saltus.simulate(known, x=0.0, duration=1.0)
     monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(kernels, "LIMITS", replace(LIMITS, unsaid=0.0))
     system, told = saltus.System(model=Unheard(), load=saltus.Load(force=0.1)), []
-    saltus.simulate(system, x=0.1, duration=1.0, progress=lambda fraction, what: told.append((fraction, what)))
-    saltus.sensitivities(system, x=0.1, duration=1.0, progress=lambda fraction, what: told.append((fraction, what)))
+    saltus.simulate(
+        system, x=0.1, duration=1.0, progress=lambda fraction, what: told.append((fraction, what))
+    )
+    saltus.sensitivities(
+        system, x=0.1, duration=1.0, progress=lambda fraction, what: told.append((fraction, what))
+    )
     words = [what for _, what in told if what.startswith("compiling")]
     assert words == [
         "compiling Unheard, a model of 1 coordinate (some 0 s, once)",
         "compiling the sensitivities of Unheard, a model of 1 coordinate (some 0 s, once)",
     ]
     again = []
-    saltus.simulate(system, x=0.2, duration=1.0, progress=lambda fraction, what: again.append(fraction))
+    saltus.simulate(
+        system, x=0.2, duration=1.0, progress=lambda fraction, what: again.append(fraction)
+    )
     assert again == sorted(again)
     assert len(again) == 2
 

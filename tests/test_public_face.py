@@ -1,8 +1,10 @@
-"""The public face: every number of every public function, class and method, with values that have no meaning.
+"""The public face: every number of every public function, class and method, with values that have
+no meaning.
 
-What is public is read from `saltus.__all__`, from `saltus.theory`, and from what is marked as answering in the other rooms; of a
-new name the first test asks for arguments that fit. A value is refused by a sentence of at most 400 characters, or it is meant;
-an object of a senseless type may end in Python's own TypeError, and is not tried.
+What is public is read from `saltus.__all__`, from `saltus.theory`, and from what is marked as
+answering in the other rooms; of a new name the first test asks for arguments that fit. A value is
+refused by a sentence of at most 400 characters, or it is meant; an object of a senseless type may
+end in Python's own TypeError, and is not tried.
 """
 
 import importlib
@@ -25,7 +27,9 @@ SYSTEM = saltus.System(
     load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.3), vertical=-0.5),
 )
 UNFORCED = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=-0.5))
-LINEAR = saltus.System(model=saltus.Metainterface(beta0=math.pi / 2), load=saltus.Load(vertical=-0.5))
+LINEAR = saltus.System(
+    model=saltus.Metainterface(beta0=math.pi / 2), load=saltus.Load(vertical=-0.5)
+)
 WALL = saltus.System(
     model=saltus.WallOscillator(damping=0.1),
     load=saltus.Load(frequency=2.6, force=saltus.Harmonic(1.0)),
@@ -35,13 +39,23 @@ CELL = saltus.UnitCell(alpha0=0.3, beta0=1.4)
 BODY = saltus.PhysicalBlock(half_width=0.2, half_height=1.0)
 BLOCK = saltus.System(
     model=saltus.RockingBlock(alpha=0.2),
-    load=saltus.Load(ground_horizontal=saltus.HalfSine(amplitude=0.5, frequency=2.0, quantity="acceleration")),
+    load=saltus.Load(
+        ground_horizontal=saltus.HalfSine(amplitude=0.5, frequency=2.0, quantity="acceleration")
+    ),
 )
 X, V = sympy.symbols("x v")
 SI = saltus.PhysicalCell(length=0.1, upper_mass=1.0, upper_stiffness=2.0)
 ROOMS = ("attractors", "flow", "orbits", "studies", "sweep", "systems", "theory")
-# Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check nothing; and how orbits are made.
-FORMULAS = (saltus.Model, saltus.Harmonic, saltus.Record, saltus.systems.Pulse, saltus.Contact, saltus.systems.ImpactLaw)
+# Formulas, which are called with numbers, arrays and the symbols of the tracer alike and check
+# nothing; and how orbits are made.
+FORMULAS = (
+    saltus.Model,
+    saltus.Harmonic,
+    saltus.Record,
+    saltus.systems.Pulse,
+    saltus.Contact,
+    saltus.systems.ImpactLaw,
+)
 MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.inside")
 
 # What is tried, by what stands in the annotation: numbers, or as many numbers as a list has.
@@ -57,14 +71,25 @@ class Computed(BaseException):
 @pytest.fixture(scope="module")
 def made():
     """What public functions take and only others give."""
-    motion, orbit = saltus.simulate(SYSTEM, theta=0.3, periods=2), saltus.find_orbit(SYSTEM, theta=0.1)
-    branch = saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.8, 1.2))
+    motion, orbit = (
+        saltus.simulate(SYSTEM, theta=0.3, periods=2),
+        saltus.find_orbit(SYSTEM, theta=0.1),
+    )
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.8, 1.2)
+    )
     fold = next(s for s in branch.special if s.kind == orbits.SpecialKind.LP)
-    curve = saltus.continue_special(fold, "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10)
-    chart = saltus.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60)
+    curve = saltus.continue_special(
+        fold, "load.vertical", (-0.51, -0.49), first_bounds=(0.8, 1.2), most_points=10
+    )
+    chart = saltus.stability_chart(
+        SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60
+    )
     many = saltus.simulate_many(SYSTEM, theta=[0.1, 0.3], periods=4, last=3)
     branch.to_xarray()  # computes defects, which are then kept
-    record = saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}, sigma=0.1)
+    record = saltus.Measurement(
+        start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}, sigma=0.1
+    )
     found = saltus.fit(SYSTEM, record, {"model.damping": (0.0, 1.0)}, starts=1)
     explorer = saltus.explore(SYSTEM, theta=0.3)
     more = {
@@ -73,13 +98,27 @@ def made():
         "fit": found,
         "sensitivities": saltus.sensitivities(SYSTEM, theta=0.3, periods=1),
     }
-    return more | {"motion": motion, "orbit": orbit, "branch": branch, "fold": fold, "curve": curve, "chart": chart, "many": many}
+    return more | {
+        "motion": motion,
+        "orbit": orbit,
+        "branch": branch,
+        "fold": fold,
+        "curve": curve,
+        "chart": chart,
+        "many": many,
+    }
 
 
 def good(made):
     """What is called, by its name, with arguments that fit."""
-    orbit, branch, fold, curve, chart = (made[name] for name in ("orbit", "branch", "fold", "curve", "chart"))
-    plan = sweep.Plan(function="test_public_face:squares", axes={"x": np.arange(2.0)}, variables={"y": sweep.Variable()})
+    orbit, branch, fold, curve, chart = (
+        made[name] for name in ("orbit", "branch", "fold", "curve", "chart")
+    )
+    plan = sweep.Plan(
+        function="test_public_face:squares",
+        axes={"x": np.arange(2.0)},
+        variables={"y": sweep.Variable()},
+    )
     along = {"system": SYSTEM, "path": "load.frequency"}
     one = {"system": SYSTEM, "theta": 0.3}
     angles = {"beta0": 1.4, "vertical": -0.5}
@@ -91,19 +130,30 @@ def good(made):
         "saltus.attractors_along": {**along, "values": [1.0, 1.1]},
         "saltus.basin_integrity": {
             "basins": xarray.Dataset(
-                {"label": (("y", "x"), [[1, 1], [2, 2]]), "section_x": (("attractor", "state"), [[0.0], [1.0]])}
+                {
+                    "label": (("y", "x"), [[1, 1], [2, 2]]),
+                    "section_x": (("attractor", "state"), [[0.0], [1.0]]),
+                }
                 | {"section_y": (("attractor", "state"), [[0.0], [1.0]])},
                 {"x": [0.0, 1.0], "y": [0.0, 1.0], "attractor": [1, 2]},
                 {"plane": ["x", "y"]},
             )
         },
-        "saltus.basins_of_attraction": {"system": SYSTEM, "theta": [0.0, 1.0], "velocity": [0.0, 1.0]},
+        "saltus.basins_of_attraction": {
+            "system": SYSTEM,
+            "theta": [0.0, 1.0],
+            "velocity": [0.0, 1.0],
+        },
         "saltus.bifurcation_diagram": {"system": SYSTEM},
         "saltus.capture_speed": {"system": SYSTEM},
         "saltus.chaotic_bands": {**along, "bounds": (0.9, 1.1)},
         "saltus.classify": one,
         "saltus.continue_orbit": {"orbit": orbit, "path": "load.frequency", "bounds": (0.9, 1.1)},
-        "saltus.continue_special": {"special": fold, "path": "load.vertical", "bounds": (-0.6, -0.4)},
+        "saltus.continue_special": {
+            "special": fold,
+            "path": "load.vertical",
+            "bounds": (-0.6, -0.4),
+        },
         "saltus.doubling_cascade": {"first": fold, "bounds": (0.8, 1.1)},
         "saltus.energies": {"of": made["motion"]},
         "saltus.explore": one,
@@ -112,7 +162,9 @@ def good(made):
         "saltus.page": {"system": SYSTEM, "theta": 0.3},
         "saltus.fit": {
             "system": SYSTEM,
-            "data": saltus.Measurement(start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}),
+            "data": saltus.Measurement(
+                start={"theta": 0.3}, time=[0.5, 1.0], values={"theta": [0.3, 0.2]}
+            ),
             "parameters": {"model.damping": (0.0, 1.0)},
         },
         "saltus.frequency_sweep": {"system": SYSTEM, "values": [1.0, 1.1], "theta": 0.3},
@@ -121,9 +173,18 @@ def good(made):
         "saltus.to_mat": {"path": "motion", "result": made["motion"]},
         "saltus.to_csv": {"path": "motion.csv", "result": made["motion"]},
         "saltus.to_pandas": {"result": made["motion"]},
-        "saltus.animate": {"result": made["motion"], "path": "film.gif", "seconds": 0.1, "fps": 0.1},
+        "saltus.animate": {
+            "result": made["motion"],
+            "path": "film.gif",
+            "seconds": 0.1,
+            "fps": 0.1,
+        },
         "saltus.fragility": {"systems": [BLOCK], "scales": [1.0, 2.0]},
-        "saltus.overturning_spectrum": {"system": BLOCK, "amplitude": [0.3, 0.5], "frequency": [1.0, 2.0]},
+        "saltus.overturning_spectrum": {
+            "system": BLOCK,
+            "amplitude": [0.3, 0.5],
+            "frequency": [1.0, 2.0],
+        },
         "saltus.show_progress": {"fraction": 0.5, "what": "motions"},
         "saltus.load_study": {"path": "/nowhere/study.toml"},
         "saltus.lyapunov_many": one,
@@ -167,7 +228,10 @@ def good(made):
         "sweep.remove_store": {"path": "/nowhere/store"},
         "sweep.run": {"plan": plan},
         "sweep.status": {"path": "/nowhere/store"},
-        "saltus.energy_gain": {"model": saltus.TwoLayer(beta0=1.4, mass_ratio=0.5), "impact": saltus.NewtonImpact(1.0)},
+        "saltus.energy_gain": {
+            "model": saltus.TwoLayer(beta0=1.4, mass_ratio=0.5),
+            "impact": saltus.NewtonImpact(1.0),
+        },
         "theory.amplitude_limits": {"system": SYSTEM},
         "theory.critical_horizontal": angles,
         "theory.decayed_amplitude": {"cycle": 2, "theta0": 0.3, "e": 0.9},
@@ -190,10 +254,19 @@ def good(made):
         "theory.linear_period": {"theta0": 0.1, **angles},
         "theory.open_layer": {"system": UNFORCED, "side": 1},
         "theory.peaks": {"system": UNFORCED, "theta0": 0.1},
-        "theory.pendulum_acceleration": {"system": LINEAR, "tau": 0.0, "theta": 0.1, "velocity": 0.0},
+        "theory.pendulum_acceleration": {
+            "system": LINEAR,
+            "tau": 0.0,
+            "theta": 0.1,
+            "velocity": 0.0,
+        },
         "theory.potential_energy": {"system": UNFORCED, "theta": 0.1},
         "theory.potential_slope": {"system": UNFORCED, "theta": 0.1},
-        "theory.quasi_static_border": {"system": SYSTEM, "plane": ("load.horizontal.amplitude", "load.vertical"), "lowest": -1.0},
+        "theory.quasi_static_border": {
+            "system": SYSTEM,
+            "plane": ("load.horizontal.amplitude", "load.vertical"),
+            "lowest": -1.0,
+        },
         "theory.reciprocal": {"system": UNFORCED, "theta0": 0.1},
         "theory.rocking_energy_decreases": {"velocity": 0.1, "alpha": 0.3, "e": 0.9},
         "theory.rocking_energy_jump": {"velocity": 0.1, "alpha": 0.3, "e": 0.9},
@@ -214,7 +287,10 @@ def good(made):
         "theory.vibrations": {"system": UNFORCED},
         "theory.wall_orbits": {"system": WALL},
     }
-    asked = {name: (getattr(importlib.import_module(_room(name)), name.partition(".")[2]), kw) for name, kw in functions.items()}
+    asked = {
+        name: (getattr(importlib.import_module(_room(name)), name.partition(".")[2]), kw)
+        for name, kw in functions.items()
+    }
     return asked | {
         "BeltOscillator": (saltus.BeltOscillator, {}),
         "Branch.at": (branch.at, {"value": 1.0}),
@@ -222,14 +298,23 @@ def good(made):
         "Branch.solved_at": (branch.solved_at, {"value": 1.0}),
         "Branch.solved_between": (branch.solved_between, {"before": 0, "value": 0.81}),
         "Explorer.add": (made["explorer"].add, {"result": branch}),
-        "Chirp": (saltus.Chirp, {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0}),
+        "Chirp": (
+            saltus.Chirp,
+            {"amplitude": 0.1, "frequency": 1.0, "end_frequency": 2.0, "duration": 3.0},
+        ),
         "Contact": (saltus.Contact, contact),
         "EnergyRestitution": (saltus.EnergyRestitution, {"r": 0.9}),
-        "Structure": (saltus.Structure, {"mass": [[2.0]], "stiffness": [[1.0]], "forces": {"drive": 0}}),
+        "Structure": (
+            saltus.Structure,
+            {"mass": [[2.0]], "stiffness": [[1.0]], "forces": {"drive": 0}},
+        ),
         "Surface": (saltus.Surface, {"name": "stop", "coordinate": "x"}),
         "Surface.side": (saltus.Surface(name="stop", coordinate="x").side, {"position": 0.5}),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
-        "Friction.coefficient": (saltus.Friction(name="belt", coordinate="x", kinetic=0.2).coefficient, {"speed": 0.1}),
+        "Friction.coefficient": (
+            saltus.Friction(name="belt", coordinate="x", kinetic=0.2).coefficient,
+            {"speed": 0.1},
+        ),
         "Friction.slipping": (
             saltus.Friction(name="belt", coordinate="x", kinetic=0.2).slipping,
             {"velocity": 0.1, "direction": 1},
@@ -239,9 +324,15 @@ def good(made):
         "Harmonic": (saltus.Harmonic, {"amplitude": 0.1}),
         "Load": (saltus.Load, {"frequency": 1.0, "horizontal": 0.1}),
         "ImpactPair": (saltus.ImpactPair, {}),
-        "MavroeidisPapageorgiou": (saltus.MavroeidisPapageorgiou, {"amplitude": 0.1, "frequency": 1.0, "gamma": 2.0}),
+        "MavroeidisPapageorgiou": (
+            saltus.MavroeidisPapageorgiou,
+            {"amplitude": 0.1, "frequency": 1.0, "gamma": 2.0},
+        ),
         "Fit.log_likelihood": (made["fit"].log_likelihood, {"values": [0.1]}),
-        "Measurement": (saltus.Measurement, {"start": {"theta": 0.3}, "time": [0.5, 1.0], "values": {"theta": [0.3, 0.2]}}),
+        "Measurement": (
+            saltus.Measurement,
+            {"start": {"theta": 0.3}, "time": [0.5, 1.0], "values": {"theta": [0.3, 0.2]}},
+        ),
         "Measurement.sigma_of": (made["record"].sigma_of, {"quantity": "theta"}),
         "Metainterface": (model, {"beta0": 1.4}),
         "Motion.at": (made["motion"].at, {"times": 1.0}),
@@ -261,7 +352,10 @@ def good(made):
         "PhysicalBlock.load_in_si": (BODY.load_in_si, {"load": BLOCK.load}),
         "PhysicalBlock.system": (BODY.system, {"si": BLOCK.load}),
         "PhysicalCell": (saltus.PhysicalCell, cell_data),
-        "PhysicalCell.from_model": (saltus.PhysicalCell.from_model, {"model": SYSTEM.model, **cell_data}),
+        "PhysicalCell.from_model": (
+            saltus.PhysicalCell.from_model,
+            {"model": SYSTEM.model, **cell_data},
+        ),
         "PhysicalCell.load": (SI.load, {"si": SYSTEM.load}),
         "PhysicalCell.load_in_si": (SI.load_in_si, {"load": SYSTEM.load}),
         "PhysicalCell.metainterface": (SI.metainterface, {"beta0": 1.4}),
@@ -272,7 +366,10 @@ def good(made):
         "RockingBlock": (saltus.RockingBlock, {"alpha": 0.3}),
         "Sensitivities.at": (made["sensitivities"].at, {"times": 1.0}),
         "SpecialCurve.at": (curve.at, {"path": "load.vertical", "value": -0.5}),
-        "System": (saltus.System, {"model": SYSTEM.model, "load": SYSTEM.load, "impact": SYSTEM.impact}),
+        "System": (
+            saltus.System,
+            {"model": SYSTEM.model, "load": SYSTEM.load, "impact": SYSTEM.impact},
+        ),
         "System.from_dict": (saltus.System.from_dict, {"data": SYSTEM.to_dict()}),
         "System.from_json": (saltus.System.from_json, {"text": SYSTEM.to_json()}),
         "System.from_toml": (saltus.System.from_toml, {"text": SYSTEM.to_toml()}),
@@ -286,7 +383,10 @@ def good(made):
         "CellChain": (saltus.CellChain, {"beta0": 1.4}),
         "saltus.to_jax": (saltus.to_jax, {"system": SYSTEM, "periods": 1}),
         "saltus.to_torch": (saltus.to_torch, {"system": SYSTEM, "periods": 1}),
-        "saltus.from_sympy": (saltus.from_sympy, {"coordinates": [X], "velocities": [V], "force": [-X], "parameters": {}}),
+        "saltus.from_sympy": (
+            saltus.from_sympy,
+            {"coordinates": [X], "velocities": [V], "force": [-X], "parameters": {}},
+        ),
         **{
             f"UnitCell.{name}": (getattr(CELL, name), {"theta": 0.1})
             for name in ("alpha", "beta", "eta", "phi", "small_phi", "xi")
@@ -318,17 +418,28 @@ def _room(name):
 
 
 def public():
-    """The names of all functions that answer, of the classes that a user makes, and of their methods with arguments."""
+    """The names of all functions that answer, of the classes that a user makes, and of their
+    methods with arguments.
+    """
     for room in ("saltus", *(f"saltus.{room}" for room in ROOMS)):
         package = importlib.import_module(room)
         for name in package.__all__:
             found = getattr(package, name)
             own = f"{room.removeprefix('saltus.')}.{name}"
             named_above = room != "saltus" and getattr(saltus, name, None) is found
-            if inspect.isfunction(found) and hasattr(found, "answers") and not named_above and _arguments(found):
+            if (
+                inspect.isfunction(found)
+                and hasattr(found, "answers")
+                and not named_above
+                and _arguments(found)
+            ):
                 yield own
     for cls in (getattr(saltus, name) for name in saltus.__all__):
-        if inspect.isclass(cls) and cls.__module__.startswith("saltus.") and not issubclass(cls, (Exception, str)):
+        if (
+            inspect.isclass(cls)
+            and cls.__module__.startswith("saltus.")
+            and not issubclass(cls, (Exception, str))
+        ):
             yield from _of(cls)
 
 
@@ -336,7 +447,8 @@ def _of(cls):
     if hasattr(cls.__init__, "answers") and _arguments(cls) and not issubclass(cls, Result):
         yield cls.__name__
     for name, method in inspect.getmembers(cls, inspect.isroutine):
-        own = str(getattr(method, "__module__", "")).startswith("saltus")  # those of an enumeration of integers are Python's
+        # those of an enumeration of integers are Python's
+        own = str(getattr(method, "__module__", "")).startswith("saltus")
         if name.startswith("_") or not callable(method) or not own or not _arguments(method):
             continue
         if not issubclass(cls, FORMULAS):
@@ -350,8 +462,11 @@ def _arguments(function):
 def test_every_public_name_is_asked(made):
     """A formula of a model is none of them; whatever else there is has arguments here, and answers."""
     asked = set(good(made))
-    once = {name.partition(".")[2] for name in asked if name.startswith("Branch.")}  # of several classes
-    assert {name for name in public() if name.partition(".")[2] not in once or name in asked} - {*MADE_INSIDE} == asked
+    # of several classes
+    once = {name.partition(".")[2] for name in asked if name.startswith("Branch.")}
+    assert {name for name in public() if name.partition(".")[2] not in once or name in asked} - {
+        *MADE_INSIDE
+    } == asked
 
 
 def test_arguments_that_fit_are_taken(made, alone):
@@ -359,8 +474,15 @@ def test_arguments_that_fit_are_taken(made, alone):
         assert answer(function, fitting) is None or name in REFUSED, name
 
 
-# A study or a store that is nowhere, an empty tree, a fold where only a period doubling begins something.
-REFUSED = ("saltus.branch_of", "saltus.doubling_cascade", "saltus.switch_branch", "saltus.load", "saltus.load_study")
+# A study or a store that is nowhere, an empty tree, a fold where only a period doubling begins
+# something.
+REFUSED = (
+    "saltus.branch_of",
+    "saltus.doubling_cascade",
+    "saltus.switch_branch",
+    "saltus.load",
+    "saltus.load_study",
+)
 REFUSED += ("saltus.branches_of", "sweep.open_store", "sweep.status")
 
 
@@ -402,15 +524,22 @@ def values_of(parameter):
         return NUMBERS
     if kind == "Numbers":
         return NUMBERS + ARRAYS[:4]
-    return ARRAYS if kind in ("np.ndarray", "Iterable[float]", "tuple[float, float]") else TEXTS * (kind == "str")
+    return (
+        ARRAYS
+        if kind in ("np.ndarray", "Iterable[float]", "tuple[float, float]")
+        else TEXTS * (kind == "str")
+    )
 
 
 @pytest.mark.filterwarnings("ignore")  # of NumPy, where an array of huge numbers is meant
 def test_every_argument_answers_every_value(made, alone):
-    """Of more than two thousand calls with one value that may be wrong, none raises anything but one sentence."""
+    """Of more than two thousand calls with one value that may be wrong, none raises anything but
+    one sentence.
+    """
     wrong, tried = [], 0
     for name, (function, fitting) in good(made).items():
-        for parameter in () if name.startswith("theory.") else _arguments(function):  # tests/theory tries its values
+        # tests/theory tries its values
+        for parameter in () if name.startswith("theory.") else _arguments(function):
             for value in () if parameter.name in ("workers", "scheduler") else values_of(parameter):
                 tried += 1
                 begun = time.process_time()
@@ -422,7 +551,9 @@ def test_every_argument_answers_every_value(made, alone):
                 if len(refusal) > 400 or "\n" in refusal or time.process_time() - begun > 10.0:
                     wrong.append((name, parameter.name, value, f"is long: {refusal}"))
     assert tried > 2000
-    assert not wrong, "\n".join(f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong)
+    assert not wrong, "\n".join(
+        f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong
+    )
 
 
 def test_every_misspelt_argument_is_answered_with_the_near_name(made):
@@ -432,6 +563,8 @@ def test_every_misspelt_argument_is_answered_with_the_near_name(made):
             continue
         for parameter in _arguments(function):
             misspelt = parameter.name + "_"
-            with pytest.raises(ParameterError, match=f"did you mean .*'{parameter.name}'") as refusal:
+            with pytest.raises(
+                ParameterError, match=f"did you mean .*'{parameter.name}'"
+            ) as refusal:
                 function(**{**fitting, misspelt: 1})
             assert refusal.value.parameter == misspelt, name

@@ -1,4 +1,6 @@
-"""Public signatures: no options that a user cannot see, and a name means one thing wherever it stands."""
+"""Public signatures: no options that a user cannot see, and a name means one thing wherever it
+stands.
+"""
 
 import importlib
 import inspect
@@ -9,7 +11,8 @@ from test_public_face import public
 
 import saltus
 
-# A name of an argument by what it takes; `| None` says that it may be left out. "number" is one or an array of them.
+# A name of an argument by what it takes; `| None` says that it may be left out. "number" is one or
+# an array of them.
 ALIKE = {
     "Numbers": "number",
     "Number": "number",
@@ -23,7 +26,8 @@ ALIKE = {
     "ContactModel": "Model",
     "int | Workers": "int",
 }
-# Names with two meanings, which are those of the field in both: what a dimension, a figure of a formula or a file is called.
+# Names with two meanings, which are those of the field in both: what a dimension, a figure of a
+# formula or a file is called.
 SEVERAL = {
     "channels": "the names of a load's channels with their symbols, or signals",
     "changes": "values by dotted path, or parts of a system too",
@@ -34,7 +38,9 @@ SEVERAL = {
     "data": "what was measured, or a system as a dictionary",
     "e": "a coefficient of restitution, one or a matrix of several contacts",
     "equations": "of a model in symbols, or of an orbit",
-    "functions": "quantities by name: of an orbit, of a motion, or of a motion at the times of a record",
+    "functions": (
+        "quantities by name: of an orbit, of a motion, or of a motion at the times of a record"
+    ),
     "known": "attractors, orbits or branches",
     "parameters": "values by dotted path, or the paths to differentiate to or to solve for",
     "path": "a parameter's dotted path, or that of a file",
@@ -49,8 +55,8 @@ SEVERAL = {
     "velocity": "of a start, or at which a friction slides",
     "values": "of a parameter, or what was measured, or the unknowns of a fit",
 }
-# By which arguments a function takes names of its own: those of a model's coordinates, of a load's channels, of parameters, and
-# those of the function that draws.
+# By which arguments a function takes names of its own: those of a model's coordinates, of a load's
+# channels, of parameters, and those of the function that draws.
 OWN_NAMES = {"coordinates", "channels", "more", "options"}
 
 
@@ -65,7 +71,12 @@ def function(name):
 @pytest.fixture(scope="module")
 def arguments():
     """(name of the function, parameter) of all arguments."""
-    return [(name, p) for name in public() for p in inspect.signature(function(name)).parameters.values() if p.name != "self"]
+    return [
+        (name, p)
+        for name in public()
+        for p in inspect.signature(function(name)).parameters.values()
+        if p.name != "self"
+    ]
 
 
 def meaning(annotation):
@@ -75,27 +86,46 @@ def meaning(annotation):
 
 
 def test_no_option_is_hidden(arguments):
-    hidden = {(name, p.name) for name, p in arguments if p.kind is p.VAR_KEYWORD and p.name not in OWN_NAMES}
+    hidden = {
+        (name, p.name)
+        for name, p in arguments
+        if p.kind is p.VAR_KEYWORD and p.name not in OWN_NAMES
+    }
     assert not hidden
-    assert {name for name, p in arguments if p.name == "options"} == {"saltus.plot"}  # which refuses others by their names
+    # which refuses others by their names
+    assert {name for name, p in arguments if p.name == "options"} == {"saltus.plot"}
 
 
 def test_a_name_means_one_thing(arguments):
-    """Formulas of the theory are called with symbols and left out, as are the starts `velocity`, which may be several numbers."""
+    """Formulas of the theory are called with symbols and left out, as are the starts `velocity`,
+    which may be several numbers.
+    """
     meanings = defaultdict(lambda: defaultdict(list))
     for name, p in arguments:
         if not name.startswith("theory."):
             meanings[p.name][meaning(p.annotation)].append(name)
     assert len(meanings) > 100
     several = {name: dict(each) for name, each in meanings.items() if len(each) > 1}
-    assert set(several) == set(SEVERAL), {name: each for name, each in several.items() if name not in SEVERAL}
-    assert {"seed", "progress", "tol", "max_period", "window", "step", "system"} <= set(meanings) - set(SEVERAL)
+    assert set(several) == set(SEVERAL), {
+        name: each for name, each in several.items() if name not in SEVERAL
+    }
+    assert {"seed", "progress", "tol", "max_period", "window", "step", "system"} <= set(
+        meanings
+    ) - set(SEVERAL)
 
 
 def test_what_stands_everywhere_has_one_default_or_a_scale_of_its_own(arguments):
     defaults = defaultdict(set)
     for _, p in arguments:
-        if p.default is not p.empty and p.name in ("seed", "progress", "velocity", "store", "workers", "scheduler", "window"):
+        if p.default is not p.empty and p.name in (
+            "seed",
+            "progress",
+            "velocity",
+            "store",
+            "workers",
+            "scheduler",
+            "window",
+        ):
             defaults[p.name].add(repr(p.default))
     assert defaults["seed"] <= {"0", "1"}
     assert len(defaults["progress"]) == 1

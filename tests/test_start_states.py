@@ -1,4 +1,6 @@
-"""Every function that takes the state at the start of a motion reads it in the same way and refuses it in the same words."""
+"""Every function that takes the state at the start of a motion reads it in the same way and refuses
+it in the same words.
+"""
 
 import numpy as np
 import pytest
@@ -7,27 +9,44 @@ import saltus
 from saltus.systems import arguments_of, read_start, read_starts, state_of
 
 LOAD = saltus.Load(frequency=1.0, force=saltus.Harmonic(0.3))
-ONE = saltus.System(model=saltus.WallOscillator(damping=0.2), load=LOAD, impact=saltus.VelocityReduction(0.5))
-TWO = saltus.System(model=saltus.ImpactPair(damping=0.2), load=LOAD, impact=saltus.NewtonImpact(0.5))
-LAYERS = saltus.System(model=saltus.TwoLayer(beta0=1.4, damping=0.2), load=saltus.Load(frequency=1.0, vertical=-0.2))
+ONE = saltus.System(
+    model=saltus.WallOscillator(damping=0.2), load=LOAD, impact=saltus.VelocityReduction(0.5)
+)
+TWO = saltus.System(
+    model=saltus.ImpactPair(damping=0.2), load=LOAD, impact=saltus.NewtonImpact(0.5)
+)
+LAYERS = saltus.System(
+    model=saltus.TwoLayer(beta0=1.4, damping=0.2), load=saltus.Load(frequency=1.0, vertical=-0.2)
+)
 
 # Each with the shortest work that it accepts; a state that is read well is followed for a moment.
 READERS = {
     "simulate": lambda system, **start: saltus.simulate(system, periods=1, **start),
-    "sensitivities": lambda system, **start: saltus.sensitivities(system, parameters=("model.damping",), periods=1, **start),
+    "sensitivities": lambda system, **start: saltus.sensitivities(
+        system, parameters=("model.damping",), periods=1, **start
+    ),
     "simulate_many": lambda system, **start: saltus.simulate_many(system, periods=1, **start),
     "find_orbit": lambda system, **start: saltus.find_orbit(system, settle=0, period=1, **start),
     "classify": lambda system, **start: saltus.classify(system, periods=96, transient=0, **start),
-    "frequency_sweep": lambda system, **start: saltus.frequency_sweep(system, [1.0, 1.01], periods=2, **start),
-    "lyapunov_spectrum": lambda system, **start: saltus.lyapunov_spectrum(system, periods=32, transient=0, **start),
+    "frequency_sweep": lambda system, **start: saltus.frequency_sweep(
+        system, [1.0, 1.01], periods=2, **start
+    ),
+    "lyapunov_spectrum": lambda system, **start: saltus.lyapunov_spectrum(
+        system, periods=32, transient=0, **start
+    ),
 }
-# Under one coordinate an ensemble takes any array for the velocity, so that only the others refuse a pair of them.
+# Under one coordinate an ensemble takes any array for the velocity, so that only the others refuse
+# a pair of them.
 REFUSED = [
     (ONE, {}, "the state at the start needs x=..."),
     (ONE, {"velocity": 0.1}, "the state at the start needs x=..."),
     (ONE, {"theta": 0.1}, "WallOscillator has no coordinate 'theta'; known here: x"),
     (ONE, {"x": 0.1, "y": 0.1}, "WallOscillator has no coordinate 'y'; "),
-    (ONE, {"x": 0.1, "velocty": 0.1}, "WallOscillator has no coordinate 'velocty'; did you mean 'velocity'?"),
+    (
+        ONE,
+        {"x": 0.1, "velocty": 0.1},
+        "WallOscillator has no coordinate 'velocty'; did you mean 'velocity'?",
+    ),
     (ONE, {"x": np.nan}, "x must be finite, got nan"),
     (ONE, {"x": -np.inf}, "x must be finite, got -inf"),
     (ONE, {"x": 10**400}, "x must be finite, got inf"),
@@ -42,7 +61,11 @@ REFUSED = [
     (TWO, {"z": 0.1}, "the state at the start needs x=..."),
     (TWO, {"z": 0.1, "x": 0.1, "velocity": 0.3}, "velocity must have 2 value(s), got 0.3"),
     (TWO, {"z": 0.1, "x": 0.1, "velocity": (0.3,)}, "velocity must have 2 value(s), got (0.3,)"),
-    (TWO, {"z": 0.1, "x": 0.1, "velocity": [0.1, 0.2, 0.3]}, "velocity must have 2 value(s), got [0.1, 0.2, 0.3]"),
+    (
+        TWO,
+        {"z": 0.1, "x": 0.1, "velocity": [0.1, 0.2, 0.3]},
+        "velocity must have 2 value(s), got [0.1, 0.2, 0.3]",
+    ),
     (TWO, {"z": 0.1, "x": 0.1, "velocity": None}, "velocity must have 2 value(s), got None"),
     (TWO, {"z": 0.1, "x": 0.1, "velocity": False}, "velocity must have 2 value(s), got False"),
     (TWO, {"z": 0.1, "x": 0.1, "velocity": (0.0, np.inf)}, "velocity must be finite, got inf"),
@@ -83,7 +106,10 @@ def test_a_good_start_is_the_same_state(system, start, state):
     assert saltus.simulate(system, duration=0.0, **start).final_state.tolist() == state
     many = saltus.simulate_many(system, duration=0.0, **start)
     names = system.model.coordinates
-    assert [float(many[f"start_{name}"]) for name in names if f"start_{name}" in many] in ([], state[: len(names)])
+    assert [float(many[f"start_{name}"]) for name in names if f"start_{name}" in many] in (
+        [],
+        state[: len(names)],
+    )
 
 
 @pytest.mark.parametrize(("system", "start", "state"), TAKEN)
@@ -96,6 +122,8 @@ def test_a_state_and_the_arguments_of_simulate_are_each_others_inverse(system, s
 
 def test_a_pair_of_velocities_is_no_state_of_one_coordinate():
     for reader in set(READERS) - {"simulate_many"}:
-        with pytest.raises(saltus.ParameterError, match=r"velocity must have 1 value\(s\), got \(0.1, 0.2\)"):
+        with pytest.raises(
+            saltus.ParameterError, match=r"velocity must have 1 value\(s\), got \(0.1, 0.2\)"
+        ):
             READERS[reader](ONE, x=0.1, velocity=(0.1, 0.2))
     assert saltus.simulate_many(ONE, x=0.1, velocity=(0.1, 0.2), periods=1).sizes["trajectory"] == 2

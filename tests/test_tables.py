@@ -1,4 +1,6 @@
-"""Tables of results: long, never a product of unrelated dimensions, numbers exact, and what a notebook shows."""
+"""Tables of results: long, never a product of unrelated dimensions, numbers exact, and what a
+notebook shows.
+"""
 
 import csv
 import sys
@@ -19,7 +21,9 @@ SYSTEM = saltus.System(
 
 @pytest.fixture(scope="module")
 def branch():
-    return saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.3), "load.frequency", (0.85, 1.05))
+    return saltus.continue_orbit(
+        saltus.find_orbit(SYSTEM, theta=0.3), "load.frequency", (0.85, 1.05)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -34,18 +38,30 @@ def test_a_branch_has_a_row_for_each_point_and_never_their_product_with_other_di
     assert len(table) == data.sizes["point"] == len(branch.points)
     assert list(table.parameter) == list(branch.parameters)
     assert len(saltus.to_pandas(branch, "special")) == len(branch.special)
-    with pytest.raises(ParameterError, match=r"there is no table 'specials'; did you mean 'special'\?"):
+    with pytest.raises(
+        ParameterError, match=r"there is no table 'specials'; did you mean 'special'\?"
+    ):
         saltus.to_pandas(branch, "specials")
 
 
 def test_an_ensemble_has_a_row_for_each_motion_and_stops_are_words():
     theta, size = xr.DataArray([0.1, 0.2, 0.3], dims="a"), xr.DataArray([0.02, 0.5], dims="b")
-    ends = saltus.simulate_many(SYSTEM, theta=theta, parameters={"load.horizontal.amplitude": size}, periods=60, until=["rest"])
+    ends = saltus.simulate_many(
+        SYSTEM,
+        theta=theta,
+        parameters={"load.horizontal.amplitude": size},
+        periods=60,
+        until=["rest"],
+    )
     table = saltus.to_pandas(ends)
     assert len(table) == 6
     for _, row in table.iterrows():
         own = ends.isel(a=int(row.a), b=int(row.b))
-        assert (row.theta, row.start_theta, row.impact_count) == (float(own.theta), float(own.start_theta), int(own.impact_count))
+        assert (row.theta, row.start_theta, row.impact_count) == (
+            float(own.theta),
+            float(own.start_theta),
+            int(own.impact_count),
+        )
         assert row.stop == str(saltus.stop_names(own).values)
     stops = saltus.stop_names(ends)
     assert stops.dims == ("a", "b")
@@ -62,7 +78,10 @@ def test_a_grid_of_ones_own_has_a_row_for_each_point_whatever_its_number_of_name
         chosen = dict(list(axes.items())[:count])
         found = saltus.map_over(lambda rest=rest, **point: place(**point, **rest), chosen)
         with saltus.to_csv(tmp_path / "found.csv", found).open() as file:
-            rows = [{name: float(row[name]) for name in (*chosen, "value")} for row in csv.DictReader(file)]
+            rows = [
+                {name: float(row[name]) for name in (*chosen, "value")}
+                for row in csv.DictReader(file)
+            ]
         assert len(rows) == np.prod([len(values) for values in chosen.values()])
         for row in rows:
             value = row.pop("value")
@@ -78,7 +97,9 @@ def test_arrays_at_the_points_of_a_grid_are_columns_or_a_table_of_their_own():
     assert table.columns.to_list() == ["a", "b", "sum", "powers_0", "powers_1"]
     assert table.powers_1.to_list() == [4.0, 4.0, 9.0, 9.0]
     assert saltus.to_pandas(found, "square").square.to_list() == [2.0] * 8 + [3.0] * 8
-    with pytest.raises(ParameterError, match=r"there is no table 'squares'; did you mean 'square'\?"):
+    with pytest.raises(
+        ParameterError, match=r"there is no table 'squares'; did you mean 'square'\?"
+    ):
         saltus.to_pandas(found, "squares")
     alone = saltus.to_pandas(saltus.map_over(lambda a: np.full((2, 2), a), {"a": [2.0, 3.0]}))
     assert alone.value.to_list() == [2.0] * 4 + [3.0] * 4
@@ -104,7 +125,9 @@ def test_sweeps_basins_and_attractors_along_a_parameter_have_a_row_for_each_of_t
 
 
 def test_a_diagram_has_the_tables_of_its_parts():
-    diagram = saltus.bifurcation_diagram(SYSTEM, bounds=(0.85, 0.95), max_period=1, values=[0.9], starts=4, bands=False)
+    diagram = saltus.bifurcation_diagram(
+        SYSTEM, bounds=(0.85, 0.95), max_period=1, values=[0.9], starts=4, bands=False
+    )
     table = saltus.to_pandas(diagram)
     assert len(table) == diagram["points"].sizes["point"]
     assert list(table.amplitude) == diagram["points"]["amplitude"].values.tolist()
@@ -129,7 +152,9 @@ def test_events_impacts_and_special_points_are_tables(branch, motion):
     assert list(motion.impacts.to_pandas().velocity_after) == motion.impacts.velocity_after.tolist()
     assert list(branch.special.to_pandas().kind) == [str(point.kind) for point in branch.special]
     several = saltus.System(
-        model=saltus.TwoStops(), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(1.0)), impact=saltus.NewtonImpact(0.5)
+        model=saltus.TwoStops(),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(1.0)),
+        impact=saltus.NewtonImpact(0.5),
     )
     stops = saltus.simulate(several, x=0.0, periods=3)
     assert set(stops.events.to_pandas().contact) <= {"left", "right"}
@@ -152,12 +177,22 @@ def test_what_a_notebook_shows_is_a_table_in_html(branch, motion):
 
 def test_a_notebook_shows_each_attractor_and_says_that_a_model_has_no_margins():
     stops = saltus.System(
-        model=saltus.TwoStops(left=-5.0, right=5.0, damping=1.0), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5))
+        model=saltus.TwoStops(left=-5.0, right=5.0, damping=1.0),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5)),
     )
     html = saltus.find_attractors(stops, starts=4, window=((-0.5, 0.5), (-0.5, 0.5)))._repr_html_()
-    for word in ("share of the starts", "period 1", "100 +- 0 %", "orbit of period 1: residual", "0.5"):
+    for word in (
+        "share of the starts",
+        "period 1",
+        "100 +- 0 %",
+        "orbit of period 1: residual",
+        "0.5",
+    ):
         assert word in html  # at resonance the amplitude is 0.5 / damping
-    assert "the model has no margins" in saltus.simulate(stops, x=0.1, periods=1).validity._repr_html_()
+    assert (
+        "the model has no margins"
+        in saltus.simulate(stops, x=0.1, periods=1).validity._repr_html_()
+    )
 
 
 def test_an_end_of_a_branch_is_shown_as_its_sentence(branch):
@@ -173,7 +208,9 @@ def test_progress_in_a_notebook_is_one_line_that_is_written_over(monkeypatch, ca
         return SimpleNamespace(update=updates.append)
 
     shell = SimpleNamespace(kernel=object())
-    notebook = SimpleNamespace(get_ipython=lambda: shell, display=SimpleNamespace(HTML=lambda text: text, display=display))
+    notebook = SimpleNamespace(
+        get_ipython=lambda: shell, display=SimpleNamespace(HTML=lambda text: text, display=display)
+    )
     monkeypatch.setitem(sys.modules, "IPython", notebook)
     for fraction in (0.0, 0.3, 0.7, 1.0):
         saltus.show_progress(fraction, "a < b")

@@ -9,4 +9,6 @@ from machine import about
 from auto.beside import beside_auto
 
 quick = "--quick" in sys.argv
-beside_auto(about(("saltus", "numpy", "scipy", "numba"), **({"quick": "yes"} if quick else {})), quick)
+beside_auto(
+    about(("saltus", "numpy", "scipy", "numba"), **({"quick": "yes"} if quick else {})), quick
+)

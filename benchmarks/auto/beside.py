@@ -1,4 +1,6 @@
-"""The comparison: every B on every mesh by AUTO, the exact branch by saltus, and the files that hold them."""
+"""The comparison: every B on every mesh by AUTO, the exact branch by saltus, and the files that
+hold them.
+"""
 
 from __future__ import annotations
 
@@ -51,15 +53,23 @@ def measured(quick: bool) -> dict[str, Any]:
                     names = {"amplitude": amplitude, "sharpness": sharpness, "mesh": str(mesh)}
                     rows.append(names | _row(program, orbit, names, mesh, known))
                 print(f"auto: H = {amplitude:g}, B = {sharpness:g}", flush=True)
-    exact = {str(amplitude): exact_rows(amplitude, known, 1 if quick else 3) for amplitude, known in KNOWN.items()}
+    exact = {
+        str(amplitude): exact_rows(amplitude, known, 1 if quick else 3)
+        for amplitude, known in KNOWN.items()
+    }
     return {"version": version(), "auto": rows, "exact": exact, "curve": exact_curve(SHOWN)}
 
 
-def _row(program: Path, orbit: np.ndarray, names: dict[str, Any], mesh: Mesh, known: Known) -> dict[str, Any]:
+def _row(
+    program: Path, orbit: np.ndarray, names: dict[str, Any], mesh: Mesh, known: Known
+) -> dict[str, Any]:
     """One run, and one down to TIMED alone for its time, where AUTO gets there."""
     amplitude, sharpness = names["amplitude"], names["sharpness"]
     done = run(program, orbit, constants(amplitude, sharpness, mesh))
-    curve = {"omega": [p.omega for p in done.branch], "amplitude": [p.amplitude for p in done.branch]}
+    curve = {
+        "omega": [p.omega for p in done.branch],
+        "amplitude": [p.amplitude for p in done.branch],
+    }
     timed = None
     if min(curve["omega"], default=HIGHEST) <= TIMED:
         part = run(program, orbit, constants(amplitude, sharpness, mesh, lowest=TIMED))

@@ -1,7 +1,8 @@
 """The branches that are compared, and what is known of them.
 
-Load (i) (`loadpatha`) at beta0 = 80 deg, C = 0.1, V = -0.5, e = 1: the symmetric orbits of period 1 from Omega = 3 down to 0.1,
-for two amplitudes. The folds are those on which two independent exact codes agree to residuals of 1e-15.
+Load (i) (`loadpatha`) at beta0 = 80 deg, C = 0.1, V = -0.5, e = 1: the symmetric orbits of period 1
+from Omega = 3 down to 0.1, for two amplitudes. The folds are those on which two independent exact
+codes agree to residuals of 1e-15.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import numpy as np
 from reference import BETA0, DAMPING, VERTICAL
 
 HIGHEST, LOWEST = 3.0, 0.1  # Omega, followed downwards
-TIMED = 0.2  # the codes are timed against each other as far down as this, where both get without many impacts a period
+# the codes are timed against each other as far down as this, where both get without many impacts a
+# period
+TIMED = 0.2
 SHARPNESSES = (50.0, 200.0, 1000.0, 5000.0)  # B
 SAMPLES = 400  # of the orbit that AUTO starts from
 
@@ -39,7 +42,9 @@ def system(amplitude: float) -> Any:
     """The exact system at Omega = 3."""
     import saltus
 
-    load = saltus.Load(frequency=HIGHEST, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=VERTICAL)
+    load = saltus.Load(
+        frequency=HIGHEST, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=VERTICAL
+    )
     return saltus.System(model=saltus.Metainterface(beta0=BETA0, damping=DAMPING), load=load)
 
 
@@ -47,8 +52,9 @@ def system(amplitude: float) -> Any:
 def first_state(amplitude: float) -> tuple[float, float]:
     """theta and theta' at tau = 0 on the exact orbit at Omega = 3.
 
-    Newton's method on one period of the event-driven flow, from the high-frequency limit theta = -H sin(beta0) sin(Omega tau) /
-    Omega^2: for H = 1 a motion that starts elsewhere settles on another attractor.
+    Newton's method on one period of the event-driven flow, from the high-frequency limit theta = -H
+    sin(beta0) sin(Omega tau) / Omega^2: for H = 1 a motion that starts elsewhere settles on another
+    attractor.
     """
     from scipy.optimize import root
 
@@ -62,12 +68,17 @@ def first_state(amplitude: float) -> tuple[float, float]:
 
     found = root(gap, (0.0, -amplitude * math.sin(BETA0) / HIGHEST), tol=1e-13)
     if not np.max(np.abs(found.fun)) < 1e-12:
-        raise RuntimeError(f"no orbit of period 1 was found at Omega = {HIGHEST:g} for H = {amplitude:g}: {found.message}")
+        raise RuntimeError(
+            f"no orbit of period 1 was found at Omega = {HIGHEST:g} for H = {amplitude:g}: "
+            f"{found.message}"
+        )
     return float(found.x[0]), float(found.x[1])
 
 
 def first_orbit(amplitude: float) -> np.ndarray:
-    """The same orbit over its period, as rows of tau, theta, theta', sin(Omega tau), cos(Omega tau)."""
+    """The same orbit over its period, as rows of tau, theta, theta', sin(Omega tau), cos(Omega
+    tau).
+    """
     import saltus
 
     theta, velocity = first_state(amplitude)

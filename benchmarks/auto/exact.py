@@ -23,18 +23,25 @@ class TooLongError(Exception):
 
 
 def exact_rows(amplitude: float, known: Known, rounds: int) -> list[dict[str, Any]]:
-    """The lines of the table for the branch down to TIMED and to LOWEST; `fails` with the reason where there is none.
+    """The lines of the table for the branch down to TIMED and to LOWEST; `fails` with the reason
+    where there is none.
 
-    The first one is timed by processor time, over `rounds` rounds after one in which code is compiled; the second one once.
+    The first one is timed by processor time, over `rounds` rounds after one in which code is
+    compiled; the second one once.
     """
     first = _attempt(lambda: _timed(amplitude, rounds))
     second = _attempt(lambda: _once(amplitude))
     lows = (TIMED, LOWEST)
-    return [{"lowest": low} | _row(outcome, known) for low, outcome in zip(lows, (first, second), strict=True)]
+    return [
+        {"lowest": low} | _row(outcome, known)
+        for low, outcome in zip(lows, (first, second), strict=True)
+    ]
 
 
 def exact_curve(amplitude: float) -> dict[str, list[float]]:
-    """Omega and max abs(theta) down to TIMED in small steps, to be drawn; empty lists where that fails."""
+    """Omega and max abs(theta) down to TIMED in small steps, to be drawn; empty lists where that
+    fails.
+    """
     found = _attempt(lambda: (follow(amplitude, TIMED, step=DRAWN), 0.0))
     if isinstance(found, str):
         return {"omega": [], "amplitude": []}
@@ -53,12 +60,16 @@ def follow(amplitude: float, lowest: float, **options: float) -> Any:
         if time.perf_counter() - start > LIMIT:
             raise TooLongError(f"not done in {LIMIT:g} s, {what}, {done:.0%}")
 
-    return saltus.continue_orbit(orbit, "load.frequency", (lowest, HIGHEST), progress=watch, **options)
+    return saltus.continue_orbit(
+        orbit, "load.frequency", (lowest, HIGHEST), progress=watch, **options
+    )
 
 
 def _timed(amplitude: float, rounds: int) -> tuple[Any, float]:
     branches: list[Any] = []
-    timings = interleave({0: lambda: branches.append(follow(amplitude, TIMED))}, rounds, one_core=True)
+    timings = interleave(
+        {0: lambda: branches.append(follow(amplitude, TIMED))}, rounds, one_core=True
+    )
     return branches[-1], timings[0].median
 
 
@@ -81,7 +92,11 @@ def _row(outcome: tuple[Any, float] | str, known: Known) -> dict[str, Any]:
     branch, seconds = outcome
     special = list(reversed(branch.special))  # downwards, as the branch is followed
     labels = Counter(KINDS.get(point.kind, point.kind) for point in special)
-    folds = [Point(point.parameter, point.amplitude, 0.0, False, "LP") for point in special if point.kind == "LP"]
+    folds = [
+        Point(point.parameter, point.amplitude, 0.0, False, "LP")
+        for point in special
+        if point.kind == "LP"
+    ]
     grazings = [[point.parameter, point.amplitude] for point in special if point.kind == "GR"]
     return {
         "seconds": seconds,
@@ -90,6 +105,9 @@ def _row(outcome: tuple[Any, float] | str, known: Known) -> dict[str, Any]:
         "folds": [[fold.omega, fold.amplitude] for fold in folds],
         "grazings": grazings,
         "labels": {kind: labels[kind] for kind in ("LP", "BP", "PD", "TR")},
-        "impossible": sum(point.kind == "NS" or (point.kind == "PD" and point.orbit.symmetric) for point in special),
+        "impossible": sum(
+            point.kind == "NS" or (point.kind == "PD" and point.orbit.symmetric)
+            for point in special
+        ),
         "end": str(branch.ends[0]),
     }

@@ -59,7 +59,9 @@ def _reading() -> str:
 
 
 def _errors(row: dict[str, Any]) -> str:
-    return ", ".join("not found" if error is None else f"{error:.0e}" for error in row["fold_errors"])
+    return ", ".join(
+        "not found" if error is None else f"{error:.0e}" for error in row["fold_errors"]
+    )
 
 
 def _labels(row: dict[str, Any]) -> str:
@@ -70,7 +72,9 @@ def _exact_line(row: dict[str, Any]) -> list[str]:
     head = ["saltus", "exact", f"to {row['lowest']:g}"]
     if "fails" in row:
         return [*head, "-", "-", "-", "-", row["fails"], "-", "-"]
-    grazings = ", ".join(f"{omega:.9f}" for omega, _ in row["grazings"][:2]) + (", ..." if len(row["grazings"]) > 2 else "")
+    grazings = ", ".join(f"{omega:.9f}" for omega, _ in row["grazings"][:2]) + (
+        ", ..." if len(row["grazings"]) > 2 else ""
+    )
     return [*head, number(row["seconds"]), str(row["points"]), _errors(row), grazings and f"located: {grazings}", row["end"],
             _labels(row), str(row["impossible"])]  # fmt: skip
 
@@ -100,7 +104,17 @@ def _ratio(exact: dict[str, Any], rows: list[dict[str, Any]]) -> str:
         return ""
     texts = []
     for sharpness in dict.fromkeys(row["sharpness"] for row in rows):
-        times = [(row["timed"], row["mesh"]) for row in rows if row["sharpness"] == sharpness and row["timed"]]
-        cells = ", ".join(f"{number(t)} s on {mesh} ({number(t / exact['seconds'])}x)" for t, mesh in sorted(times))
+        times = [
+            (row["timed"], row["mesh"])
+            for row in rows
+            if row["sharpness"] == sharpness and row["timed"]
+        ]
+        cells = ", ".join(
+            f"{number(t)} s on {mesh} ({number(t / exact['seconds'])}x)"
+            for t, mesh in sorted(times)
+        )
         texts.append(f"* B = {sharpness:g}: {cells or 'no mesh gets there'}")
-    return f"From Omega = {HIGHEST:g} to {TIMED:g} saltus takes {number(exact['seconds'])} s; AUTO:\n\n" + "\n".join(texts)
+    return (
+        f"From Omega = {HIGHEST:g} to {TIMED:g} saltus takes {number(exact['seconds'])} s; AUTO:\n\n"
+        + "\n".join(texts)
+    )

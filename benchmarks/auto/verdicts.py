@@ -9,8 +9,8 @@ from auto.case import HIGHEST, LOWEST, Known
 from auto.diagram import Point
 from auto.program import Run
 
-# abs(mean of theta) up to which an orbit counts as symmetric: the coarsest mesh errs by 1.4e-3 where no other orbit is near,
-# and the asymmetric orbits that double here have 3e-3 and more
+# abs(mean of theta) up to which an orbit counts as symmetric: the coarsest mesh errs by 1.4e-3
+# where no other orbit is near, and the asymmetric orbits that double here have 3e-3 and more
 SYMMETRIC = 2e-3
 NEAR = 1e-2  # relative: a fold farther than this from the exact one is another fold, or none
 NEAR_GRAZING = 2e-3  # in Omega
@@ -20,32 +20,54 @@ def fold_errors(branch: list[Point], known: Known) -> list[float | None]:
     """For each known fold the error in Omega of the nearest LP; None where no LP is near."""
     folds = [point.omega for point in branch if point.kind == "LP"]
     errors = [min((abs(fold - exact) for fold in folds), default=exact) for exact in known.folds]
-    return [error if error < NEAR * exact else None for error, exact in zip(errors, known.folds, strict=True)]
+    return [
+        error if error < NEAR * exact else None
+        for error, exact in zip(errors, known.folds, strict=True)
+    ]
 
 
 def impossible(branch: list[Point]) -> int:
     """Labels that no orbit can deserve, each an artefact of the discretisation.
 
-    TR: the product of the multipliers is exp(-C T) < 1, so no pair lies on the unit circle. PD on a symmetric orbit: its
-    multipliers are squares of those of the half map, and -1 would be the square of such a pair.
+    TR: the product of the multipliers is exp(-C T) < 1, so no pair lies on the unit circle. PD on a
+    symmetric orbit: its multipliers are squares of those of the half map, and -1 would be the
+    square of such a pair.
     """
-    return sum(point.kind == "TR" or (point.kind == "PD" and abs(point.mean) < SYMMETRIC) for point in branch)
+    return sum(
+        point.kind == "TR" or (point.kind == "PD" and abs(point.mean) < SYMMETRIC)
+        for point in branch
+    )
 
 
 def at_grazing(branch: list[Point], known: Known) -> dict[str, Any] | None:
-    """The first passage of the exact grazing: the amplitude on arrival, and the folds around it before the branch leaves.
+    """The first passage of the exact grazing: the amplitude on arrival, and the folds around it
+    before the branch leaves.
 
-    The exact branch turns at the grazing and again a little above it; a smoothed one may show that as two folds, or pass.
-    None where nothing grazes; `arrives` is False where the branch never gets there.
+    The exact branch turns at the grazing and again a little above it; a smoothed one may show that
+    as two folds, or pass. None where nothing grazes; `arrives` is False where the branch never gets
+    there.
     """
     if known.grazing is None:
         return None
-    first = next((i for i, point in enumerate(branch) if point.omega < known.grazing + NEAR_GRAZING), None)
+    first = next(
+        (i for i, point in enumerate(branch) if point.omega < known.grazing + NEAR_GRAZING), None
+    )
     if first is None:
         return {"arrives": False, "turns": [], "beyond": False}
-    stay = next((i for i in range(first, len(branch)) if abs(branch[i].omega - known.grazing) > NEAR_GRAZING), len(branch))
+    stay = next(
+        (
+            i
+            for i in range(first, len(branch))
+            if abs(branch[i].omega - known.grazing) > NEAR_GRAZING
+        ),
+        len(branch),
+    )
     turns = [[point.omega, point.amplitude] for point in branch[first:stay] if point.kind == "LP"]
-    return {"arrives": True, "turns": turns, "beyond": stay < len(branch) and branch[stay].omega < known.grazing}
+    return {
+        "arrives": True,
+        "turns": turns,
+        "beyond": stay < len(branch) and branch[stay].omega < known.grazing,
+    }
 
 
 def end(run: Run) -> str:

@@ -1,4 +1,6 @@
-"""The peers: one file for each way of computing the motions; a peer that is not installed is reported as absent."""
+"""The peers: one file for each way of computing the motions; a peer that is not installed is
+reported as absent.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +8,29 @@ import importlib
 
 from peers.peer import AbsentError, DerivativeFlow, Flow, Peer, zeno_answer
 
-MODULES = ("saltus_lanes", "saltus_scalar", "heyoka_batch", "heyoka_scalar", "diffrax_batch", "scipy_restarts", "prototype")
-PROTOTYPE = "SALTUS_BENCHMARK_PROTOTYPE"  # the environment variable by which run.py hands --prototype on
+MODULES = (
+    "saltus_lanes",
+    "saltus_scalar",
+    "heyoka_batch",
+    "heyoka_scalar",
+    "diffrax_batch",
+    "scipy_restarts",
+    "prototype",
+)
+# the environment variable by which run.py hands --prototype on
+PROTOTYPE = "SALTUS_BENCHMARK_PROTOTYPE"
 
-__all__ = ["MODULES", "PROTOTYPE", "AbsentError", "DerivativeFlow", "Flow", "Peer", "firsts", "load_peers", "zeno_answer"]
+__all__ = [
+    "MODULES",
+    "PROTOTYPE",
+    "AbsentError",
+    "DerivativeFlow",
+    "Flow",
+    "Peer",
+    "firsts",
+    "load_peers",
+    "zeno_answer",
+]
 
 
 def firsts(peers: list[Peer]) -> list[Peer]:

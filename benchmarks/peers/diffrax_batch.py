@@ -1,8 +1,9 @@
-"""diffrax, compiled by XLA for the CPU: a batch by vmap, with its own events and a restart after each of them.
+"""diffrax, compiled by XLA for the CPU: a batch by vmap, with its own events and a restart after
+each of them.
 
-The motions of a batch march in step: all of them wait for the one with the most steps between two impacts, and for the one with
-the most impacts. The event is theta over the time since the last impact, for theta itself is zero there and diffrax would
-take that for the next event.
+The motions of a batch march in step: all of them wait for the one with the most steps between two
+impacts, and for the one with the most impacts. The event is theta over the time since the last
+impact, for theta itself is zero there and diffrax would take that for the next event.
 """
 
 from __future__ import annotations
@@ -11,14 +12,26 @@ import os
 from functools import cache
 from typing import Any
 
-os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")  # one core
+# one core
+os.environ.setdefault(
+    "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+)
 
 import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix
-from reference import AMPLITUDE, BETA0, DAMPING, FREQUENCY, HORIZON, VERTICAL, ZENO_FACTOR, ZENO_HORIZON
+from reference import (
+    AMPLITUDE,
+    BETA0,
+    DAMPING,
+    FREQUENCY,
+    HORIZON,
+    VERTICAL,
+    ZENO_FACTOR,
+    ZENO_HORIZON,
+)
 
 from peers.peer import DerivativeFlow, Flow, Peer, zeno_answer
 
@@ -39,11 +52,22 @@ def gap(t: Any, y: Any, args: Any, **_: Any) -> Any:
     side, start, at_contact, _ = args
     since = t - start
     fresh = since <= 0
-    return side * jnp.where(at_contact, jnp.where(fresh, y[1], y[0] / jnp.where(fresh, 1.0, since)), y[0])
+    return side * jnp.where(
+        at_contact, jnp.where(fresh, y[1], y[0] / jnp.where(fresh, 1.0, since)), y[0]
+    )
 
 
-def follow(solver: Any, tol: float, horizon: float, factor: float = 1.0, enough: float = jnp.inf, forward: bool = False) -> Any:
-    """The motion of a single state, as a function to be batched and compiled; `forward` makes it differentiable."""
+def follow(
+    solver: Any,
+    tol: float,
+    horizon: float,
+    factor: float = 1.0,
+    enough: float = jnp.inf,
+    forward: bool = False,
+) -> Any:
+    """The motion of a single state, as a function to be batched and compiled; `forward` makes it
+    differentiable.
+    """
     adjoint = diffrax.ForwardMode() if forward else diffrax.RecursiveCheckpointAdjoint()
     event = diffrax.Event(gap, optimistix.Newton(rtol=1e-13, atol=1e-14))
     control = diffrax.PIDController(rtol=max(tol, 2.3e-14), atol=tol)
@@ -56,12 +80,22 @@ def follow(solver: Any, tol: float, horizon: float, factor: float = 1.0, enough:
         )  # fmt: skip
         t, y, hit = part.ts[-1], part.ys[-1], part.event_mask
         y = jnp.where(hit, jnp.stack([0.0, factor * y[1]]), y)
-        return t, y, jnp.where(hit, -side, side), hit, amplitude, impacts + hit, jnp.where(hit, t, last)
+        return (
+            t,
+            y,
+            jnp.where(hit, -side, side),
+            hit,
+            amplitude,
+            impacts + hit,
+            jnp.where(hit, t, last),
+        )
 
     def motion(theta: Any, velocity: Any, amplitude: Any) -> Any:
         side = jnp.where((theta > 0) | ((theta == 0) & (velocity > 0)), 1.0, -1.0)
         start = (0.0, jnp.stack([theta, velocity]), side, theta == 0, amplitude, 0, 0.0)
-        t, y, _, _, _, impacts, last = jax.lax.while_loop(lambda c: (c[0] < horizon) & (c[5] < enough), arc, start)
+        t, y, _, _, _, impacts, last = jax.lax.while_loop(
+            lambda c: (c[0] < horizon) & (c[5] < enough), arc, start
+        )
         return y[0], y[1], t, impacts, last
 
     return motion
@@ -88,7 +122,9 @@ def _peer(solver: Any, tolerances: tuple[float, ...], with_derivatives: bool = F
 
         run = jax.jit(jax.vmap(both))
 
-        def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        def flow(
+            theta: np.ndarray, velocity: np.ndarray
+        ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
             (x, v), (dx, dv) = run(theta, velocity)
             return np.asarray(x), np.asarray(v), np.asarray(dx), np.asarray(dv)
 
@@ -101,7 +137,10 @@ def _peer(solver: Any, tolerances: tuple[float, ...], with_derivatives: bool = F
 
     return Peer(
         name=f"diffrax {name}",
-        about=f"{name} and Newton on its interpolant, a batch of {BATCH} by vmap that marches in step; 64 bits, XLA on one core",
+        about=(
+            f"{name} and Newton on its interpolant, a batch of {BATCH} by vmap that marches in "
+            "step; 64 bits, XLA on one core"
+        ),
         packages=("diffrax", "jax"),
         tolerances=tolerances,
         setup=setup,

@@ -1,9 +1,10 @@
 """heyoka.py's batch mode, set up as well as it can be on this problem.
 
-Tried: 4, 8, 16 and 32 motions a batch; with and without fast_math and force_avx512; `integrator.pars` or a memory view in the
-callback. 16 motions with all of them is the fastest, by a few per cent over 8 and a third over the defaults. Its events are
-found motion by motion and their callbacks are Python, so that wider batches gain little. On all cores one process each is used:
-its threads would wait for each other in the callbacks.
+Tried: 4, 8, 16 and 32 motions a batch; with and without fast_math and force_avx512;
+`integrator.pars` or a memory view in the callback. 16 motions with all of them is the fastest, by a
+few per cent over 8 and a third over the defaults. Its events are found motion by motion and their
+callbacks are Python, so that wider batches gain little. On all cores one process each is used: its
+threads would wait for each other in the callbacks.
 """
 
 from __future__ import annotations
@@ -29,12 +30,26 @@ def integrator(tol: float, callback: Any, system: Any = None) -> Any:
     """A batch integrator with the event."""
     event = hy.t_event_batch(hy.make_vars("x"), callback=callback)
     pars = np.repeat([[1.0], [AMPLITUDE]], WIDTH, axis=1)
-    options = {"tol": tol, "t_events": [event], "pars": pars, "fast_math": True, "force_avx512": True}
+    options = {
+        "tol": tol,
+        "t_events": [event],
+        "pars": pars,
+        "fast_math": True,
+        "force_avx512": True,
+    }
     return hy.taylor_adaptive_batch(system or equations(), np.zeros((2, WIDTH)), **options)
 
 
-def batches(ta: Any, theta: np.ndarray, velocity: np.ndarray, rows: tuple[int, ...], identity: np.ndarray | None) -> np.ndarray:
-    """Propagate every batch and keep some rows of the states at the end; the last batch is filled up with copies."""
+def batches(
+    ta: Any,
+    theta: np.ndarray,
+    velocity: np.ndarray,
+    rows: tuple[int, ...],
+    identity: np.ndarray | None,
+) -> np.ndarray:
+    """Propagate every batch and keep some rows of the states at the end; the last batch is filled
+    up with copies.
+    """
     padded = -(-len(theta) // WIDTH) * WIDTH
     starts = np.stack([np.resize(theta, padded), np.resize(velocity, padded)])
     ends = np.empty((len(rows), padded))
@@ -86,7 +101,9 @@ def derivatives(tol: float) -> DerivativeFlow:
     side, rows = memoryview(ta.pars[SIDE]), [memoryview(row) for row in ta.state]
     identity = ta.state[2:].copy()
 
-    def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def flow(
+        theta: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         ends = batches(ta, theta, velocity, (0, 1, 4, 7), identity)
         return ends[0], ends[1], ends[2], ends[3]
 
@@ -108,13 +125,17 @@ def _work(part: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 @contextmanager
 def all_cores(tol: float) -> Iterator[Flow]:
-    """The flow on every core, in processes that are started and have compiled before anything is timed."""
+    """The flow on every core, in processes that are started and have compiled before anything is
+    timed.
+    """
     cores = os.cpu_count() or 1
     with multiprocessing.get_context("spawn").Pool(cores, _start_worker, (tol,)) as pool:
 
         def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             pieces = max(cores, -(-len(theta) // CHUNK))
-            parts = zip(np.array_split(theta, pieces), np.array_split(velocity, pieces), strict=True)
+            parts = zip(
+                np.array_split(theta, pieces), np.array_split(velocity, pieces), strict=True
+            )
             ends = pool.map(_work, parts, chunksize=1)
             return np.concatenate([e[0] for e in ends]), np.concatenate([e[1] for e in ends])
 
@@ -124,13 +145,18 @@ def all_cores(tol: float) -> Iterator[Flow]:
 PEERS = (
     Peer(
         name="heyoka.py batch",
-        about=f"batches of {WIDTH} with AVX-512 and fast_math, an event with a short Python callback; a process for each core",
+        about=(
+            f"batches of {WIDTH} with AVX-512 and fast_math, an event with a short Python "
+            "callback; a process for each core"
+        ),
         packages=("heyoka",),
         tolerances=TOLERANCES,
         setup=setup,
         batch=32 * WIDTH,
         all_cores=all_cores,
         derivatives=derivatives,
-        derivatives_about="state and amplitude; it has no saltation, which is written by hand in the callback",
+        derivatives_about=(
+            "state and amplitude; it has no saltation, which is written by hand in the callback"
+        ),
     ),
 )

@@ -1,7 +1,9 @@
-"""heyoka.py, one motion at a time, with a terminal event at the contact whose callback changes the side.
+"""heyoka.py, one motion at a time, with a terminal event at the contact whose callback changes the
+side.
 
-Its callbacks are Python. They are kept as short as they can be: the side is a parameter, written through a memory view that is
-made once; `integrator.pars[0]` in the callback costs 0.8 us an impact more.
+Its callbacks are Python. They are kept as short as they can be: the side is a parameter, written
+through a memory view that is made once; `integrator.pars[0]` in the callback costs 0.8 us an impact
+more.
 """
 
 from __future__ import annotations
@@ -11,12 +13,22 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-from reference import AMPLITUDE, BETA0, DAMPING, FREQUENCY, HORIZON, VERTICAL, ZENO_FACTOR, ZENO_HORIZON
+from reference import (
+    AMPLITUDE,
+    BETA0,
+    DAMPING,
+    FREQUENCY,
+    HORIZON,
+    VERTICAL,
+    ZENO_FACTOR,
+    ZENO_HORIZON,
+)
 
 from peers.peer import DerivativeFlow, Flow, Peer, zeno_answer
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15)
-JUMP = -2.0 * np.cos(BETA0) * VERTICAL  # of the acceleration at an impact with e = 1, for the side before it
+# of the acceleration at an impact with e = 1, for the side before it
+JUMP = -2.0 * np.cos(BETA0) * VERTICAL
 SIDE, SIZE = 0, 1  # places of the parameters
 
 
@@ -30,7 +42,9 @@ def equations() -> list[tuple[Any, Any]]:
 
 
 def variational() -> Any:
-    """The same with the derivatives to the state and to the amplitude; the order is that of `DERIVATIVES`."""
+    """The same with the derivatives to the state and to the amplitude; the order is that of
+    `DERIVATIVES`.
+    """
     x, v = hy.make_vars("x", "v")
     return hy.var_ode_sys(equations(), [x, v, hy.par[SIZE]], order=1)
 
@@ -38,7 +52,14 @@ def variational() -> Any:
 def integrator(tol: float, callback: Callable[..., bool], system: Any = None) -> Any:
     """A scalar integrator with the event."""
     event = hy.t_event(hy.make_vars("x"), callback=callback)
-    return hy.taylor_adaptive(system or equations(), [0.3, 0.0], tol=tol, t_events=[event], pars=[1.0, AMPLITUDE], fast_math=True)
+    return hy.taylor_adaptive(
+        system or equations(),
+        [0.3, 0.0],
+        tol=tol,
+        t_events=[event],
+        pars=[1.0, AMPLITUDE],
+        fast_math=True,
+    )
 
 
 def prepare(ta: Any, x: float, v: float) -> None:
@@ -89,7 +110,9 @@ def derivatives(tol: float) -> DerivativeFlow:
     pars, state = memoryview(ta.pars), memoryview(ta.state)
     identity = ta.state[2:].copy()
 
-    def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def flow(
+        theta: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         ends = np.empty((4, len(theta)))
         for i, (x, v) in enumerate(zip(theta, velocity, strict=True)):
             prepare(ta, x, v)
@@ -115,19 +138,26 @@ def zeno(enough: int) -> dict[str, Any]:
     ta = integrator(1e-12, bounce)
     ta.pars[SIZE] = 0.0
     ta.propagate_until(ZENO_HORIZON)
-    return zeno_answer(time=ta.time, theta=ta.state[0], velocity=ta.state[1], impacts=impacts, last=last)
+    return zeno_answer(
+        time=ta.time, theta=ta.state[0], velocity=ta.state[1], impacts=impacts, last=last
+    )
 
 
 PEERS = (
     Peer(
         name="heyoka.py scalar",
-        about="Taylor series with a terminal event, its Python callback as short as it can be; fast_math",
+        about=(
+            "Taylor series with a terminal event, its Python callback as short as it can be; "
+            "fast_math"
+        ),
         packages=("heyoka",),
         tolerances=TOLERANCES,
         setup=setup,
         batch=16,
         derivatives=derivatives,
-        derivatives_about="state and amplitude; it has no saltation, which is written by hand in the callback",
+        derivatives_about=(
+            "state and amplitude; it has no saltation, which is written by hand in the callback"
+        ),
         zeno=zeno,
     ),
 )

@@ -12,7 +12,9 @@ import numpy as np
 # From theta and theta' at time 0 to theta and theta' after reference.PERIODS forcing periods
 Flow = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 # The same, followed by d theta / d amplitude and d theta' / d amplitude
-DerivativeFlow = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+DerivativeFlow = Callable[
+    [np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+]
 
 
 class AbsentError(Exception):
@@ -27,7 +29,8 @@ class Peer:
     about: str  # what it does, in a sentence
     packages: tuple[str, ...]
     tolerances: tuple[float, ...]  # loose ones too, where a code does better than it is asked to
-    setup: Callable[[float], Flow]  # for one core; whatever is compiled at the first call is not timed
+    # for one core; whatever is compiled at the first call is not timed
+    setup: Callable[[float], Flow]
     batch: int = 1  # motions in one timed call
     all_cores: Callable[[float], AbstractContextManager[Flow]] | None = None
     derivatives: Callable[[float], DerivativeFlow] | None = None
@@ -40,7 +43,11 @@ class Peer:
         return self.setup.__module__.removeprefix("peers.")
 
 
-def zeno_answer(*, time: float, theta: float, velocity: float, impacts: int, last: float) -> dict[str, Any]:
-    """Where a code is with the accumulation of impacts when it ends: its time, its state, and its impacts."""
+def zeno_answer(
+    *, time: float, theta: float, velocity: float, impacts: int, last: float
+) -> dict[str, Any]:
+    """Where a code is with the accumulation of impacts when it ends: its time, its state, and its
+    impacts.
+    """
     numbers = {"time": time, "theta": theta, "velocity": velocity, "last_impact": last}
     return {"impacts": int(impacts), **{name: float(value) for name, value in numbers.items()}}

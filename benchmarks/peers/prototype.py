@@ -1,4 +1,6 @@
-"""A foreign sketch of the lanes, `nb_lanes.py`, from a folder that the caller names; off unless asked for."""
+"""A foreign sketch of the lanes, `nb_lanes.py`, from a folder that the caller names; off unless
+asked for.
+"""
 
 from __future__ import annotations
 

@@ -18,10 +18,24 @@ if not hasattr(saltus, "simulate_many"):
     raise AbsentError("this saltus has no simulate_many")
 
 
-def run(what: Any, theta: np.ndarray, velocity: np.ndarray, tol: float, threads: int | None, **options: Any) -> Any:
+def run(
+    what: Any,
+    theta: np.ndarray,
+    velocity: np.ndarray,
+    tol: float,
+    threads: int | None,
+    **options: Any,
+) -> Any:
     """An ensemble of motions over the measured number of periods, of which only the ends are kept."""
     return saltus.simulate_many(
-        what, theta=theta, velocity=velocity, periods=PERIODS, tol=tol, sample=(), threads=threads, **options
+        what,
+        theta=theta,
+        velocity=velocity,
+        periods=PERIODS,
+        tol=tol,
+        sample=(),
+        threads=threads,
+        **options,
     )
 
 
@@ -46,7 +60,9 @@ def derivatives(tol: float) -> DerivativeFlow:
     """The motions and their derivatives to the amplitude."""
     what = system()
 
-    def flow(theta: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def flow(
+        theta: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         ends = run(what, theta, velocity, tol, 1, sensitivities=(AMPLITUDE_PATH,))
         slopes = ends["derivative"].sel(column=AMPLITUDE_PATH).values
         return ends["theta"].values, ends["velocity"].values, slopes[:, 0], slopes[:, 1]

@@ -1,4 +1,6 @@
-"""SciPy's solve_ivp, restarted at every impact that its own event location finds: what a careful user writes."""
+"""SciPy's solve_ivp, restarted at every impact that its own event location finds: what a careful
+user writes.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,16 @@ import math
 from typing import Any
 
 import numpy as np
-from reference import AMPLITUDE, BETA0, DAMPING, FREQUENCY, HORIZON, VERTICAL, ZENO_FACTOR, ZENO_HORIZON
+from reference import (
+    AMPLITUDE,
+    BETA0,
+    DAMPING,
+    FREQUENCY,
+    HORIZON,
+    VERTICAL,
+    ZENO_FACTOR,
+    ZENO_HORIZON,
+)
 from scipy.integrate import solve_ivp
 
 from peers.peer import Flow, Peer, zeno_answer
@@ -20,7 +31,14 @@ def slope(t: float, y: np.ndarray, side: float, amplitude: float) -> tuple[float
 
 
 def follow(
-    method: str, tol: float, state: np.ndarray, end: float, *, amplitude: float, factor: float = 1.0, enough: float = math.inf
+    method: str,
+    tol: float,
+    state: np.ndarray,
+    end: float,
+    *,
+    amplitude: float,
+    factor: float = 1.0,
+    enough: float = math.inf,
 ) -> dict[str, Any]:
     """One motion to its end, or to `enough` impacts."""
     t, last, impacts = 0.0, 0.0, 0
@@ -32,7 +50,16 @@ def follow(
     contact.terminal = True  # type: ignore[attr-defined]
     while t < end and impacts < enough:
         contact.direction = -side  # type: ignore[attr-defined]
-        part = solve_ivp(slope, (t, end), state, method, events=contact, args=(side, amplitude), rtol=max(tol, 2.3e-14), atol=tol)
+        part = solve_ivp(
+            slope,
+            (t, end),
+            state,
+            method,
+            events=contact,
+            args=(side, amplitude),
+            rtol=max(tol, 2.3e-14),
+            atol=tol,
+        )
         if part.status < 0:
             raise RuntimeError(part.message)
         t, state = part.t[-1], part.y[:, -1].copy()
@@ -52,10 +79,20 @@ def _peer(method: str, tolerances: tuple[float, ...]) -> Peer:
 
     def zeno(enough: int) -> dict[str, Any]:
         state = np.array([0.3, 0.0])
-        return follow(method, 1e-10, state, ZENO_HORIZON, amplitude=0.0, factor=ZENO_FACTOR, enough=enough)
+        return follow(
+            method, 1e-10, state, ZENO_HORIZON, amplitude=0.0, factor=ZENO_FACTOR, enough=enough
+        )
 
     about = f"solve_ivp with {method}, restarted at every impact that its event location finds"
-    return Peer(name=f"SciPy {method}", about=about, packages=("scipy",), tolerances=tolerances, setup=setup, batch=1, zeno=zeno)
+    return Peer(
+        name=f"SciPy {method}",
+        about=about,
+        packages=("scipy",),
+        tolerances=tolerances,
+        setup=setup,
+        batch=1,
+        zeno=zeno,
+    )
 
 
 PEERS = (

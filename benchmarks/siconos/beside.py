@@ -1,4 +1,6 @@
-"""The comparison: every motion with ever smaller steps by Siconos, the same by saltus, and the files that hold them."""
+"""The comparison: every motion with ever smaller steps by Siconos, the same by saltus, and the
+files that hold them.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,16 @@ QUICK_STEPS = STEPS[:6]
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 EXACT = 1e-15  # the tol of the motions that errors are counted from
 TARGETS = (1e-3, 1e-5)
-HEAD = ("motion", "impacts", "Siconos' order", "error", "saltus, ms", "Siconos, ms", "with steps of", "ratio")
+HEAD = (
+    "motion",
+    "impacts",
+    "Siconos' order",
+    "error",
+    "saltus, ms",
+    "Siconos, ms",
+    "with steps of",
+    "ratio",
+)
 
 READING = """
 Six motions of `TwoLayer` with Newton's law of impact, by saltus with exact events and by Siconos with Moreau and Jean's time
@@ -52,7 +63,10 @@ def beside_siconos(about: dict[str, Any], quick: bool = False, folder: Path = RE
 
 
 def measured(quick: bool) -> list[dict[str, Any]]:
-    """Errors and seconds of every motion, by both. Raises AbsentError where Siconos is not installed."""
+    """Errors and seconds of every motion, by both.
+
+    Raises AbsentError where Siconos is not installed.
+    """
     counts, rounds = (QUICK_STEPS, 1) if quick else (STEPS, 3)
     answers = iter(march([case.task(count, rounds) for case in CASES for count in counts]))
     rows = []
@@ -61,9 +75,19 @@ def measured(quick: bool) -> list[dict[str, Any]]:
         steps = [_step(case, count, next(answers), exact) for count in counts]
         tasks = {tol: lambda case=case, tol=tol: case.motion(tol) for tol in TOLERANCES}
         timings = interleave(tasks, 3 if quick else 15, one_core=True)
-        ours = [{"tol": tol, "error": _error(case.end(tol), exact), "seconds": timings[tol].median} for tol in TOLERANCES]
-        row = {"about": case.about, "impacts": len(case.motion(EXACT).impacts), "siconos": steps, "saltus": ours}
-        rows.append(row | {"order": order(steps), "equal": [_at(target, steps, ours) for target in TARGETS]})
+        ours = [
+            {"tol": tol, "error": _error(case.end(tol), exact), "seconds": timings[tol].median}
+            for tol in TOLERANCES
+        ]
+        row = {
+            "about": case.about,
+            "impacts": len(case.motion(EXACT).impacts),
+            "siconos": steps,
+            "saltus": ours,
+        }
+        rows.append(
+            row | {"order": order(steps), "equal": [_at(target, steps, ours) for target in TARGETS]}
+        )
     return rows
 
 
@@ -72,7 +96,11 @@ def _step(case: Case, count: int, answer: dict[str, Any], exact: np.ndarray) -> 
     size = case.duration / count
     if abs(answer["time"] - case.duration) > 0.5 * size:
         raise RuntimeError(f"Siconos ended at {answer['time']} instead of {case.duration}")
-    return {"step": size, "error": _error(np.array(answer["state"]), exact), "seconds": float(np.median(answer["seconds"]))}
+    return {
+        "step": size,
+        "error": _error(np.array(answer["state"]), exact),
+        "seconds": float(np.median(answer["seconds"])),
+    }
 
 
 def _error(state: np.ndarray, exact: np.ndarray) -> float:
@@ -85,18 +113,30 @@ def order(steps: list[dict[str, float]]) -> float:
     return float(np.polyfit(x, y, 1)[0])
 
 
-def _at(target: float, steps: list[dict[str, float]], ours: list[dict[str, float]]) -> dict[str, Any]:
-    """The seconds of both for an error of at most `target`, and Siconos' step: `reached` by one, or extrapolated."""
+def _at(
+    target: float, steps: list[dict[str, float]], ours: list[dict[str, float]]
+) -> dict[str, Any]:
+    """The seconds of both for an error of at most `target`, and Siconos' step: `reached` by one, or
+    extrapolated.
+    """
     smallest = min(steps, key=lambda row: row["step"])
     theirs, size = (
         equal_error([r["error"] for r in steps], costs, [target])[0]
         for costs in ([r["seconds"] for r in steps], [1.0 / r["step"] for r in steps])
     )
-    mine = equal_error([max(r["error"], 1e-16) for r in ours], [r["seconds"] for r in ours], [target])[0]
+    mine = equal_error(
+        [max(r["error"], 1e-16) for r in ours], [r["seconds"] for r in ours], [target]
+    )[0]
     reached, more = bool(np.isfinite(theirs)), smallest["error"] / target
     if not reached:
         theirs, size = smallest["seconds"] * more, more / smallest["step"]
-    return {"target": target, "saltus": float(mine), "siconos": float(theirs), "step": float(1.0 / size), "reached": reached}
+    return {
+        "target": target,
+        "saltus": float(mine),
+        "siconos": float(theirs),
+        "step": float(1.0 / size),
+        "reached": reached,
+    }
 
 
 def report(results: dict[str, Any]) -> str:
@@ -104,7 +144,12 @@ def report(results: dict[str, Any]) -> str:
     parts = ["# Both layers, beside Siconos"]
     if "absent" in results:
         return "\n\n".join([*parts, f"Siconos is absent: {results['absent']}."]) + "\n"
-    parts.append("\n".join(f"* {key}: {value}" for key, value in [*results["about"].items(), ("Siconos", results["version"])]))
+    parts.append(
+        "\n".join(
+            f"* {key}: {value}"
+            for key, value in [*results["about"].items(), ("Siconos", results["version"])]
+        )
+    )
     parts.append(READING)
     parts.append(table(HEAD, [_line(row, at) for row in results["cases"] for at in row["equal"]]))
     parts.append("![error against step, and time against error](siconos.png)")

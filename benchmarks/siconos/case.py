@@ -37,7 +37,9 @@ class Case:
         """For saltus."""
         names = ("damping", "stiffness_ratio", "mass_ratio", "dissipation_ratio")
         return saltus.System(
-            model=saltus.TwoLayer(beta0=math.radians(self.beta0), **{name: getattr(self, name) for name in names}),
+            model=saltus.TwoLayer(
+                beta0=math.radians(self.beta0), **{name: getattr(self, name) for name in names}
+            ),
             load=saltus.Load(
                 frequency=self.frequency,
                 vertical=self.vertical,
@@ -51,11 +53,23 @@ class Case:
     def numbers(self) -> Numbers:
         """For layers.c, in the order of its places."""
         of_model = (self.damping, self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio)
-        return (math.radians(self.beta0), *of_model, self.vertical, self.horizontal, self.frequency, self.ground)
+        return (
+            math.radians(self.beta0),
+            *of_model,
+            self.vertical,
+            self.horizontal,
+            self.frequency,
+            self.ground,
+        )
 
     def task(self, steps: int, rounds: int) -> dict[str, Any]:
         """What march.py is asked for."""
-        asked = {"opening": self.opening, "velocity": self.velocity, "numbers": self.numbers, "e": self.e}
+        asked = {
+            "opening": self.opening,
+            "velocity": self.velocity,
+            "numbers": self.numbers,
+            "e": self.e,
+        }
         return asked | {"duration": self.duration, "steps": steps, "rounds": rounds}
 
     def end(self, tol: float) -> np.ndarray:
@@ -67,11 +81,19 @@ class Case:
     def motion(self, tol: float) -> saltus.Motion:
         """The motion, by saltus."""
         (x, y), (v, w) = self.opening, self.velocity
-        return saltus.simulate(self.system, theta=(x, -y), velocity=(v, -w), duration=self.duration, tol=tol)
+        return saltus.simulate(
+            self.system, theta=(x, -y), velocity=(v, -w), duration=self.duration, tol=tol
+        )
 
 
 CASES = (
-    Case(about="small loads, one layer at a time", opening=(0.12, 0.0), e=(0.0, 0.0), mass_ratio=0.01, horizontal=0.1),
+    Case(
+        about="small loads, one layer at a time",
+        opening=(0.12, 0.0),
+        e=(0.0, 0.0),
+        mass_ratio=0.01,
+        horizontal=0.1,
+    ),
     Case(
         about="the closed layer is let go",
         opening=(0.2, 0.0),
@@ -81,7 +103,13 @@ CASES = (
         stiffness_ratio=0.7,
         dissipation_ratio=1.4,
     ),
-    Case(about="both bounce, and come to rest", opening=(0.3, 0.4), velocity=(0.0, 0.6), e=(0.5, 0.5), mass_ratio=1.0),
+    Case(
+        about="both bounce, and come to rest",
+        opening=(0.3, 0.4),
+        velocity=(0.0, 0.6),
+        e=(0.5, 0.5),
+        mass_ratio=1.0,
+    ),
     Case(
         about="heavy lower mass under a moving ground",
         opening=(0.2, 0.3),
@@ -94,7 +122,20 @@ CASES = (
         ground=0.2,
     ),
     Case(
-        about="nothing is lost", opening=(0.3, 0.4), velocity=(0.0, 0.2), e=(1.0, 1.0), mass_ratio=0.7, damping=0.0, duration=6.0
+        about="nothing is lost",
+        opening=(0.3, 0.4),
+        velocity=(0.0, 0.2),
+        e=(1.0, 1.0),
+        mass_ratio=0.7,
+        damping=0.0,
+        duration=6.0,
     ),
-    Case(about="rest and release in turn", opening=(0.1, 0.1), e=(0.5, 0.5), mass_ratio=0.5, beta0=60.0, horizontal=0.9),
+    Case(
+        about="rest and release in turn",
+        opening=(0.1, 0.1),
+        e=(0.5, 0.5),
+        mass_ratio=0.5,
+        beta0=60.0,
+        horizontal=0.9,
+    ),
 )

@@ -1,7 +1,9 @@
-"""Motions of both layers and of bodies by Siconos, for the Python that has it: march.py EQUATIONS TASKS ANSWERS, files of JSON.
+"""Motions of both layers and of bodies by Siconos, for the Python that has it: march.py EQUATIONS
+TASKS ANSWERS, files of JSON.
 
-Moreau and Jean's time stepping with theta = 1/2, Newton's method in each step, a linear complementarity problem for the impulses.
-The loop over steps is Siconos' own, in C++; seconds are processor time of that loop alone. Nothing of saltus is imported here.
+Moreau and Jean's time stepping with theta = 1/2, Newton's method in each step, a linear
+complementarity problem for the impulses. The loop over steps is Siconos' own, in C++; seconds are
+processor time of that loop alone. Nothing of saltus is imported here.
 """
 
 import json
@@ -23,7 +25,11 @@ def march(equations, task):
             start = time.process_time()
             simulation.run()
             seconds = [time.process_time() - start]
-            return {"state": [*bodies.q(), *bodies.velocity()], "time": simulation.startingTime(), "seconds": seconds}
+            return {
+                "state": [*bodies.q(), *bodies.velocity()],
+                "time": simulation.startingTime(),
+                "seconds": seconds,
+            }
         layers = sk.LagrangianDS(np.array(task["opening"]), np.array(task["velocity"]))
         layers.setzPtr(np.array(task["numbers"]))
         layers.setComputeMassFunction(equations, "mass")
@@ -33,12 +39,18 @@ def march(equations, task):
         model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
         model.insertDynamicalSystem(layers)
         for row, e in zip(np.eye(2), task["e"], strict=True):
-            model.link(sk.Interaction(sk.NewtonImpactNSL(e), sk.LagrangianLinearTIR(row[None, :])), layers)
+            model.link(
+                sk.Interaction(sk.NewtonImpactNSL(e), sk.LagrangianLinearTIR(row[None, :])), layers
+            )
         simulation = time_stepping(model, task)
         start = time.process_time()
         simulation.run()
         seconds.append(time.process_time() - start)
-    return {"state": [*layers.q(), *layers.velocity()], "time": simulation.startingTime(), "seconds": seconds}
+    return {
+        "state": [*layers.q(), *layers.velocity()],
+        "time": simulation.startingTime(),
+        "seconds": seconds,
+    }
 
 
 def time_stepping(model, task):
@@ -51,11 +63,13 @@ def time_stepping(model, task):
 
 
 def linear_bodies(equations, task):
-    """M q'' + C q' + K q = f with the gaps H q + b >= 0, a row each, and their restitution; f is constant, or a sine that acts on
-    the first coordinate."""
+    """M q'' + C q' + K q = f with the gaps H q + b >= 0, a row each, and their restitution; f is
+    constant, or a sine that acts on the first coordinate."""
     mass, stiffness = (np.array(task[name], dtype=float) for name in ("mass", "stiffness"))
     damping = np.array(task.get("damping", 0.0 * mass), dtype=float)
-    bodies = sk.LagrangianLinearTIDS(np.array(task["position"]), np.array(task["velocity"]), mass, stiffness, damping)
+    bodies = sk.LagrangianLinearTIDS(
+        np.array(task["position"]), np.array(task["velocity"]), mass, stiffness, damping
+    )
     if "wave" in task:
         bodies.setzPtr(np.array(task["wave"]))
         bodies.setComputeFExtFunction(equations, "wave")
@@ -64,7 +78,9 @@ def linear_bodies(equations, task):
     model = sk.NonSmoothDynamicalSystem(0.0, task["duration"])
     model.insertDynamicalSystem(bodies)
     for row, offset, e in zip(task["rows"], task["offsets"], task["e"], strict=True):
-        relation = sk.LagrangianLinearTIR(np.array([row], dtype=float), np.array([offset], dtype=float))
+        relation = sk.LagrangianLinearTIR(
+            np.array([row], dtype=float), np.array([offset], dtype=float)
+        )
         model.link(sk.Interaction(sk.NewtonImpactNSL(e), relation), bodies)
     return bodies, model
 

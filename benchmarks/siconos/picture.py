@@ -17,12 +17,22 @@ def draw(cases: list[dict[str, Any]]) -> bytes:
         figure = new_figure(width=LOOK.double_column, height=95.0)
         left, right = figure.subplots(1, 2)
         for case, color, marker in zip(cases, COLORS, MARKERS, strict=True):
-            look = {"color": color, "marker": marker, "markersize": 3.5, "linewidth": 0.8, "markeredgewidth": 0.7}
-            step, error, seconds = ([row[name] for row in case["siconos"]] for name in ("step", "error", "seconds"))
+            look = {
+                "color": color,
+                "marker": marker,
+                "markersize": 3.5,
+                "linewidth": 0.8,
+                "markeredgewidth": 0.7,
+            }
+            step, error, seconds = (
+                [row[name] for row in case["siconos"]] for name in ("step", "error", "seconds")
+            )
             left.plot(step, error, label=case["about"], **look)
             right.plot(error, seconds, **look)
             ours = [(max(row["error"], 1e-16), row["seconds"]) for row in case["saltus"]]
-            right.plot(*zip(*ours, strict=True), **look | {"markerfacecolor": "white", "linestyle": "--"})
+            right.plot(
+                *zip(*ours, strict=True), **look | {"markerfacecolor": "white", "linestyle": "--"}
+            )
         _first_order(left, cases)
         left.set(xlabel="step of Siconos", ylabel="error at the end")
         right.set(xlabel="error at the end", ylabel="processor time (s)")
@@ -44,12 +54,21 @@ def _first_order(ax: Any, cases: list[dict[str, Any]]) -> None:
     step = [cases[0]["siconos"][i]["step"] for i in (-1, 0)]
     lowest = min(row["error"] / row["step"] for case in cases for row in case["siconos"])
     ax.plot(step, [0.5 * lowest * s for s in step], color=LOOK.ink, linewidth=0.8, linestyle=":")
-    ax.annotate("first order", (step[0] ** 0.5 * step[1] ** 0.5, 0.4 * lowest * (step[0] * step[1]) ** 0.5), ha="left", va="top")
+    ax.annotate(
+        "first order",
+        (step[0] ** 0.5 * step[1] ** 0.5, 0.4 * lowest * (step[0] * step[1]) ** 0.5),
+        ha="left",
+        va="top",
+    )
 
 
 def _kinds(ax: Any) -> None:
     """Which lines are whose."""
-    handles = [ax.plot([], [], color=LOOK.ink, marker="o", markersize=3.5, linewidth=0.8, label="Siconos")[0]]
+    handles = [
+        ax.plot([], [], color=LOOK.ink, marker="o", markersize=3.5, linewidth=0.8, label="Siconos")[
+            0
+        ]
+    ]
     hollow = {"markerfacecolor": "white", "markersize": 3.5, "linewidth": 0.8}
     handles += ax.plot([], [], color=LOOK.ink, marker="o", linestyle="--", label="saltus", **hollow)
     ax.legend(handles=handles, loc="center right")

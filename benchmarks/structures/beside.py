@@ -20,10 +20,14 @@ from report import number, table
 from saltus.files import write_text
 
 HERE = Path(__file__).resolve().parent
-RESULTS, KEPT = HERE.parent / "results", HERE.parent.parent / "results" / "benchmarks" / "structures"
+RESULTS, KEPT = (
+    HERE.parent / "results",
+    HERE.parent.parent / "results" / "benchmarks" / "structures",
+)
 SIZES, CELLS = (1, 3, 10, 30, 100, 200), (1, 2, 4, 8, 16, 32)
 QUICK_SIZES, QUICK_CELLS = (1, 10, 30), (1, 4)
-LIMIT, LIMIT_OF_QUICK, LIMIT_OF_KERNELS = 400.0, 60.0, 1800.0  # seconds for a row, and for what all rows share
+# seconds for a row, and for what all rows share
+LIMIT, LIMIT_OF_QUICK, LIMIT_OF_KERNELS = 400.0, 60.0, 1800.0
 TARGETS = (1e-4, 1e-7)  # errors of displacements, the largest of which is some 0.06
 CODES = {"motion": "saltus", "scipy": "SciPy DOP853", "siconos": "Siconos"}
 
@@ -38,15 +42,27 @@ extrapolated at first order. An *ensemble* is of 64 motions, at tol 1e-8; what a
 """.strip()
 
 
-def beside_structures(about: dict[str, Any], quick: bool = False, folder: Path = RESULTS, again: bool = False) -> None:
-    """Measure what is not kept yet, and write structures.json and structures.md into `folder` after each row."""
-    start, sizes, cells = time.perf_counter(), QUICK_SIZES if quick else SIZES, QUICK_CELLS if quick else CELLS
+def beside_structures(
+    about: dict[str, Any], quick: bool = False, folder: Path = RESULTS, again: bool = False
+) -> None:
+    """Measure what is not kept yet, and write structures.json and structures.md into `folder` after
+    each row.
+    """
+    start, sizes, cells = (
+        time.perf_counter(),
+        QUICK_SIZES if quick else SIZES,
+        QUICK_CELLS if quick else CELLS,
+    )
     asked = [(task, n) for n in sizes for task in (*CODES, "ensemble", "orbit", "sweep")]
-    asked += [(task, n) for n in cells for task in ("cells", "cells_together", "cells_differentiated")]
+    asked += [
+        (task, n) for n in cells for task in ("cells", "cells_together", "cells_differentiated")
+    ]
     rows: dict[str, Any] = {f"{task} {n}": {"fails": "not run"} for task, n in asked}
-    with tempfile.TemporaryDirectory() as cache:  # all rows share their kernels, and none finds its structure compiled
+    # all rows share their kernels, and none finds its structure compiled
+    with tempfile.TemporaryDirectory() as cache:
         make = _Rows(about, LIMIT_OF_QUICK if quick else LIMIT, Path(cache), again)
-        for task, n in asked:  # written after each row, so that a run that is broken off leaves a table
+        # written after each row, so that a run that is broken off leaves a table
+        for task, n in asked:
             rows[f"{task} {n}"] = make.row(task, n)
             results = {"about": about, "rows": rows}
             write_text(folder / "structures.json", json.dumps(results, indent=1) + "\n")
@@ -84,7 +100,10 @@ class _Rows:
         """A new row, and a line about it."""
         start = time.perf_counter()
         row = _computed(task, size, limit, self.cache)
-        print(f"{task} {size}: {row.get('fails', 'done')}, {time.perf_counter() - start:.0f} s", flush=True)
+        print(
+            f"{task} {size}: {row.get('fails', 'done')}, {time.perf_counter() - start:.0f} s",
+            flush=True,
+        )
         return row
 
 
@@ -98,9 +117,16 @@ def _key(about: dict[str, Any]) -> str:
 def _computed(task: str, size: int, limit: float, cache: Path) -> dict[str, Any]:
     """A row from a process of its own, or `fails` with the reason."""
     command = [sys.executable, str(HERE / "row.py"), task, str(size)]
-    one_core = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "SALTUS_CACHE_DIR": str(cache)}
+    one_core = {
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "NUMBA_NUM_THREADS": "1",
+        "SALTUS_CACHE_DIR": str(cache),
+    }
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit, env=os.environ | one_core)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=limit, env=os.environ | one_core
+        )
     except subprocess.TimeoutExpired:
         return {"fails": f"over {limit:g} s"}
     if done.returncode:
@@ -112,36 +138,74 @@ def _computed(task: str, size: int, limit: float, cache: Path) -> dict[str, Any]
 def report(results: dict[str, Any]) -> str:
     """What was found, in Markdown."""
     rows, about = results["rows"], results["about"]
-    parts = ["# Structures by their size", "\n".join(f"* {key}: {value}" for key, value in about.items()), READING]
+    parts = [
+        "# Structures by their size",
+        "\n".join(f"* {key}: {value}" for key, value in about.items()),
+        READING,
+    ]
     for target in TARGETS:
-        head = ("n", *(f"{code}, us" for code in CODES.values()), "SciPy / saltus", "Siconos / saltus")
-        parts.append(f"## A forcing period, at an error of {target:.0e}\n\n" + table(head, _periods(rows, target)))
-    head = ("n", "compiling, s", "MiB", "orbit, s", "its compiling, s", "MiB", "sweep, s", "its compiling, s", "MiB")
+        head = (
+            "n",
+            *(f"{code}, us" for code in CODES.values()),
+            "SciPy / saltus",
+            "Siconos / saltus",
+        )
+        parts.append(
+            f"## A forcing period, at an error of {target:.0e}\n\n"
+            + table(head, _periods(rows, target))
+        )
+    head = (
+        "n",
+        "compiling, s",
+        "MiB",
+        "orbit, s",
+        "its compiling, s",
+        "MiB",
+        "sweep, s",
+        "its compiling, s",
+        "MiB",
+    )
     parts.append("## Compiling, orbits, sweeps and memory\n\n" + table(head, _costs(rows)))
     together = ("in an ensemble, us", "alone, us", "its compiling, s", "MiB")
-    parts.append("## A motion's forcing period in an ensemble\n\n" + table(("n", *together), _together(rows, "ensemble")))
-    lines = [(*line, *_cells(rows[f"cells_together {line[0]}"], *TOGETHER)) for line in _alone(rows, "cells")]
+    parts.append(
+        "## A motion's forcing period in an ensemble\n\n"
+        + table(("n", *together), _together(rows, "ensemble"))
+    )
+    lines = [
+        (*line, *_cells(rows[f"cells_together {line[0]}"], *TOGETHER))
+        for line in _alone(rows, "cells")
+    ]
     head = ("cells", "compiling, s", "a period, us", "MiB", *together)
     parts.append("## Chains of cells, at tol 1e-8\n\n" + table(head, lines))
     head = ("cells", "compiling, s", "a period, us", "MiB")
     parts.append(
-        "## Derivatives of chains, to the start and one parameter\n\n" + table(head, _alone(rows, "cells_differentiated"))
+        "## Derivatives of chains, to the start and one parameter\n\n"
+        + table(head, _alone(rows, "cells_differentiated"))
     )
     return "\n\n".join(parts) + "\n"
 
 
-TOGETHER = (("seconds", 1e6), ("alone", 1e6), ("compile", 1.0), ("peak", 1.0))  # what is said of an ensemble, and in which unit
+# what is said of an ensemble, and in which unit
+TOGETHER = (("seconds", 1e6), ("alone", 1e6), ("compile", 1.0), ("peak", 1.0))
 
 
 def _together(rows: dict[str, Any], task: str) -> list[tuple[str, ...]]:
     """The lines of a table of ensembles."""
-    return [(name.split()[1], *_cells(row, *TOGETHER)) for name, row in rows.items() if name.split()[0] == task]
+    return [
+        (name.split()[1], *_cells(row, *TOGETHER))
+        for name, row in rows.items()
+        if name.split()[0] == task
+    ]
 
 
 def _alone(rows: dict[str, Any], task: str) -> list[tuple[str, ...]]:
     """The lines of a table of motions."""
     asked = ("compile", 1.0), ("seconds", 1e6), ("peak", 1.0)
-    return [(name.split()[1], *_cells(row, *asked)) for name, row in rows.items() if name.split()[0] == task]
+    return [
+        (name.split()[1], *_cells(row, *asked))
+        for name, row in rows.items()
+        if name.split()[0] == task
+    ]
 
 
 def _sizes(rows: dict[str, Any]) -> list[str]:
@@ -155,17 +219,27 @@ def _periods(rows: dict[str, Any], target: float) -> list[tuple[str, ...]]:
     found = []
     for n in _sizes(rows):
         times = {task: at_error(rows[f"{task} {n}"], target) for task in CODES}
-        cells = [_said(rows[f"{task} {n}"], times[task][0] / PERIODS * 1e6, times[task][1]) for task in CODES]
-        ratios = [_said({}, times[task][0] / times["motion"][0], times[task][1]) for task in ("scipy", "siconos")]
+        cells = [
+            _said(rows[f"{task} {n}"], times[task][0] / PERIODS * 1e6, times[task][1])
+            for task in CODES
+        ]
+        ratios = [
+            _said({}, times[task][0] / times["motion"][0], times[task][1])
+            for task in ("scipy", "siconos")
+        ]
         found.append((n, *cells, *ratios))
     return found
 
 
 def at_error(row: dict[str, Any], target: float) -> tuple[float, bool]:
-    """Seconds for an error of at most `target`, and whether they were reached; those beyond the smallest step at first order."""
+    """Seconds for an error of at most `target`, and whether they were reached; those beyond the
+    smallest step at first order.
+    """
     if "rows" not in row:
         return float("nan"), True
-    errors, seconds = ([max(each[name], 1e-16) for each in row["rows"]] for name in ("error", "seconds"))
+    errors, seconds = (
+        [max(each[name], 1e-16) for each in row["rows"]] for name in ("error", "seconds")
+    )
     found = float(equal_error(errors, seconds, [target])[0])
     return (found, True) if np.isfinite(found) else (seconds[-1] * errors[-1] / target, False)
 

@@ -1,7 +1,9 @@
-"""The structure of each size: a bar of length 1 and wave speed 1, held at one end, pushed at the other, which meets a wall.
+"""The structure of each size: a bar of length 1 and wave speed 1, held at one end, pushed at the
+other, which meets a wall.
 
-Its mass is lumped, so that SciPy's way has no equation to solve for the reaction of the wall. The impact is inelastic: with
-another restitution the node at the wall would bounce without end, which neither of the others can follow.
+Its mass is lumped, so that SciPy's way has no equation to solve for the reaction of the wall. The
+impact is inelastic: with another restitution the node at the wall would bounce without end, which
+neither of the others can follow.
 """
 
 from __future__ import annotations
@@ -36,14 +38,18 @@ def bar(size: int) -> saltus.System:
     mass, damping, stiffness = matrices(size)
     wall = saltus.Contact(name="wall", coordinate=0, position=-GAP)
     return saltus.System(
-        model=saltus.Structure(mass=mass, damping=damping, stiffness=stiffness, contacts=[wall], forces={"push": 0}),
+        model=saltus.Structure(
+            mass=mass, damping=damping, stiffness=stiffness, contacts=[wall], forces={"push": 0}
+        ),
         load=saltus.Load(frequency=FREQUENCY, push=saltus.Harmonic(AMPLITUDE)),
         impact=saltus.NewtonImpact(e=0.0),
     )
 
 
 def chain(cells: int) -> saltus.System:
-    """A row of cells of the paper under a load, for saltus; with both masses, as a motion ends where a massless one is free."""
+    """A row of cells of the paper under a load, for saltus; with both masses, as a motion ends
+    where a massless one is free.
+    """
     return saltus.System(
         model=saltus.CellChain(cells=cells, beta0=math.radians(80), damping=0.1, mass_ratio=1.0),
         load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
@@ -52,7 +58,9 @@ def chain(cells: int) -> saltus.System:
 
 
 def by_scipy(size: int, tol: float) -> np.ndarray:
-    """The displacements at the end by DOP853, restarted at each impact and each release, which its events find."""
+    """The displacements at the end by DOP853, restarted at each impact and each release, which its
+    events find.
+    """
     mass, damping, stiffness = matrices(size)
     inertia, t, held, since = np.diag(mass), 0.0, False, 0.0
     of_state = -np.hstack([stiffness, damping])

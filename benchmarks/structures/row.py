@@ -1,7 +1,9 @@
-"""One row, in a process of its own: row.py TASK SIZE, a task being a function of this file; its answer is the last line, as JSON.
+"""One row, in a process of its own: row.py TASK SIZE, a task being a function of this file; its
+answer is the last line, as JSON.
 
-A time is the processor time of this process. The kernels, which no model changes, are compiled before; what a first call takes
-longer than the next ones is the tracing and compiling of this structure.
+A time is the processor time of this process. The kernels, which no model changes, are compiled
+before; what a first call takes longer than the next ones is the tracing and compiling of this
+structure.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from structures.case import END, PERIODS, SWEPT, bar, by_scipy, chain, for_sicon
 TOLERANCES = {"ours": (1e-6, 1e-8, 1e-10), "SciPy": (1e-4, 1e-6, 1e-8)}
 STEPS = tuple(2000 * 4**k for k in range(4))
 EXACT = 1e-14
-BEFORE, CELLS_BEFORE = 2, 3  # coordinates of the structure, and cells of the chain, with which the kernels are compiled
+# coordinates of the structure, and cells of the chain, with which the kernels are compiled
+BEFORE, CELLS_BEFORE = 2, 3
 TOGETHER, ALONE = 64, 8  # motions of an ensemble, and how many of them are followed one by one
 
 
@@ -52,20 +55,30 @@ def before(size: int) -> dict[str, Any]:
 
 
 def motion(size: int) -> dict[str, Any]:
-    """The motion at each tolerance, with its error, what the first call takes longer, and the memory of the process."""
+    """The motion at each tolerance, with its error, what the first call takes longer, and the
+    memory of the process.
+    """
     displaced(bar(BEFORE if size != BEFORE else BEFORE + 1), EXACT)
     system = bar(size)
     start = _start(system)
     first, _ = timed(lambda: displaced(system, TOLERANCES["ours"][0], start))
     exact = displaced(system, EXACT)
-    rows = [_row(tol, lambda tol=tol: displaced(system, tol, start), exact) for tol in TOLERANCES["ours"]]
+    rows = [
+        _row(tol, lambda tol=tol: displaced(system, tol, start), exact)
+        for tol in TOLERANCES["ours"]
+    ]
     return {"rows": rows, "compile": first - rows[0]["seconds"], "peak": _peak()}
 
 
 def scipy(size: int) -> dict[str, Any]:
     """The same by SciPy."""
     exact = displaced(bar(size), EXACT)
-    return {"rows": [_row(tol, lambda tol=tol: by_scipy(size, tol), exact, rounds=1) for tol in TOLERANCES["SciPy"]]}
+    return {
+        "rows": [
+            _row(tol, lambda tol=tol: by_scipy(size, tol), exact, rounds=1)
+            for tol in TOLERANCES["SciPy"]
+        ]
+    }
 
 
 def siconos(size: int) -> dict[str, Any]:
@@ -106,7 +119,9 @@ def cells(size: int) -> dict[str, Any]:
     """A motion of a chain of cells, and what its first call takes longer."""
 
     def follow(cells: int) -> Any:
-        found = saltus.simulate(chain(cells), **_start_of_cells(cells), periods=PERIODS, tol=TOL, dense=False)
+        found = saltus.simulate(
+            chain(cells), **_start_of_cells(cells), periods=PERIODS, tol=TOL, dense=False
+        )
         assert found.stop == "horizon", found.stop  # a motion that ends before would be cheap
         return found
 
@@ -137,12 +152,21 @@ TOL = 1e-8  # of ensembles, and of motions of chains
 
 
 def _together(system: saltus.System, start: dict[str, Any], path: str) -> dict[str, Any]:
-    """The seconds of a motion and a forcing period in an ensemble, what its first call takes longer, and those without others."""
+    """The seconds of a motion and a forcing period in an ensemble, what its first call takes
+    longer, and those without others.
+    """
     values = np.linspace(0.9, 1.1, TOGETHER) * system.get(path)
     asked: dict[str, Any] = {**start, "periods": PERIODS, "tol": TOL}
-    found = _twice(lambda: saltus.simulate_many(system, **asked, sample=(), parameters={path: values}, threads=1))
+    found = _twice(
+        lambda: saltus.simulate_many(
+            system, **asked, sample=(), parameters={path: values}, threads=1
+        )
+    )
     systems = [system.with_({path: float(value)}) for value in values[:: TOGETHER // ALONE]]
-    alone = [timed(lambda: [saltus.simulate(each, **asked, dense=False) for each in systems])[0] for _ in range(2)]
+    alone = [
+        timed(lambda: [saltus.simulate(each, **asked, dense=False) for each in systems])[0]
+        for _ in range(2)
+    ]
     each = found["seconds"] / (TOGETHER * PERIODS)
     return found | {"seconds": each, "alone": min(alone) / (len(systems) * PERIODS)}
 
@@ -151,7 +175,8 @@ def _start_of_cells(cells: int) -> dict[str, Any]:
     """All layers open, the more so the farther along the chain."""
     signs = [contact.sign for contact in chain(cells).model.contacts]
     return {
-        name: sign * (0.2 + 0.01 * i) for i, (name, sign) in enumerate(zip(chain(cells).model.coordinates, signs, strict=True))
+        name: sign * (0.2 + 0.01 * i)
+        for i, (name, sign) in enumerate(zip(chain(cells).model.coordinates, signs, strict=True))
     }
 
 
@@ -161,7 +186,9 @@ def _start(system: saltus.System) -> dict[str, Any]:
     return found
 
 
-def _row(tol: float, call: Callable[[], np.ndarray], exact: np.ndarray, rounds: int = 3) -> dict[str, float]:
+def _row(
+    tol: float, call: Callable[[], np.ndarray], exact: np.ndarray, rounds: int = 3
+) -> dict[str, float]:
     """The least seconds of some rounds, and the error."""
     found = [timed(call) for _ in range(rounds)]
     error = float(np.abs(found[0][1] - exact).max())

@@ -13,7 +13,9 @@ TOL = 1e-10
 
 
 def derivative_cost(peers: list[Peer], rounds: int) -> list[dict[str, Any]]:
-    """One row for each peer that has derivatives: both times, their ratio, and the error of the derivative to the amplitude."""
+    """One row for each peer that has derivatives: both times, their ratio, and the error of the
+    derivative to the amplitude.
+    """
     tasks: dict[tuple[str, str], Any] = {}
     rows: list[dict[str, Any]] = []
     known = exact()["derivative_to_amplitude"]
@@ -29,14 +31,23 @@ def derivative_cost(peers: list[Peer], rounds: int) -> list[dict[str, Any]]:
         except (AbsentError, TypeError, ValueError, NotImplementedError, RuntimeError) as reason:
             row["fails"] = f"{type(reason).__name__}: {reason}"[:200]
             continue
-        row["error"] = float(np.max(np.abs([theta[0] - known[0], velocity[0] - known[1]]) / np.abs(known)))
-        tasks[peer.name, "with"], tasks[peer.name, "without"] = _task(flow, start), _task(peer.setup(TOL), start)
+        row["error"] = float(
+            np.max(np.abs([theta[0] - known[0], velocity[0] - known[1]]) / np.abs(known))
+        )
+        tasks[peer.name, "with"], tasks[peer.name, "without"] = (
+            _task(flow, start),
+            _task(peer.setup(TOL), start),
+        )
     timings = interleave(tasks, rounds, one_core=True)
     for row in rows:
         if "fails" not in row:
             count = next(p.batch for p in peers if p.name == row["peer"]) * PERIODS
             both = [timings[row["peer"], mode].per(count) for mode in ("with", "without")]
-            row |= {"with": both[0].median, "without": both[1].median, "ratio": both[0].median / both[1].median}
+            row |= {
+                "with": both[0].median,
+                "without": both[1].median,
+                "ratio": both[0].median / both[1].median,
+            }
     return rows
 
 

@@ -1,4 +1,6 @@
-"""What a fit costs with exact derivatives, beside SciPy's two-point differences of the same motions at the same final error."""
+"""What a fit costs with exact derivatives, beside SciPy's two-point differences of the same motions
+at the same final error.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ class Fitted:
 
     def exactly(self) -> saltus.Fit:
         """By saltus, from the one guess."""
-        return saltus.fit(self.system, self.record, {name: SIX[name][2] for name in self.names}, starts=1)
+        return saltus.fit(
+            self.system, self.record, {name: SIX[name][2] for name in self.names}, starts=1
+        )
 
     def by_differences(self, tolerance: float) -> Any:
         """By SciPy, as one would write it without derivatives; `tolerance` is where it ends."""
@@ -42,7 +46,9 @@ class Fitted:
         def residuals(x: np.ndarray) -> np.ndarray:
             given = dict(zip(self.names, x.tolist(), strict=True))
             theta = given.pop("start.theta", self.record.start["theta"])
-            motion = saltus.simulate(self.system.with_(given), theta=theta, duration=DURATION, tol=1e-11)
+            motion = saltus.simulate(
+                self.system.with_(given), theta=theta, duration=DURATION, tol=1e-11
+            )
             return (motion.at(self.record.time)[0] - self.record.values["theta"]) / SIGMA
 
         start = [SIX[name][1] for name in self.names]
@@ -62,11 +68,15 @@ def problem(names: tuple[str, ...]) -> Fitted:
     values = {"theta": theta + SIGMA * np.random.default_rng(0).normal(size=COUNT)}
     begin = {"theta": SIX["start.theta"][1] if "start.theta" in names else 0.3}
     guess = true.with_({name: SIX[name][1] for name in names if name != "start.theta"})
-    return Fitted(names, guess, saltus.Measurement(start=begin, time=times, values=values, sigma=SIGMA))
+    return Fitted(
+        names, guess, saltus.Measurement(start=begin, time=times, values=values, sigma=SIGMA)
+    )
 
 
 def fits(rounds: int) -> list[dict[str, Any]]:
-    """One row for one and for six unknowns: milliseconds of both, their ratio, and by how many standard errors they miss."""
+    """One row for one and for six unknowns: milliseconds of both, their ratio, and by how many
+    standard errors they miss.
+    """
     rows: list[dict[str, Any]] = []
     tasks: dict[tuple[int, str], Any] = {}
     for names in (("model.damping",), tuple(SIX)):
@@ -88,9 +98,13 @@ def fits(rounds: int) -> list[dict[str, Any]]:
             }
         )
         tasks[len(names), "exact"] = this.exactly
-        tasks[len(names), "differences"] = lambda this=this, tolerance=tolerance: this.by_differences(tolerance)
+        tasks[len(names), "differences"] = lambda this=this, tolerance=tolerance: (
+            this.by_differences(tolerance)
+        )
     timings = interleave(tasks, rounds, one_core=True)
     for row in rows:
-        both = [timings[row["unknowns"], way].per(1, 1e3).median for way in ("exact", "differences")]
+        both = [
+            timings[row["unknowns"], way].per(1, 1e3).median for way in ("exact", "differences")
+        ]
         row |= {"exact": both[0], "differences": both[1], "ratio": both[1] / both[0]}
     return rows

@@ -13,7 +13,9 @@ from typing import Any
 CHILD = Path(__file__).resolve().parent.parent / "child.py"
 
 
-def run_child(*arguments: str, limit: float, environment: dict[str, str] | None = None) -> dict[str, Any]:
+def run_child(
+    *arguments: str, limit: float, environment: dict[str, str] | None = None
+) -> dict[str, Any]:
     """The child's answer with the wall time of the whole process; or `fails`, with the reason."""
     start = time.perf_counter()
     try:

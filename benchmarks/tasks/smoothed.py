@@ -1,7 +1,8 @@
-"""The paper's way: `smoothing`, q = tanh(B theta / 2) for the sign, by RK45 at 1e-8 with steps of at most 1e-4.
+"""The paper's way: `smoothing`, q = tanh(B theta / 2) for the sign, by RK45 at 1e-8 with steps of
+at most 1e-4.
 
-The paper names neither B nor its error. One forcing period of the first motion is followed for a few B, and compared with
-the exact motion of the non-smooth equation.
+The paper names neither B nor its error. One forcing period of the first motion is followed for a
+few B, and compared with the exact motion of the non-smooth equation.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ def smoothed(sharpness: float) -> tuple[float, float]:
     def slope(t: float, y: np.ndarray) -> tuple[float, float]:
         sign = math.tanh(half * y[0])
         angle = sign * y[0] + BETA0
-        push = math.sin(angle) * AMPLITUDE * math.sin(FREQUENCY * t) + sign * math.cos(angle) * VERTICAL
+        push = (
+            math.sin(angle) * AMPLITUDE * math.sin(FREQUENCY * t)
+            + sign * math.cos(angle) * VERTICAL
+        )
         return y[1], push - DAMPING * y[1] - y[0]
 
     end = 2 * math.pi / FREQUENCY
@@ -44,5 +48,7 @@ def paper_way(rounds: int, quick: bool) -> list[dict[str, Any]]:
     sharpnesses = (5e3,) if quick else (5e2, 5e3, 5e4)
     timings = interleave({b: task(b) for b in sharpnesses}, rounds, warm=False, one_core=True)
     return [
-        {"sharpness": b, "error": float(np.max(np.abs(np.subtract(ends[b], known))))} | timings[b].as_dict() for b in sharpnesses
+        {"sharpness": b, "error": float(np.max(np.abs(np.subtract(ends[b], known))))}
+        | timings[b].as_dict()
+        for b in sharpnesses
     ]

@@ -1,7 +1,9 @@
-"""From the start of the interpreter to the end of the first motion: cold, cached, with other numbers, with another structure.
+"""From the start of the interpreter to the end of the first motion: cold, cached, with other
+numbers, with another structure.
 
-The cold start of saltus has an empty cache directory; the kernels that serve every model are compiled then as well. The
-other codes keep nothing on disk, so that every start of theirs is the same.
+The cold start of saltus has an empty cache directory; the kernels that serve every model are
+compiled then as well. The other codes keep nothing on disk, so that every start of theirs is the
+same.
 """
 
 from __future__ import annotations
@@ -21,14 +23,22 @@ OTHER_NUMBERS, OTHER_STRUCTURE = "other numbers", "another structure, cold"
 
 
 def startup(peers: list[Peer], rounds: int) -> list[dict[str, Any]]:
-    """One row for each start of each package: seconds, how many of them after the imports, and the files added to the cache."""
+    """One row for each start of each package: seconds, how many of them after the imports, and the
+    files added to the cache.
+    """
     rows: list[dict[str, Any]] = []
     for peer in firsts(peers):
         module = peer.module
         if module.startswith("saltus"):
             rows.extend(_saltus(peer, rounds))
         elif module != "prototype":
-            rows.append(_row(peer, "every start", [run_child("first", module, peer.name, limit=LIMIT) for _ in range(rounds)]))
+            rows.append(
+                _row(
+                    peer,
+                    "every start",
+                    [run_child("first", module, peer.name, limit=LIMIT) for _ in range(rounds)],
+                )
+            )
     return rows
 
 
@@ -37,7 +47,10 @@ def _saltus(peer: Peer, rounds: int) -> list[dict[str, Any]]:
 
         def start(label: str, variant: str, times: int) -> dict[str, Any]:
             before, place = _files(cache), {"SALTUS_CACHE_DIR": cache}
-            runs = [run_child("first", peer.module, peer.name, variant, limit=LIMIT, environment=place) for _ in range(times)]
+            runs = [
+                run_child("first", peer.module, peer.name, variant, limit=LIMIT, environment=place)
+                for _ in range(times)
+            ]
             return _row(peer, label, runs) | {"new_files": len(_files(cache) - before)}
 
         return [

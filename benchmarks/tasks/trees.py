@@ -1,6 +1,8 @@
-"""What `against.py` measures, by functions that stand in both trees; run as a script it computes the tasks that it reads.
+"""What `against.py` measures, by functions that stand in both trees; run as a script it computes
+the tasks that it reads.
 
-Every line of its input names a task, and its answer is the processor time in seconds, of all threads.
+Every line of its input names a task, and its answer is the processor time in seconds, of all
+threads.
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ def system(amplitude: float = 0.5, **impact: float) -> Any:
     """The paper's system under load (i)."""
     import saltus
 
-    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude))
+    load = saltus.Load(
+        frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=amplitude)
+    )
     law = {"impact": saltus.VelocityReduction(**impact)} if impact else {}
     return saltus.System(model=saltus.Metainterface(beta0=BETA0, damping=0.1), load=load, **law)
 
@@ -59,7 +63,9 @@ def stops() -> Any:
     import saltus
 
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=2.0))
-    return saltus.System(model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(e=0.7))
+    return saltus.System(
+        model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(e=0.7)
+    )
 
 
 @cache
@@ -68,7 +74,9 @@ def belt() -> Any:
     import saltus
 
     load = saltus.Load(frequency=1.3, force=saltus.Harmonic(amplitude=0.4))
-    return saltus.System(model=saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.3), load=load)
+    return saltus.System(
+        model=saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.3), load=load
+    )
 
 
 @cache
@@ -140,7 +148,14 @@ def both_layers() -> None:
     import saltus
 
     for n in range(5):
-        saltus.simulate(layers(), theta_1=0.1 + 0.01 * n, theta_2=-0.05, velocity=(0.0, 0.0), periods=200, dense=False)
+        saltus.simulate(
+            layers(),
+            theta_1=0.1 + 0.01 * n,
+            theta_2=-0.05,
+            velocity=(0.0, 0.0),
+            periods=200,
+            dense=False,
+        )
 
 
 def two_stops() -> None:
@@ -166,7 +181,15 @@ def lanes_of_layers() -> None:
     import saltus
 
     theta = np.linspace(0.02, 0.3, 128)
-    saltus.simulate_many(layers(), theta_1=theta, theta_2=-0.05, velocity=(0.0, 0.0), periods=20, sample=(), threads=1)
+    saltus.simulate_many(
+        layers(),
+        theta_1=theta,
+        theta_2=-0.05,
+        velocity=(0.0, 0.0),
+        periods=20,
+        sample=(),
+        threads=1,
+    )
 
 
 def sensitivities() -> None:
@@ -174,7 +197,9 @@ def sensitivities() -> None:
     import saltus
 
     for n in range(10):
-        saltus.sensitivities(stops(), x=0.1 + 0.01 * n, periods=100, parameters=("load.force.amplitude",))
+        saltus.sensitivities(
+            stops(), x=0.1 + 0.01 * n, periods=100, parameters=("load.force.amplitude",)
+        )
 
 
 TASKS: dict[str, Callable[[], None]] = {

@@ -1,4 +1,6 @@
-"""Pages that compute, in the pages of this site: each is made when the site is built, and stands beside it as a file."""
+"""Pages that compute, in the pages of this site: each is made when the site is built, and stands
+beside it as a file.
+"""
 
 from pathlib import Path
 

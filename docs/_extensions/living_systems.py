@@ -1,4 +1,6 @@
-"""What the living pages of this site show: for each what moves, the results laid over it, and the motion with which it begins."""
+"""What the living pages of this site show: for each what moves, the results laid over it, and the
+motion with which it begins.
+"""
 
 from dataclasses import dataclass
 from functools import cache
@@ -11,22 +13,46 @@ import saltus
 
 @cache
 def tristable():
-    """The metainterface of Fig. 4c: three stable states under a constant load, and the curves between their basins."""
+    """The metainterface of Fig.
+
+    4c: three stable states under a constant load, and the curves between their basins.
+    """
     beta0 = np.deg2rad(80)
-    system = saltus.System(model=saltus.Metainterface(beta0=beta0, damping=0.1), load=saltus.Load(vertical=-1.5 / np.sin(beta0)))
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=beta0, damping=0.1),
+        load=saltus.Load(vertical=-1.5 / np.sin(beta0)),
+    )
     between = saltus.separatrices(system, window=((-2.4, 2.4), (-1.2, 1.2)), step=0.1)
-    return system, between, {"theta": 0.0, "velocity": 0.8, "duration": 70.0, "title": "Three stable states of the metainterface"}
+    return (
+        system,
+        between,
+        {
+            "theta": 0.0,
+            "velocity": 0.8,
+            "duration": 70.0,
+            "title": "Three stable states of the metainterface",
+        },
+    )
 
 
 @cache
 def spectrum():
-    """The response spectrum of Fig. 9b: its resonance, and the loops of the branch at low frequencies."""
+    """The response spectrum of Fig.
+
+    9b: its resonance, and the loops of the branch at low frequencies.
+    """
     system = saltus.System(
         model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
         load=saltus.Load(frequency=0.85, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
     )
-    found = saltus.response_spectrum(system, "load.frequency", (0.1, 3.75), effort="quick", window=((-4.0, 4.0), (-4.0, 4.0)))
-    return system, [found], {"theta": 0.3, "periods": 40, "title": "A response spectrum and its orbits"}
+    found = saltus.response_spectrum(
+        system, "load.frequency", (0.1, 3.75), effort="quick", window=((-4.0, 4.0), (-4.0, 4.0))
+    )
+    return (
+        system,
+        [found],
+        {"theta": 0.3, "periods": 40, "title": "A response spectrum and its orbits"},
+    )
 
 
 @cache
@@ -62,7 +88,9 @@ class Bilinear(saltus.OneContactModel):
 @cache
 def bilinear():
     """A model of ten lines, with one branch of its resonance."""
-    system = saltus.System(model=Bilinear(), load=saltus.Load(frequency=1.3, force=saltus.Harmonic(amplitude=0.5)))
+    system = saltus.System(
+        model=Bilinear(), load=saltus.Load(frequency=1.3, force=saltus.Harmonic(amplitude=0.5))
+    )
     branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.4), "load.frequency", (0.5, 2.5))
     return system, [branch], {"x": 0.4, "periods": 30, "title": "An oscillator of one's own"}
 

@@ -8,7 +8,9 @@ ENTRIES = {id: entry for claims in claim_tables().values() for id, entry in clai
 
 def claims_of(measures):
     """The claims of any measures by id, whether or not they are all of a part."""
-    return {id: judge_claim(id, ENTRIES[id], one) for id, one in measures.items() if one is not None}
+    return {
+        id: judge_claim(id, ENTRIES[id], one) for id, one in measures.items() if one is not None
+    }
 
 
 def verdicts(measures):

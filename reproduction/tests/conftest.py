@@ -10,7 +10,9 @@ __all__ = ["refused", "saltus", "started"]
 
 @pytest.fixture(scope="session", autouse=True)
 def _speed_measured_for_a_moment():
-    """Each reproduction measures the speed of the machine for half a second; of how long it takes no test asks for a digit."""
+    """Each reproduction measures the speed of the machine for half a second; of how long it takes
+    no test asks for a digit.
+    """
     with pytest.MonkeyPatch.context() as here:
         here.setattr("saltus_paper.expected_time.MEASURED", 0.01)
         yield
@@ -27,5 +29,7 @@ def _of_three_parts(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def results(_of_three_parts, tmp_path_factory):
-    """The reproduction of three parts of the paper, which a process makes once, in a folder of the file of tests."""
+    """The reproduction of three parts of the paper, which a process makes once, in a folder of the
+    file of tests.
+    """
     return shutil.copytree(_of_three_parts, tmp_path_factory.mktemp("results") / "results")

@@ -14,7 +14,9 @@ def check_provenance(name, data):
 
 
 def clipped(picture):
-    """The parts of a picture, axes with all their labels and texts, that reach beyond its edges by more than a pixel."""
+    """The parts of a picture, axes with all their labels and texts, that reach beyond its edges by
+    more than a pixel.
+    """
     with style():
         FigureCanvasAgg(picture).draw()
     frame = picture.bbox.padded(1.0)
@@ -22,4 +24,8 @@ def clipped(picture):
     for axes in picture.axes:  # a box in space may be larger than the picture; its axes may not
         parts += [axes.xaxis, axes.yaxis, axes.zaxis] if hasattr(axes, "zaxis") else [axes]
     boxes = [(part, part.get_tightbbox(picture.canvas.get_renderer())) for part in parts]
-    return [part for part, box in boxes if not (frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1))]
+    return [
+        part
+        for part, box in boxes
+        if not (frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1))
+    ]

@@ -1,4 +1,6 @@
-"""The paper's motions with both layers: where the reduced model is exact, and the stable states that it does not have."""
+"""The paper's motions with both layers: where the reduced model is exact, and the stable states
+that it does not have.
+"""
 
 import math
 
@@ -12,7 +14,12 @@ from saltus_paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY, under_forc
 
 def test_a_state_of_the_reduced_model_opens_the_layer_of_its_sign():
     states = np.array([[0.3, -0.1], [-0.3, 0.1], [0.0, 0.2], [0.0, -0.2]])
-    expected = [[0.3, 0.0, -0.1, 0.0], [0.0, -0.3, 0.0, 0.1], [0.0, 0.0, 0.2, 0.0], [0.0, 0.0, 0.0, -0.2]]
+    expected = [
+        [0.3, 0.0, -0.1, 0.0],
+        [0.0, -0.3, 0.0, 0.1],
+        [0.0, 0.0, 0.2, 0.0],
+        [0.0, 0.0, 0.0, -0.2],
+    ]
     np.testing.assert_array_equal(embedded(states), expected)
 
 
@@ -24,8 +31,12 @@ def test_the_page_begins_where_the_closed_layer_opens():
 
 
 def test_steady_motions_are_exact_up_to_the_load_that_opens_the_closed_layer():
-    """At Omega = 1, V = -0.5, C = 0.1 that is Hhat = 0.174, by the least reaction of the reduced motion (contacts.md)."""
-    data = beside(under_force(), {AMPLITUDE: np.array([0.1, 0.172, 0.176, 0.2])}, ((0.0, 0.0, 1.0),))
+    """At Omega = 1, V = -0.5, C = 0.1 that is Hhat = 0.174, by the least reaction of the reduced
+    motion (contacts.md).
+    """
+    data = beside(
+        under_force(), {AMPLITUDE: np.array([0.1, 0.172, 0.176, 0.2])}, ((0.0, 0.0, 1.0),)
+    )
     same = data["fate"].values[0] == FATES.index("same")
     amplitude = data[AMPLITUDE].values
     assert same[amplitude < 0.174].all()
@@ -34,8 +45,15 @@ def test_steady_motions_are_exact_up_to_the_load_that_opens_the_closed_layer():
 
 def test_a_transfer_changes_no_motion_whose_impacts_open_both_layers():
     """It acts at closed contacts: with e > 0 the other layer is open when one closes."""
-    places = {FREQUENCY: np.array([0.2876543, 0.1938271, 0.66]), AMPLITUDE: np.array([0.5, 0.2, 0.2])}
-    data = beside(under_force(), places, ((0.001, 0.5, 0.0), (0.001, 0.5, 0.5), (0.001, 0.0, 0.0), (0.001, 0.0, 1.0)))
+    places = {
+        FREQUENCY: np.array([0.2876543, 0.1938271, 0.66]),
+        AMPLITUDE: np.array([0.5, 0.2, 0.2]),
+    }
+    data = beside(
+        under_force(),
+        places,
+        ((0.001, 0.5, 0.0), (0.001, 0.5, 0.5), (0.001, 0.0, 0.0), (0.001, 0.0, 1.0)),
+    )
     full = data["full"].values
     assert np.isfinite(full[0]).any()
     np.testing.assert_array_equal(full[0], full[1])
@@ -44,7 +62,9 @@ def test_a_transfer_changes_no_motion_whose_impacts_open_both_layers():
 
 @pytest.mark.parametrize("stiffness", [1.0, 1.1])
 def test_the_fourth_stable_state_has_both_layers_open_where_each_would_be_alone(stiffness):
-    """The potential is a sum over both layers: each rests where V cos(beta0 + x) = k x beyond its hump, by bisection."""
+    """The potential is a sum over both layers: each rests where V cos(beta0 + x) = k x beyond its
+    hump, by bisection.
+    """
     beta0 = math.radians(80)
     vertical = -1.5 / math.sin(beta0)
 
@@ -52,7 +72,11 @@ def test_the_fourth_stable_state_has_both_layers_open_where_each_would_be_alone(
         low, high = math.pi / 2 - beta0 + 0.6, math.pi - beta0
         for _ in range(200):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if vertical * math.cos(beta0 + middle) > k * middle else (low, middle)
+            low, high = (
+                (middle, high)
+                if vertical * math.cos(beta0 + middle) > k * middle
+                else (low, middle)
+            )
         return low
 
     data = stable_states()

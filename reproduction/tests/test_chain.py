@@ -1,4 +1,6 @@
-"""The chain of eight cells: the waves of a row, their multipliers from one cell, and what the chapter says of them."""
+"""The chain of eight cells: the waves of a row, their multipliers from one cell, and what the
+chapter says of them.
+"""
 
 import numpy as np
 import pytest
@@ -33,7 +35,9 @@ def test_waves_are_those_of_the_differences_between_neighbours(cells):
 def test_without_springs_a_wave_has_the_multipliers_of_the_cell():
     orbit = at_load(0.1)
     values = np.linalg.eigvals(transverse(orbit, np.zeros(1))[0])
-    np.testing.assert_allclose(np.sort_complex(values), np.sort_complex(orbit.multipliers), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort_complex(values), np.sort_complex(orbit.multipliers), atol=1e-9
+    )
 
 
 def test_waves_of_eight_cells_grow_as_the_equations_of_one_cell_say():
@@ -42,13 +46,17 @@ def test_waves_of_eight_cells_grow_as_the_equations_of_one_cell_say():
 
 
 def test_cells_part_below_a_load_and_not_above_it():
-    """At kappa = 0.1: the wave of largest multiplier grows by it at Hhat = 0.06; at 0.149 all die away."""
+    """At kappa = 0.1: the wave of largest multiplier grows by it at Hhat = 0.06; at 0.149 all die
+    away.
+    """
     for load, grows in ((0.06, True), (0.149, False)):
         one = at_load(load)
         multiplier = np.abs(largest(transverse(one, 0.1 * wave_numbers()))[1:]).max()
         assert bool(multiplier > 1.1) is grows
         time, state = turning(one)
-        states = state + 1e-6 * np.stack([np.random.default_rng(3).standard_normal(8), np.zeros(8)], axis=1)
+        states = state + 1e-6 * np.stack(
+            [np.random.default_rng(3).standard_normal(8), np.zeros(8)], axis=1
+        )
         system = chain(load, 0.1)
         motion = simulate(system, **begun(system, states, time), periods=40, tol=1e-12)
         spread = np.ptp(angles_at(motion, time + PERIOD * np.array([20, 40])), axis=0)

@@ -10,22 +10,29 @@ from picture_checks import check_provenance, clipped
 from saltus import SaltusError
 from saltus_paper import FIGURES, ClaimVerdict
 from saltus_paper.claims.claim import judge, judge_claim, measured, printed_unit, with_summaries
-from saltus_paper.claims.claim_tables import ClaimEntry, ListForm, Origin, claim_tables, section_titles
+from saltus_paper.claims.claim_tables import (
+    ClaimEntry,
+    ListForm,
+    Origin,
+    claim_tables,
+    section_titles,
+)
 from saltus_paper.claims.ledger import ledger, tally, to_markdown
 from saltus_paper.errata import errata
 from saltus_paper.release_check import failures
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = (ROOT / "tests", ROOT / "reproduction" / "tests")
-# Left out here, as they take minutes: quick versions of them are tested in files of their own, and `make release-check` judges
-# their claims at full size.
+# Left out here, as they take minutes: quick versions of them are tested in files of their own, and
+# `make release-check` judges their claims at full size.
 SPECTRA = ("fig09", "fig10", "fig11", "fig12", "fig13", "fig14", "fig15", "quasi")
 ELSEWHERE = (
     *SPECTRA,
     "smoothing",
     "chain",
 )  # the last two are computed, judged and drawn in test_smoothing_study.py and test_chain.py
-# Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of the one that its claim names.
+# Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of
+# the one that its claim names.
 COARSE = {"both_layers": {"size": 3}}
 # Those of sections 2 to 5 and of the appendix; from 29 on they are our own (docs/errata.md).
 ERRATA = {*range(1, 22), 23, 25, 26, 27, 29, 40}
@@ -33,7 +40,9 @@ ERRATA = {*range(1, 22), 23, 25, 26, 27, 29, 40}
 
 def judged(*outcomes, statement="s", **entry):
     """A claim with these keys in its table, from what was measured."""
-    return judge_claim("x", ClaimEntry(place="eq", statement=statement, evidence="e", **entry), measured(*outcomes))
+    return judge_claim(
+        "x", ClaimEntry(place="eq", statement=statement, evidence="e", **entry), measured(*outcomes)
+    )
 
 
 @pytest.mark.parametrize(
@@ -90,10 +99,19 @@ def test_a_correction_needs_both_kinds_of_evidence():
     table = {"erratum": 4, "second": "a second method finds {found}"}
     entry = ClaimEntry(place="eq", statement="s", evidence="e", **table)
     both = judge_claim("x", entry, measured(False, True, second=True, found=3))
-    assert (both.verdict, both.evidence) == (ClaimVerdict.CORRECTED, "e; independently: a second method finds 3")
-    assert judge_claim("x", entry, measured(False, True, second=False, found=3)).verdict is ClaimVerdict.UNDECIDED
+    assert (both.verdict, both.evidence) == (
+        ClaimVerdict.CORRECTED,
+        "e; independently: a second method finds 3",
+    )
+    assert (
+        judge_claim("x", entry, measured(False, True, second=False, found=3)).verdict
+        is ClaimVerdict.UNDECIDED
+    )
     assert judge_claim("x", entry, measured(False, True, found=3)).verdict is ClaimVerdict.UNDECIDED
-    assert judge_claim("x", entry, measured(True, True, second=False, found=3)).verdict is ClaimVerdict.AS_PRINTED
+    assert (
+        judge_claim("x", entry, measured(True, True, second=False, found=3)).verdict
+        is ClaimVerdict.AS_PRINTED
+    )
 
 
 def test_what_the_numbers_do_not_decide_is_undecided_with_its_reason():
@@ -104,14 +122,20 @@ def test_what_the_numbers_do_not_decide_is_undecided_with_its_reason():
 
 def test_our_own_checks_hold_or_disagree_and_never_count_as_the_papers():
     claims = [judged(True, origin=Origin.OURS), judged(False, origin=Origin.OURS), judged(True)]
-    assert [claim.verdict for claim in claims] == [ClaimVerdict.HOLDS, ClaimVerdict.DISAGREES, ClaimVerdict.AS_PRINTED]
+    assert [claim.verdict for claim in claims] == [
+        ClaimVerdict.HOLDS,
+        ClaimVerdict.DISAGREES,
+        ClaimVerdict.AS_PRINTED,
+    ]
     total = ledger(claims)[-1]
     assert total.paper.total() == total.paper[ClaimVerdict.AS_PRINTED] == 1
     assert total.cells()[-1] == "1 of 2"
 
 
 def test_a_statement_that_is_not_checked_needs_no_measure_and_gives_its_reason(monkeypatch):
-    tables = {"fig99": {"x": ClaimEntry(place="eq", statement="s", not_checked="it is about experiments")}}
+    tables = {
+        "fig99": {"x": ClaimEntry(place="eq", statement="s", not_checked="it is about experiments")}
+    }
     monkeypatch.setattr("saltus_paper.claims.claim.claim_tables", lambda: tables)
     (claim,) = judge("fig99", {})
     assert (claim.verdict, claim.evidence) == (ClaimVerdict.NOT_CHECKED, "it is about experiments")
@@ -128,9 +152,17 @@ def test_a_statement_that_is_not_checked_needs_no_measure_and_gives_its_reason(m
         (((None,), (False, False)), ClaimVerdict.DISAGREES, None),
     ],
 )
-def test_a_summary_has_the_gravest_verdict_of_what_it_rests_on(monkeypatch, outcomes, verdict, erratum):
+def test_a_summary_has_the_gravest_verdict_of_what_it_rests_on(
+    monkeypatch, outcomes, verdict, erratum
+):
     entry = ClaimEntry(place="eq", statement="s", evidence="e", erratum=4)
-    tables = {"fig99": {"a": entry, "b": entry, "sum": ClaimEntry(place="abstract", statement="all", rests_on=("a", "b"))}}
+    tables = {
+        "fig99": {
+            "a": entry,
+            "b": entry,
+            "sum": ClaimEntry(place="abstract", statement="all", rests_on=("a", "b")),
+        }
+    }
     monkeypatch.setattr("saltus_paper.claims.claim.claim_tables", lambda: tables)
     claims = judge("fig99", {id: measured(*one) for id, one in zip("ab", outcomes, strict=True)})
     summary = with_summaries(claims)[-1]
@@ -151,18 +183,29 @@ def test_every_claim_has_evidence_or_a_reason():
 
 
 def test_every_erratum_has_a_second_kind_of_evidence_and_every_proof_is_a_test():
-    known = {path: path.read_text(encoding="utf-8") for folder in FOLDERS for path in folder.rglob("test_*.py")}
+    known = {
+        path: path.read_text(encoding="utf-8")
+        for folder in FOLDERS
+        for path in folder.rglob("test_*.py")
+    }
     for claims in claim_tables().values():
         for id, entry in claims.items():
             if entry.erratum and not entry.section.startswith("6."):
-                assert entry.second or entry.proof, f"{id} contradicts the paper by one kind of evidence only"
+                assert entry.second or entry.proof, (
+                    f"{id} contradicts the paper by one kind of evidence only"
+                )
             if entry.proof:
                 file, name = entry.proof.split("::")
                 assert f"def {name}(" in known[ROOT / file], id
 
 
 def test_errata_and_claims_name_each_other():
-    named = {entry.erratum for claims in claim_tables().values() for entry in claims.values() if entry.erratum}
+    named = {
+        entry.erratum
+        for claims in claim_tables().values()
+        for entry in claims.values()
+        if entry.erratum
+    }
     assert named <= errata().keys()
     assert {*range(1, 30)} <= errata().keys()
 
@@ -190,7 +233,9 @@ def test_the_ledger_counts_section_by_section_in_the_papers_order():
 
 
 def test_the_table_escapes_bars_and_has_each_claim_once_under_its_section():
-    text = to_markdown([judged(True, section="2"), judged(False, section="5.1", statement="|θ| > 0")])
+    text = to_markdown(
+        [judged(True, section="2"), judged(False, section="5.1", statement="|θ| > 0")]
+    )
     assert "\\|θ\\| > 0" in text
     assert text.index("## 2 Mechanical model") < text.index("## 5.1 Small vibrations")
     assert text.count("| x |") == 2
@@ -198,7 +243,10 @@ def test_the_table_escapes_bars_and_has_each_claim_once_under_its_section():
 
 def test_a_claim_that_was_not_measured_or_is_in_no_table_is_an_error(monkeypatch):
     entry = ClaimEntry(place="eq", statement="s", evidence="e")
-    monkeypatch.setattr("saltus_paper.claims.claim.claim_tables", lambda: {"fig99": {"one": entry, "another": entry}})
+    monkeypatch.setattr(
+        "saltus_paper.claims.claim.claim_tables",
+        lambda: {"fig99": {"one": entry, "another": entry}},
+    )
     both = {"one": measured(True), "another": measured(True)}
     assert [claim.id for claim in judge("fig99", both)] == ["one", "another"]
     with pytest.raises(SaltusError, match="fig99 did not measure its claims another"):
@@ -214,7 +262,9 @@ def test_every_part_with_claims_is_one_of_the_paper_and_ids_are_unique():
     ids = [id for claims in tables.values() for id in claims]
     assert len(ids) == len(set(ids))
     assert {figure.section for figure in FIGURES.values()} - {""} <= section_titles().keys()
-    assert {entry.section for claims in tables.values() for entry in claims.values()} == section_titles().keys()
+    assert {
+        entry.section for claims in tables.values() for entry in claims.values()
+    } == section_titles().keys()
 
 
 def test_a_release_fails_with_a_list_of_what_disagrees_and_what_was_not_judged(monkeypatch):
@@ -226,10 +276,16 @@ def test_a_release_fails_with_a_list_of_what_disagrees_and_what_was_not_judged(m
 
 
 def test_evidence_is_written_from_fields_and_from_lists_of_rows_within_rows():
-    lists = {"panels": ListForm(each="Ω = {w:g}: {peaks}", between="; "), "peaks": ListForm(each="{x:.1f}", none="none")}
+    lists = {
+        "panels": ListForm(each="Ω = {w:g}: {peaks}", between="; "),
+        "peaks": ListForm(each="{x:.1f}", none="none"),
+    }
     entry = ClaimEntry(place="eq", statement="s", evidence="{n} found, {panels}", lists=lists)
     rows = [{"w": 0.5, "peaks": [{"x": 1.0}, {"x": 2.0}]}, {"w": 1.0, "peaks": []}]
-    assert entry.filled(entry.evidence, {"n": 2, "panels": rows}) == "2 found, Ω = 0.5: 1.0, 2.0; Ω = 1: none"
+    assert (
+        entry.filled(entry.evidence, {"n": 2, "panels": rows})
+        == "2 found, Ω = 0.5: 1.0, 2.0; Ω = 1: none"
+    )
 
 
 @cache
@@ -240,7 +296,8 @@ def data_of(name):
 
 def test_every_erratum_is_proved_by_a_computed_claim_and_nothing_disagrees():
     claims = []
-    for figure in (figure for name, figure in FIGURES.items() if name not in (*ELSEWHERE, *COARSE)):  # those have no errata
+    # those have no errata
+    for figure in (figure for name, figure in FIGURES.items() if name not in (*ELSEWHERE, *COARSE)):
         check_provenance(figure.name, data_of(figure.name))
         claims += figure.claims(data_of(figure.name))
     assert len({claim.id for claim in claims}) == len(claims)
@@ -253,7 +310,11 @@ def test_every_erratum_is_proved_by_a_computed_claim_and_nothing_disagrees():
 @pytest.mark.parametrize("name", COARSE)
 def test_of_a_coarse_grid_nothing_disagrees(name):
     check_provenance(name, data_of(name))
-    assert [claim.id for claim in FIGURES[name].claims(data_of(name)) if claim.verdict is ClaimVerdict.DISAGREES] == []
+    assert [
+        claim.id
+        for claim in FIGURES[name].claims(data_of(name))
+        if claim.verdict is ClaimVerdict.DISAGREES
+    ] == []
 
 
 @pytest.mark.parametrize(

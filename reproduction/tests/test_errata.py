@@ -38,7 +38,15 @@ def crossings(theta, velocity, end, *numbers):
 
         reaches.terminal, reaches.direction = True, -1
         piece = solve_ivp(
-            rate, (time, end), state, method="DOP853", rtol=1e-8, atol=1e-11, events=reaches, args=(side, *numbers), max_step=0.4
+            rate,
+            (time, end),
+            state,
+            method="DOP853",
+            rtol=1e-8,
+            atol=1e-11,
+            events=reaches,
+            args=(side, *numbers),
+            max_step=0.4,
         )
         parts.append(np.vstack([piece.t, piece.y]))
         time, state = float(piece.t[-1]), [0.0, float(piece.y[1, -1])]
@@ -55,27 +63,40 @@ def largest(frequency, amplitude, theta):
 
 @cache
 def panels():
-    """The first branches of Figs. 11a and b over the load, without a search, and what becomes of rest."""
+    """The first branches of Figs.
+
+    11a and b over the load, without a search, and what becomes of rest.
+    """
     found = {}
     for frequency in (0.5, 1.0):
         system = under_force(frequency=frequency, amplitude=1.0)
         branch = continue_orbit(find_orbit(system, theta=0.3), AMPLITUDE, (1e-3, 1.6))
         parts = {**branch_tables([branch.to_xarray()]), "undeformed": undeformed(system, CRITICAL)}
-        found[frequency] = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"critical": CRITICAL}), **parts})
+        found[frequency] = xr.DataTree.from_dict(
+            {"/": xr.Dataset(attrs={"critical": CRITICAL}), **parts}
+        )
     return found
 
 
 @pytest.mark.thorough
 def test_erratum_24_past_the_critical_load_rest_is_left_and_taken_up_again_in_every_period():
-    assert verdicts({"fig11-undeformed": _undeformed(panels())}) == {"fig11-undeformed": ClaimVerdict.CORRECTED}
-    # by the equation itself: the lower layer is pulled off while H sin(beta0) + V cos(beta0) > 0, for a share of the period only
+    assert verdicts({"fig11-undeformed": _undeformed(panels())}) == {
+        "fig11-undeformed": ClaimVerdict.CORRECTED
+    }
+    # by the equation itself: the lower layer is pulled off while H sin(beta0) + V cos(beta0) > 0,
+    # for a share of the period only
     phase = np.linspace(0.0, 2 * math.pi, 100_001)
     pulled = 1.001 * CRITICAL * np.sin(phase) * math.sin(BETA0) - 0.5 * math.cos(BETA0) > 0
     assert 0.0 < pulled.mean() < 0.05
-    # and what is released returns within the same period: the lower layer alone, from its release on
+    # and what is released returns within the same period: the lower layer alone, from its release
+    # on
     released = float(phase[pulled][0])
     excursion = solve_ivp(
-        lambda t, y: rate(released + t, y, 1.0, 1.0, 1.001 * CRITICAL, -0.5, 0.1), (0.0, 1.0), (0.0, 0.0), rtol=1e-10, atol=1e-18
+        lambda t, y: rate(released + t, y, 1.0, 1.0, 1.001 * CRITICAL, -0.5, 0.1),
+        (0.0, 1.0),
+        (0.0, 0.0),
+        rtol=1e-10,
+        atol=1e-18,
     )
     assert 0.0 < excursion.y[0].max() < 1e-3
     assert excursion.y[0, -1] < 0.0

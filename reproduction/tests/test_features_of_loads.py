@@ -1,4 +1,6 @@
-"""Errata 35 to 39: what is printed fails, and holds as corrected, by two kinds of evidence that can each fail."""
+"""Errata 35 to 39: what is printed fails, and holds as corrected, by two kinds of evidence that can
+each fail.
+"""
 
 import math
 
@@ -24,7 +26,10 @@ from saltus_paper.measures.response_measures import _anticipated, border_of_rest
 @pytest.fixture(scope="module")
 def rest_under_both_loads():
     critical = float(critical_horizontal(1.3962634015954636, -0.5, 0.25))
-    groups = {"undeformed": undeformed(under_both(), critical), "disturbed": fig13._disturbed(critical)}
+    groups = {
+        "undeformed": undeformed(under_both(), critical),
+        "disturbed": fig13._disturbed(critical),
+    }
     return xr.DataTree.from_dict({**groups, "a": xr.Dataset(attrs={"critical": critical})})
 
 
@@ -53,7 +58,7 @@ def test_erratum_35_needs_both_kinds_of_evidence(rest_under_both_loads, moved, v
     assert judged(data).verdict is verdict
 
 
-# --- erratum 36 ------------------------------------------------------------------------------------------------------------
+# --- erratum 36 --------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -66,17 +71,24 @@ def first_cycle():
         "system": system.to_json(),
         "critical": 0.5 / math.tan(math.radians(80)),
     }
-    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs=attributes), **branch_tables([found.to_xarray()])})
+    tree = xr.DataTree.from_dict(
+        {"/": xr.Dataset(attrs=attributes), **branch_tables([found.to_xarray()])}
+    )
     return tree.assign(birth=xr.DataTree(birth(tree)))
 
 
 def test_erratum_36_the_first_cycle_is_born_at_a_fold_with_an_amplitude_of_its_own(first_cycle):
     claim = claims_of({"fig11-anticipated": _anticipated({1.0: first_cycle})})["fig11-anticipated"]
     assert (claim.verdict, claim.erratum) == (ClaimVerdict.CORRECTED, 36)
-    assert float(first_cycle["birth"]["fold"]) == pytest.approx(0.0219879514, abs=1e-9)  # the reference of two other codes
+    # the reference of two other codes
+    assert float(first_cycle["birth"]["fold"]) == pytest.approx(0.0219879514, abs=1e-9)
     stays = first_cycle["birth"].to_dataset().assign(after=first_cycle["birth"]["before"])
-    undone = first_cycle.assign(birth=xr.DataTree(stays))  # had the simulated motion stayed, there were no fold
-    assert verdicts({"fig11-anticipated": _anticipated({1.0: undone})})["fig11-anticipated"] is ClaimVerdict.UNDECIDED
+    # had the simulated motion stayed, there were no fold
+    undone = first_cycle.assign(birth=xr.DataTree(stays))
+    assert (
+        verdicts({"fig11-anticipated": _anticipated({1.0: undone})})["fig11-anticipated"]
+        is ClaimVerdict.UNDECIDED
+    )
 
 
 def test_a_supercritical_cycle_would_be_as_printed():
@@ -85,17 +97,25 @@ def test_a_supercritical_cycle_would_be_as_printed():
     tree = diagram(cycle)
     tree.attrs["critical"] = 0.1
     tree["birth"] = xr.DataTree(xr.Dataset({"before": 0.0, "after": 0.0}))
-    assert verdicts({"fig11-anticipated": _anticipated({1.0: tree})})["fig11-anticipated"] is ClaimVerdict.AS_PRINTED
+    assert (
+        verdicts({"fig11-anticipated": _anticipated({1.0: tree})})["fig11-anticipated"]
+        is ClaimVerdict.AS_PRINTED
+    )
 
 
-# --- erratum 37 ------------------------------------------------------------------------------------------------------------
+# --- erratum 37 --------------------------------------------------------------
 
 
 def exponent(frequency, amplitude, state, periods=80, apart=1e-7):
-    """The largest exponent per unit of time of a motion, from a neighbour of it, by SciPy from impact to impact."""
+    """The largest exponent per unit of time of a motion, from a neighbour of it, by SciPy from
+    impact to impact.
+    """
     period, state, other, sums = 2 * math.pi / frequency, np.array(state), None, []
     for _ in range(periods):
-        end, gap = crossings(*state, period, frequency, amplitude, -0.5, 0.1)[1:, -1], np.array([1.0, 0.0])
+        end, gap = (
+            crossings(*state, period, frequency, amplitude, -0.5, 0.1)[1:, -1],
+            np.array([1.0, 0.0]),
+        )
         if other is not None:
             gap = crossings(*other, period, frequency, amplitude, -0.5, 0.1)[1:, -1] - end
             sums.append(math.log(np.linalg.norm(gap) / apart))
@@ -110,7 +130,9 @@ def exponent(frequency, amplitude, state, periods=80, apart=1e-7):
         pytest.param(0.559166667, 3.0, (-0.13854, -0.25262), marks=pytest.mark.thorough),
     ],
 )
-def test_erratum_37_motions_outside_the_printed_ranges_are_chaotic_by_another_integrator(frequency, amplitude, state):
+def test_erratum_37_motions_outside_the_printed_ranges_are_chaotic_by_another_integrator(
+    frequency, amplitude, state
+):
     assert exponent(frequency, amplitude, state) > 0.02
 
 
@@ -118,12 +140,12 @@ def test_the_exponent_of_a_periodic_motion_by_the_other_integrator_is_negative()
     assert exponent(0.6, 0.5, (0.8, 0.1), periods=40) < -0.01
 
 
-# --- erratum 39 ------------------------------------------------------------------------------------------------------------
+# --- erratum 39 --------------------------------------------------------------
 
 
 def followed(amplitude, state, periods):
-    """At Omega = 1, by SciPy from impact to impact: the states after each period, and the least speed of an impact and the least
-    abs(theta) of a turning point on the way."""
+    """At Omega = 1, by SciPy from impact to impact: the states after each period, and the least
+    speed of an impact and the least abs(theta) of a turning point on the way."""
     states, slowest, nearest = [np.array(state)], np.inf, np.inf
     for _ in range(periods):
         _, theta, velocity = crossings(*states[-1], 2 * math.pi, 1.0, amplitude, -0.5, 0.1)
@@ -143,8 +165,12 @@ def followed(amplitude, state, periods):
         pytest.param(1.7522, (0.680624, -1.616595), 16, marks=pytest.mark.thorough),
     ],
 )
-def test_erratum_39_the_first_chaos_at_the_primary_resonance_comes_by_doublings_without_grazing(amplitude, state, period):
-    """Periods 4, 8 and 16 up to Hhat = 1.7526, and chaos beyond it, in which no impact is slow and no turn near the contact."""
+def test_erratum_39_the_first_chaos_at_the_primary_resonance_comes_by_doublings_without_grazing(
+    amplitude, state, period
+):
+    """Periods 4, 8 and 16 up to Hhat = 1.7526, and chaos beyond it, in which no impact is slow and
+    no turn near the contact.
+    """
     states, slowest, nearest = followed(amplitude, state, period)
     assert np.abs(states[-1] - states[0]).max() < 1e-4
     assert np.abs(states[period // 2] - states[0]).max() > 1e-3  # none of half the period
@@ -155,13 +181,18 @@ def test_erratum_39_the_first_chaos_at_the_primary_resonance_comes_by_doublings_
         assert (slowest > 1.0, nearest > 0.3) == (True, True)
 
 
-# --- erratum 38 ------------------------------------------------------------------------------------------------------------
+# --- erratum 38 --------------------------------------------------------------
 
 
 def counted(*branches, dots):
-    """A diagram with critical load 0.25 whose simulation at values 0.75, 1.25, ... found so many attractors at each."""
+    """A diagram with critical load 0.25 whose simulation at values 0.75, 1.25, ...
+
+    found so many attractors at each.
+    """
     values = np.arange(0.75, 3.0, 0.5)
-    places = [(value, 1.0) for value, number in zip(values, dots, strict=True) for _ in range(number)]
+    places = [
+        (value, 1.0) for value, number in zip(values, dots, strict=True) for _ in range(number)
+    ]
     tree = diagram(*branches, dots=places)
     tree.attrs["critical"] = 0.25
     tree["search"] = xr.DataTree(xr.Dataset(coords={"searched": values}))
@@ -172,12 +203,17 @@ def counted(*branches, dots):
     ("tree", "verdict"),
     [
         (counted(folded(), loop(), dots=(1, 2, 3, 1, 1)), ClaimVerdict.CORRECTED),
-        (counted(folded(), loop(), dots=(1, 2, 2, 3, 4)), ClaimVerdict.UNDECIDED),  # simulation sees them grow
+        # simulation sees them grow
+        (counted(folded(), loop(), dots=(1, 2, 2, 3, 4)), ClaimVerdict.UNDECIDED),
         (
-            counted(*(branch([start, 3.0], [1, 1], [1, 1]) for start in (0.0, 1.1, 1.7, 2.4)), dots=(1, 1, 2, 3, 4)),
+            counted(
+                *(branch([start, 3.0], [1, 1], [1, 1]) for start in (0.0, 1.1, 1.7, 2.4)),
+                dots=(1, 1, 2, 3, 4),
+            ),
             ClaimVerdict.AS_PRINTED,
         ),
-        (counted(branch([0.0, 3.0], [0.1, 1.0], [1, 1]), dots=(1,) * 5), ClaimVerdict.DISAGREES),  # never several
+        # never several
+        (counted(branch([0.0, 3.0], [0.1, 1.0], [1, 1]), dots=(1,) * 5), ClaimVerdict.DISAGREES),
     ],
 )
 def test_erratum_38_the_number_of_stable_motions_rises_and_falls(tree, verdict):
@@ -186,11 +222,19 @@ def test_erratum_38_the_number_of_stable_motions_rises_and_falls(tree, verdict):
 
 @pytest.mark.parametrize("amplitude", [0.2, 1.0, 3.0])
 def test_theta_st_is_where_a_slowly_growing_load_leads(amplitude):
-    """By a motion, for which the claim has the balance of moments: H rises from 0 to its amplitude in 2000 units of time."""
+    """By a motion, for which the claim has the balance of moments: H rises from 0 to its amplitude
+    in 2000 units of time.
+    """
     load = saltus.Load(horizontal=saltus.Ramp(amplitude=amplitude, duration=2000.0), vertical=-0.5)
     slow = saltus.System(model=saltus.Metainterface(beta0=math.radians(80), damping=0.5), load=load)
     reached = saltus.simulate(slow, theta=0.0, velocity=0.0, duration=2400.0, dense=False).position
     assert reached == pytest.approx(static_angle(math.radians(80), amplitude, -0.5), abs=1e-6)
-    for scale, verdict in ((reached, ClaimVerdict.AS_PRINTED), (1.001 * reached, ClaimVerdict.DISAGREES)):
+    for scale, verdict in (
+        (reached, ClaimVerdict.AS_PRINTED),
+        (1.001 * reached, ClaimVerdict.DISAGREES),
+    ):
         spectrum = xr.DataTree(xr.Dataset(attrs={"scale": scale}))
-        assert verdicts({"fig09-static": static_unit({amplitude: spectrum})})["fig09-static"] is verdict
+        assert (
+            verdicts({"fig09-static": static_unit({amplitude: spectrum})})["fig09-static"]
+            is verdict
+        )

@@ -1,4 +1,6 @@
-"""The motions behind a spectrum: a knot's two motions exist and differ, and past a loop's folds motions leave it."""
+"""The motions behind a spectrum: a knot's two motions exist and differ, and past a loop's folds
+motions leave it.
+"""
 
 import numpy as np
 import pytest
@@ -15,7 +17,9 @@ KNOT = 0.84881863  # Omega at Hhat = 0.5
 def resonance():
     """The primary resonance at Hhat = 0.5."""
     system = harmonic_loads.under_force(amplitude=0.5)
-    return response_spectrum(system, harmonic_loads.FREQUENCY, (0.75, 1.0), max_period=1, values=[0.8, 0.95], starts=4)
+    return response_spectrum(
+        system, harmonic_loads.FREQUENCY, (0.75, 1.0), max_period=1, values=[0.8, 0.95], starts=4
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,14 +55,17 @@ def test_two_motions_that_simulation_settles_on_share_the_knots_amplitude_and_di
     states = np.unique(np.round(np.stack([ends["theta"], ends["velocity"]])[:, moving], 6), axis=1)
     assert states.shape[1] == 2
     assert np.ptp(sizes) < 1e-9
-    assert knots_and_jumps.knots(resonance)["amplitude"].values == pytest.approx(sizes.mean(), abs=1e-9)
+    assert knots_and_jumps.knots(resonance)["amplitude"].values == pytest.approx(
+        sizes.mean(), abs=1e-9
+    )
 
 
 def test_the_motions_of_a_knot_are_those_of_the_system(resonance):
     knots = knots_and_jumps.knots(resonance)
     theta = knots["theta"].values[0]
     assert np.abs(theta[:, 0] - theta[:, -1]).max() < 1e-10  # periodic
-    assert np.abs(theta[:, 180:] + theta[:, :181]).max() < 1e-10  # symmetric: its own mirror image half a period later
+    # symmetric: its own mirror image half a period later
+    assert np.abs(theta[:, 180:] + theta[:, :181]).max() < 1e-10
     assert float(knots["apart"].values[0]) > 1
     first, second = np.rad2deg(knots["peak"].values[0])
     assert abs(first - second) > 90
@@ -83,7 +90,11 @@ def test_no_knot_without_two_stable_arms(resonance):
 
 
 def test_past_the_folds_of_a_loop_motions_jump(island):
-    names = [name for name, branch in detached(island) if branch.attrs["end_reasons"] == ["closed", "closed"]]
+    names = [
+        name
+        for name, branch in detached(island)
+        if branch.attrs["end_reasons"] == ["closed", "closed"]
+    ]
     jumps = knots_and_jumps.jumps(island)
     closed = np.isin(jumps["branch"].values, names)
     assert jumps["fold"].values[closed] == pytest.approx([2.539297, 2.914701], abs=2e-6)
@@ -91,7 +102,9 @@ def test_past_the_folds_of_a_loop_motions_jump(island):
 
 
 def test_between_its_folds_the_loop_attracts_what_starts_near_it(island):
-    _, branch = next((n, b) for n, b in detached(island) if b.attrs["end_reasons"] == ["closed", "closed"])
+    _, branch = next(
+        (n, b) for n, b in detached(island) if b.attrs["end_reasons"] == ["closed", "closed"]
+    )
     stable = np.flatnonzero(branch["stable"].values)
     index = int(stable[np.argmin(np.abs(branch["parameter"].values[stable] - 2.7))])
     orbit = knots_and_jumps.orbit_at(branch, index, float(branch["parameter"][index]))

@@ -1,4 +1,6 @@
-"""Separatrices of a portrait, and the reference that other tests compare the engine with, are invariant under the exact flow."""
+"""Separatrices of a portrait, and the reference that other tests compare the engine with, are
+invariant under the exact flow.
+"""
 
 import numpy as np
 import pytest
@@ -9,13 +11,27 @@ from saltus.attractors import separatrices
 from saltus.flow import simulate
 from saltus.systems import EnergyRestitution
 from saltus.theory import equilibria, total_energy
-from saltus_paper.figures.phase_portraits import circled, closed, constant_load, loop_area, outward, portrait
+from saltus_paper.figures.phase_portraits import (
+    circled,
+    closed,
+    constant_load,
+    loop_area,
+    outward,
+    portrait,
+)
 
-CASES = {"conservative": {}, "impact loss": {"e": 0.8}, "viscous": {"damping": 0.1}, "soft": {"stiffness": 0.5}}
+CASES = {
+    "conservative": {},
+    "impact loss": {"e": 0.8},
+    "viscous": {"damping": 0.1},
+    "soft": {"stiffness": 0.5},
+}
 
 
 def saddles(model):
-    return [point for point in equilibria(model) if point.eigenvalues and point.eigenvalues[0].real > 0]
+    return [
+        point for point in equilibria(model) if point.eigenvalues and point.eigenvalues[0].real > 0
+    ]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -44,7 +60,11 @@ def test_an_unstable_manifold_is_carried_along_itself_by_the_flow():
     near, far = np.searchsorted(branch.time, [17.0, 21.0])
     assert np.isfinite(branch.theta[[near, far]]).all()
     motion = simulate(
-        model, theta=branch.theta[near], velocity=branch.velocity[near], duration=branch.time[far] - branch.time[near], tol=1e-13
+        model,
+        theta=branch.theta[near],
+        velocity=branch.velocity[near],
+        duration=branch.time[far] - branch.time[near],
+        tol=1e-13,
     )
     assert motion.theta == pytest.approx(branch.theta[far], abs=1e-9)
 

@@ -1,4 +1,6 @@
-"""The pool of the paper's panels: every part gets its own panels in their order, and what two parts share is computed once."""
+"""The pool of the paper's panels: every part gets its own panels in their order, and what two parts
+share is computed once.
+"""
 
 import os
 from functools import partial
@@ -36,14 +38,18 @@ def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_p
     assert len([path for path in tmp_path.iterdir() if path.name.startswith("shared")]) == 1
 
 
-@pytest.mark.parametrize("panels", [{"a": refuse}, {"a": refuse, "b": partial(int, 1)}], ids=["here", "in processes"])
+@pytest.mark.parametrize(
+    "panels", [{"a": refuse}, {"a": refuse, "b": partial(int, 1)}], ids=["here", "in processes"]
+)
 def test_a_panel_that_fails_ends_the_others_with_its_own_error(panels: dict) -> None:
     with pytest.raises(ZeroDivisionError):
         list(compute_panels({"part": panels}))
 
 
 def cores_beside(pipe: str, mode: str) -> int:
-    """The cores that a panel may use while another one is computed, which opens the pipe too: each waits for the other."""
+    """The cores that a panel may use while another one is computed, which opens the pipe too: each
+    waits for the other.
+    """
     with open(pipe, mode):
         return available_cores()
 
@@ -60,6 +66,7 @@ def test_panels_that_are_computed_at_the_same_time_share_the_cores(tmp_path: Pat
 
 
 def test_every_part_is_computed_once():
-    from saltus_paper.parts import FIGURES, ORDER  # all of the paper, which the processes of the other tests need not import
+    # all of the paper, which the processes of the other tests need not import
+    from saltus_paper.parts import FIGURES, ORDER
 
     assert sorted(ORDER) == sorted(FIGURES)

@@ -14,5 +14,6 @@ def test_the_band_at_the_smallest_load_is_resolved_and_the_picture_is_whole():
     (claim,) = figure.claims(data)
     assert claim.verdict is ClaimVerdict.HOLDS
     assert clipped(figure.draw(data)) == []
-    data["a/bands"] = data["a/bands"].isel(band=slice(0, 0))  # without chaos the band is not explained
+    # without chaos the band is not explained
+    data["a/bands"] = data["a/bands"].isel(band=slice(0, 0))
     assert figure.claims(data)[0].verdict is ClaimVerdict.DISAGREES

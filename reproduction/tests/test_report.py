@@ -1,4 +1,6 @@
-"""The report as a file: its links, words, sizes and colours, and what of foreign text may stand in it."""
+"""The report as a file: its links, words, sizes and colours, and what of foreign text may stand in
+it.
+"""
 
 import base64
 import io
@@ -33,7 +35,9 @@ EMPTY = {"meta", "link", "img", "input", "br", "hr"}
 
 
 class Page(HTMLParser):
-    """The elements of a page in their order: tag and attributes; and whether each that was opened was closed."""
+    """The elements of a page in their order: tag and attributes; and whether each that was opened
+    was closed.
+    """
 
     def __init__(self, text):
         super().__init__()
@@ -50,7 +54,11 @@ class Page(HTMLParser):
             self.unbalanced.append(tag)
 
     def values(self, attribute, *tags):
-        return [attrs[attribute] for tag, attrs in self.elements if attribute in attrs and (not tags or tag in tags)]
+        return [
+            attrs[attribute]
+            for tag, attrs in self.elements
+            if attribute in attrs and (not tags or tag in tags)
+        ]
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +81,11 @@ def test_every_link_leads_somewhere_and_every_id_is_there_once(page, results):
             assert link[1:] in ids
         else:
             assert (results / link).is_file()
-    labels = [id for value in (*page.values("aria-labelledby"), *page.values("aria-describedby")) for id in value.split()]
+    labels = [
+        id
+        for value in (*page.values("aria-labelledby"), *page.values("aria-describedby"))
+        for id in value.split()
+    ]
     assert set(labels) <= set(ids)
     assert page.open == page.unbalanced == []
 
@@ -103,7 +115,12 @@ def test_headings_never_skip_a_level_and_every_picture_and_table_has_words(page)
 def test_all_that_says_how_a_part_was_made_is_there(text, results):
     record = json.loads((results / ".saltus" / "fig08.json").read_text(encoding="utf-8"))
     said = text[text.index('<h3 id="fig08"') : text.index('<h4 id="claims-fig08"')]
-    for word in (*record["files"].values(), f"{record['seconds']:.1f} s", "saltus reproduce fig08", *record["versions"]):
+    for word in (
+        *record["files"].values(),
+        f"{record['seconds']:.1f} s",
+        "saltus reproduce fig08",
+        *record["versions"],
+    ):
         assert word in said
     for panel in read_dataset(results / "fig08.nc").children.values():
         for name in panel.variables:
@@ -114,24 +131,34 @@ def test_the_three_lines_of_python_make_the_part(text, tmp_path, monkeypatch, ca
     monkeypatch.chdir(tmp_path)
     for name in ("fig08", "table1"):
         said = text[text.index(f'id="{name}"') :]
-        code = re.search(r"<pre><code>(.*?)</code></pre>", said, re.DOTALL).group(1).replace("&#34;", '"')
+        code = (
+            re.search(r"<pre><code>(.*?)</code></pre>", said, re.DOTALL)
+            .group(1)
+            .replace("&#34;", '"')
+        )
         assert len(code.splitlines()) == 3
         exec(code, {})
     assert (tmp_path / "fig08.png").exists()
     assert capsys.readouterr().out.count("|") > 20
 
 
-def test_the_report_is_made_anew_from_results_and_says_what_other_sources_made(results, tmp_path, monkeypatch):
+def test_the_report_is_made_anew_from_results_and_says_what_other_sources_made(
+    results, tmp_path, monkeypatch
+):
     folder = shutil.copytree(results, tmp_path / "results")
     before = (folder / "report.html").read_bytes()
     (folder / "report.html").unlink()
-    monkeypatch.setattr("saltus_paper.panel_work.compute_panels", lambda parts: pytest.fail("something is computed"))
+    monkeypatch.setattr(
+        "saltus_paper.panel_work.compute_panels", lambda parts: pytest.fail("something is computed")
+    )
     assert sorted(report_from_results(folder)) == PARTS
     assert (folder / "report.html").read_bytes() == before
     record = folder / ".saltus" / "fig08.json"
     record.write_text(record.read_text().replace('"key": "', '"key": "0'))
     report_from_results(folder)
-    assert (folder / "report.html").read_text(encoding="utf-8").count("Other sources than those") == 1
+    assert (folder / "report.html").read_text(encoding="utf-8").count(
+        "Other sources than those"
+    ) == 1
 
 
 def test_a_damaged_part_is_left_out_and_an_empty_folder_refused(results, tmp_path):
@@ -147,7 +174,10 @@ def test_a_damaged_part_is_left_out_and_an_empty_folder_refused(results, tmp_pat
     "change",
     [
         *({"seconds": "long"}, {"versions": 5}, {"claims": [1]}),
-        *(pytest.param(each, marks=pytest.mark.thorough) for each in ({"seconds": None}, {"files": []}, {"claims": None})),
+        *(
+            pytest.param(each, marks=pytest.mark.thorough)
+            for each in ({"seconds": None}, {"files": []}, {"claims": None})
+        ),
     ],
 )
 def test_a_forged_record_leaves_its_part_out(results, tmp_path, change):
@@ -191,7 +221,9 @@ def test_foreign_words_are_shown_and_never_obeyed(results, tmp_path, monkeypatch
     monkeypatch.setitem(FIGURES, "fig08", replace(FIGURES["fig08"], caption=words, title=words))
     report_from_results(folder)
     text = (folder / "report.html").read_text(encoding="utf-8")
-    escaped = words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&#34;")
+    escaped = (
+        words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&#34;")
+    )
     assert text.count(escaped) > 10
     if escaped != words:
         assert words not in text
@@ -204,7 +236,9 @@ def test_a_picture_is_embedded_without_loss_in_less_room(results):
     kind, content = re.fullmatch(r"data:image/(\w+);base64,(.*)", picture.uri).groups()
     shown = Image.open(io.BytesIO(base64.b64decode(content)))
     assert shown.size == (picture.width, picture.height)
-    assert np.array_equal(np.asarray(shown.convert("RGB")), np.asarray(Image.open(path).convert("RGB")))
+    assert np.array_equal(
+        np.asarray(shown.convert("RGB")), np.asarray(Image.open(path).convert("RGB"))
+    )
     if kind == "webp":
         assert len(content) < path.stat().st_size
 
@@ -219,12 +253,17 @@ def luminance(colour):
     digits = colour.lstrip("#")
     digits = "".join(2 * digit for digit in digits) if len(digits) == 3 else digits
     parts = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    linear = [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    ]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
 def test_words_stand_out_from_what_they_stand_on_by_day_and_by_night(text):
-    schemes = [dict(re.findall(r"--(\w+): (#\w+)", block)) for block in re.findall(r":root \{(.*?)\}", text, re.DOTALL)]
+    schemes = [
+        dict(re.findall(r"--(\w+): (#\w+)", block))
+        for block in re.findall(r":root \{(.*?)\}", text, re.DOTALL)
+    ]
     assert len(schemes) == 3  # light, dark, paper
     for colours in schemes:
         grounds = {
@@ -234,7 +273,9 @@ def test_words_stand_out_from_what_they_stand_on_by_day_and_by_night(text):
         grounds["link"] = ("paper",)
         for ink, places in grounds.items():
             for place in places:
-                light, dark = sorted((luminance(colours[ink]), luminance(colours[place])), reverse=True)
+                light, dark = sorted(
+                    (luminance(colours[ink]), luminance(colours[place])), reverse=True
+                )
                 assert (light + 0.05) / (dark + 0.05) >= 4.5, (ink, place)
 
 
@@ -245,7 +286,7 @@ def test_every_verdict_has_a_box_that_hides_its_claims(page, text):
         assert f"body:has(#show-{name}:not(:checked)) .claim.{name}" in text
 
 
-# --- what it says -----------------------------------------------------------------------------------------------------------
+# --- what it says ------------------------------------------------------------
 
 
 def test_ten_findings_each_rest_on_errata_or_our_checks_and_validity_on_claims_with_headlines():
@@ -257,14 +298,24 @@ def test_ten_findings_each_rest_on_errata_or_our_checks_and_validity_on_claims_w
         claims = [entries[id] for id in finding["claims"]]
         assert any(claim.erratum in errata() or claim.origin is Origin.OURS for claim in claims)
     assert all(entries[id].headline for id in tables["validity"])
-    listed = {id for finding in tables["findings"] for id in finding["claims"]} | set(tables["validity"])
+    listed = {id for finding in tables["findings"] for id in finding["claims"]} | set(
+        tables["validity"]
+    )
     for id, entry in entries.items():
-        assert not entry.headline or id in listed or id.split("-", 1)[1] in {one.split("-", 1)[1] for one in listed}, id
+        assert (
+            not entry.headline
+            or id in listed
+            or id.split("-", 1)[1] in {one.split("-", 1)[1] for one in listed}
+        ), id
 
 
 def test_a_finding_is_shown_only_while_all_of_its_claims_bear_it_out():
     first, *others = highlight_tables()["findings"][0]["claims"]
-    claim = judge_claim(first, ClaimEntry(place="eq", statement="s", evidence="e", erratum=22), measured(False, True))
+    claim = judge_claim(
+        first,
+        ClaimEntry(place="eq", statement="s", evidence="e", erratum=22),
+        measured(False, True),
+    )
     found = findings([claim])
     assert [one.title for one in found] == [highlight_tables()["findings"][0]["title"]]
     assert found[0].errata == [22]
@@ -282,8 +333,16 @@ def test_a_limit_of_validity_is_shown_while_its_claim_says_so():
 
 def test_evidence_that_has_columns_is_a_table_and_its_text_refers_to_it():
     panels = ListForm(each="{w:g}: {x:.1f}", columns={"Ω": "{w:g}", "x": "{x:.1f}"})
-    entry = ClaimEntry(place="eq", statement="s", evidence="found at: {panels}", origin=Origin.OURS, lists={"panels": panels})
-    claim = judge_claim("x", entry, measured(True, panels=[{"w": 0.5, "x": 1.0}, {"w": 2.0, "x": 3.0}]))
+    entry = ClaimEntry(
+        place="eq",
+        statement="s",
+        evidence="found at: {panels}",
+        origin=Origin.OURS,
+        lists={"panels": panels},
+    )
+    claim = judge_claim(
+        "x", entry, measured(True, panels=[{"w": 0.5, "x": 1.0}, {"w": 2.0, "x": 3.0}])
+    )
     assert claim.table == (("Ω", "x"), ("0.5", "1.0"), ("2", "3.0"))
     assert claim.evidence == "found at: 0.5: 1.0, 2: 3.0"
     assert claim.beside_table == "found at (see the table)"
@@ -299,22 +358,33 @@ def test_every_erratum_has_a_derivation_and_docs_hold_those_that_are_our_own():
 
 def test_ids_and_errata_in_words_become_links_and_nothing_else_does():
     linked = Linker({"fig09-chaos", "fig09-chaos-range", "period"})
-    assert linked("a period, erratum 22 & erratum 99") == 'a period, <a href="#erratum-22">erratum 22</a> &amp; erratum 99'
-    assert linked("rests on period (as printed)") == 'rests on <a href="#period">period</a> (as printed)'
-    assert linked("see fig09-chaos-range") == 'see <a href="#fig09-chaos-range">fig09-chaos-range</a>'
+    assert (
+        linked("a period, erratum 22 & erratum 99")
+        == 'a period, <a href="#erratum-22">erratum 22</a> &amp; erratum 99'
+    )
+    assert (
+        linked("rests on period (as printed)")
+        == 'rests on <a href="#period">period</a> (as printed)'
+    )
+    assert (
+        linked("see fig09-chaos-range") == 'see <a href="#fig09-chaos-range">fig09-chaos-range</a>'
+    )
     assert linked("tests/fig09-chaos.py `<b>`") == "tests/fig09-chaos.py <code>&lt;b&gt;</code>"
     assert linked("fig09-chaos", "fig09-chaos") == "fig09-chaos"
 
 
 def test_labels_of_equations_become_their_numbers():
     said = str(placed("condition after rest_def_red, Kinetic Energy, <b>"))
-    assert re.sub("<span[^>]*>|</span>", "", said) == "condition after eq.\xa0(47), eq.\xa0(91), &lt;b&gt;"
+    assert (
+        re.sub("<span[^>]*>|</span>", "", said)
+        == "condition after eq.\xa0(47), eq.\xa0(91), &lt;b&gt;"
+    )
     assert "eq.\xa0(89)" in placed("smoothing")
     assert placed("the smoothing of section 6") == "the smoothing of section 6"
     assert "eq.\xa0(1)" in Linker(set())("by `gen_conf`")
 
 
-# --- data -------------------------------------------------------------------------------------------------------------------
+# --- data --------------------------------------------------------------------
 
 
 def tree(groups):
@@ -327,19 +397,32 @@ def test_data_tables_join_what_panels_share_and_tell_what_differs(tmp_path):
     import xarray as xr
 
     def panel(amplitude):
-        system = {"model": {"type": "M", "beta0": float(np.pi / 3)}, "load": {"amplitude": amplitude, "frequency": 2.0}}
+        system = {
+            "model": {"type": "M", "beta0": float(np.pi / 3)},
+            "load": {"amplitude": amplitude, "frequency": 2.0},
+        }
         y = xr.Variable("x", [1.0, 2.0], {"units": "rad", "long_name": "an angle"})
-        return xr.Dataset({"y": y}, attrs={"system": json.dumps(system), "path": "load.frequency", "seed": 7, "other": 1})
+        return xr.Dataset(
+            {"y": y},
+            attrs={"system": json.dumps(system), "path": "load.frequency", "seed": 7, "other": 1},
+        )
 
-    write_dataset(tmp_path / "x.nc", tree({"/": xr.Dataset(), "a": panel(0.5), "b": panel(0.5), "c": panel(2.0)}))
+    write_dataset(
+        tmp_path / "x.nc",
+        tree({"/": xr.Dataset(), "a": panel(0.5), "b": panel(0.5), "c": panel(2.0)}),
+    )
     tables = data_tables(tmp_path / "x.nc")
-    assert [(row.panels, row.path, row.dims, row.units, row.meaning) for row in tables.variables] == [
-        ("a–c", "y", "x", "rad", "an angle")
-    ]
+    assert [
+        (row.panels, row.path, row.dims, row.units, row.meaning) for row in tables.variables
+    ] == [("a–c", "y", "x", "rad", "an angle")]
     assert {row.name: row.values for row in tables.parameters} == {
-        "model.type": "M", "model.beta0": "1.0472 rad (60°)", "load.amplitude": "a, b: 0.5; c: 2", "load.frequency": "varied",
+        "model.type": "M", "model.beta0": "1.0472 rad (60°)", "load.amplitude": ("a, b: 0.5; c: "
+                                                                                "2"), "load.frequency": "varied",
     }  # fmt: skip
-    assert {row.name: row.values for row in tables.settings} == {"path": "load.frequency", "seed": "7"}
+    assert {row.name: row.values for row in tables.settings} == {
+        "path": "load.frequency",
+        "seed": "7",
+    }
 
 
 def test_what_the_exact_treatment_adds_is_counted_in_the_data(tmp_path):
@@ -348,7 +431,13 @@ def test_what_the_exact_treatment_adds_is_counted_in_the_data(tmp_path):
     def line(dim, **values):
         return xr.Dataset({name: (dim, value) for name, value in values.items()})
 
-    bands = line("band", low=[1.0, 2.0], high=[1.5, 2.25], low_edge=["fold", "unknown"], high_edge=["cascade", "undecided"])
+    bands = line(
+        "band",
+        low=[1.0, 2.0],
+        high=[1.5, 2.25],
+        low_edge=["fold", "unknown"],
+        high_edge=["cascade", "undecided"],
+    )
     panel = {
         "a/special": line("special", kind=["LP", "LP", "GR", "reaction"]),
         "a/branches": line("branch", closed=[0, 1, 0]),
@@ -368,7 +457,9 @@ def test_what_the_exact_treatment_adds_is_counted_in_the_data(tmp_path):
         "b/disagreements": xr.Dataset(attrs={"changes": 12, "on_curves": 5}),
     }
     write_dataset(tmp_path / "fig15.nc", tree(chart))
-    assert chart_features(tmp_path, {"fig15": "Fig. 15"})[1:] == [("Fig. 15 (b)", "1", "0", "0", "1", "6", "12", "5")]
+    assert chart_features(tmp_path, {"fig15": "Fig. 15"})[1:] == [
+        ("Fig. 15 (b)", "1", "0", "0", "1", "6", "12", "5")
+    ]
     assert diagram_features(tmp_path, {}) == chart_features(tmp_path, {}) == []
 
 
@@ -378,10 +469,20 @@ def test_shares_of_both_layers_are_those_of_the_fates():
     fate = np.array([[FATES.index("same")] * 3 + [FATES.index("rest")]], dtype=np.int8)
     data = xr.Dataset(
         {"fate": (("variant", "attractor"), fate)},
-        coords={"mass_ratio": ("variant", [0.001]), "e": ("variant", [0.5]), "transfer": ("variant", [0.0])},
+        coords={
+            "mass_ratio": ("variant", [0.001]),
+            "e": ("variant", [0.5]),
+            "transfer": ("variant", [0.0]),
+        },
     )
     headings, row = share_table(data)
     shares = dict(zip(headings, row, strict=True))
-    assert (shares["m, e, g"], shares["exact"], shares["falls to rest"]) == ("0.001, 0.5, 0", "75%", "25%")
-    portraits = xr.Dataset({"panel": ("motion", ["fig04a", "fig04a", "fig05b"]), "exact": ("motion", [1, 0, 1])})
+    assert (shares["m, e, g"], shares["exact"], shares["falls to rest"]) == (
+        "0.001, 0.5, 0",
+        "75%",
+        "25%",
+    )
+    portraits = xr.Dataset(
+        {"panel": ("motion", ["fig04a", "fig04a", "fig05b"]), "exact": ("motion", [1, 0, 1])}
+    )
     assert exact_portraits(portraits) == [("4a", 1, 2), ("5b", 1, 1)]

@@ -1,4 +1,6 @@
-"""The report in a real browser: its scripts, its filter, the large picture, narrow screens and paper."""
+"""The report in a real browser: its scripts, its filter, the large picture, narrow screens and
+paper.
+"""
 
 import base64
 import shutil
@@ -35,7 +37,10 @@ def test_nothing_is_wider_than_the_screen(page, results, width):
     page.open(results / "report.html", width)
     page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert page.evaluate("[...document.images].filter((one) => one.hasAttribute('src')).every((one) => one.naturalWidth > 100)")
+    assert page.evaluate(
+        "[...document.images].filter((one) => one.hasAttribute('src')).every((one) => "
+        "one.naturalWidth > 100)"
+    )
 
 
 def test_the_filter_hides_the_claims_of_a_verdict_counts_and_shows_what_a_link_leads_to(page):
@@ -44,7 +49,10 @@ def test_the_filter_hides_the_claims_of_a_verdict_counts_and_shows_what_a_link_l
     assert 0 < corrected < everything
     page.click("#show-corrected")
     assert page.evaluate(f"{SHOWN}.length") == everything - corrected
-    assert page.evaluate("document.getElementById('shown').textContent") == f"{everything - corrected} of {everything} shown"
+    assert (
+        page.evaluate("document.getElementById('shown').textContent")
+        == f"{everything - corrected} of {everything} shown"
+    )
     page.evaluate("location.hash = '#fig08-domain'")
     assert page.evaluate("document.getElementById('fig08-domain').offsetParent !== null")
     page.evaluate("location.hash = ''")
@@ -57,7 +65,10 @@ def test_the_large_picture_opens_and_closes_by_pointer_and_by_keys(page):
     link = "article .enlarge"
     page.click(link)
     assert page.evaluate(large)
-    width = page.evaluate("document.querySelector('#large img').decode().then(() => document.querySelector('#large img').width)")
+    width = page.evaluate(
+        "document.querySelector('#large img').decode().then(() => document.querySelector('#large "
+        "img').width)"
+    )
     assert width == page.evaluate(f"document.querySelector('{link} img').naturalWidth") > 1280
     page.press("Escape", 27)
     assert not page.evaluate(large)
@@ -69,7 +80,10 @@ def test_the_large_picture_opens_and_closes_by_pointer_and_by_keys(page):
 
 
 def test_every_claim_can_be_reached_by_its_link(page):
-    lost = "[...document.querySelectorAll('a[href^=\"#\"]')].filter((a) => !document.getElementById(a.hash.slice(1))).length"
+    lost = (
+        "[...document.querySelectorAll('a[href^=\"#\"]')].filter((a) => "
+        "!document.getElementById(a.hash.slice(1))).length"
+    )
     assert page.evaluate(lost) == 0
 
 
@@ -85,7 +99,9 @@ def test_paper_shows_what_is_folded_and_leaves_out_what_is_to_click(page):
     assert printed.startswith(b"%PDF")
 
 
-def test_the_pdf_is_printed_once_and_removed_when_it_is_of_another_report(results, tmp_path, monkeypatch):
+def test_the_pdf_is_printed_once_and_removed_when_it_is_of_another_report(
+    results, tmp_path, monkeypatch
+):
     if browser.browser() is None:
         pytest.skip("no Chromium, Chrome or Edge is installed here")
     folder = shutil.copytree(results, tmp_path / "results")

@@ -62,7 +62,10 @@ def test_the_time_is_told_first_and_each_picture_as_it_is_ready(tmp_path):
 
 
 def test_the_work_of_every_part_is_known_and_a_draft_takes_a_third_at_most():
-    times = {effort: expected_seconds([figure.at(effort) for figure in FIGURES.values()], 1e5) for effort in EFFORTS}
+    times = {
+        effort: expected_seconds([figure.at(effort) for figure in FIGURES.values()], 1e5)
+        for effort in EFFORTS
+    }
     table = toml_table("expected_time.toml")
     assert set(times["standard"]) == set(table["standard"])
     assert set(table["quick"]) == {name for name, figure in FIGURES.items() if figure.quick}
@@ -89,7 +92,8 @@ def test_a_draft_is_marked_and_made_anew_in_full(tmp_path, monkeypatch):
     assert "Draft: 1 of 1 parts" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert reproduce(["fig04"], tmp_path)[0].made
     assert "Draft:" not in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert not reproduce(["fig04"], tmp_path, effort="quick")[0].made  # in full it is better than a draft
+    # in full it is better than a draft
+    assert not reproduce(["fig04"], tmp_path, effort="quick")[0].made
 
 
 def test_an_unknown_name_is_answered_with_the_near_ones(tmp_path):

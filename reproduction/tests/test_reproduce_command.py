@@ -33,7 +33,13 @@ def test_wrong_use_ends_with_status_2(saltus):
     ("arguments", "names", "output", "force", "effort"),
     [
         ([], [], Path("results"), False, "standard"),
-        (["fig04", "table1", "-o", "there", "--force"], ["fig04", "table1"], Path("there"), True, "standard"),
+        (
+            ["fig04", "table1", "-o", "there", "--force"],
+            ["fig04", "table1"],
+            Path("there"),
+            True,
+            "standard",
+        ),
         (["fig09", "--effort", "quick"], ["fig09"], Path("results"), False, "quick"),
     ],
 )
@@ -52,12 +58,16 @@ def test_an_unknown_part_is_refused(refused, tmp_path):
 
 
 def test_an_unknown_effort_is_refused(refused, tmp_path):
-    assert "'standard', 'quick'" in refused("reproduce", "fig08", "--effort", "fast", "-o", tmp_path)
+    assert "'standard', 'quick'" in refused(
+        "reproduce", "fig08", "--effort", "fast", "-o", tmp_path
+    )
 
 
 def test_an_unwritable_folder_is_refused(refused, tmp_path):
     (tmp_path / "file").touch()
-    assert "is a file; name another with --output" in refused("reproduce", "fig08", "-o", tmp_path / "file")
+    assert "is a file; name another with --output" in refused(
+        "reproduce", "fig08", "-o", tmp_path / "file"
+    )
 
 
 def test_the_report_of_no_results_is_refused(refused, tmp_path):
@@ -78,7 +88,8 @@ def test_an_interrupt_leaves_whole_files_only(started, tmp_path):
     process = started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while not process.stderr.readline().endswith("fig05.png is ready\n"):
         assert process.poll() is None
-    process.send_signal(signal.SIGINT)  # fig05 is made, and while fig04, which takes seconds, is being made
+    # fig05 is made, and while fig04, which takes seconds, is being made
+    process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=120)
     *_, said = err.splitlines()
     assert (process.returncode, said) == (130, "saltus: interrupted; no file was left half-written")

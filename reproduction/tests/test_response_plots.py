@@ -1,4 +1,6 @@
-"""Pictures of branches follow the conventions, and their lines go through what was computed and nothing else."""
+"""Pictures of branches follow the conventions, and their lines go through what was computed and
+nothing else.
+"""
 
 import matplotlib as mpl
 import numpy as np
@@ -12,7 +14,11 @@ from saltus_paper.figures.zooms import draw_zoom
 
 def lines(ax, line):
     """The lines of an axes in the colour and dashes of a convention."""
-    return [one for one in ax.lines if one.get_color() == line["color"] and one.get_linestyle() == drawn(line)]
+    return [
+        one
+        for one in ax.lines
+        if one.get_color() == line["color"] and one.get_linestyle() == drawn(line)
+    ]
 
 
 def drawn(line):
@@ -70,10 +76,22 @@ def test_without_a_special_point_runs_meet_in_the_middle():
 
 
 def test_a_branch_is_cut_at_the_zero_of_a_margin_and_the_graver_one_counts():
-    margins = {"reaction": [1, 0.2, -1, -1], "reach": [1, 1, 0.5, -0.5], "straight": [1, -1, -1, -1]}
+    margins = {
+        "reaction": [1, 0.2, -1, -1],
+        "reach": [1, 1, 0.5, -0.5],
+        "straight": [1, -1, -1, -1],
+    }
     zeros = [("reaction", 1.25, 1.2), ("reach", 2.5, 2.6), ("straight", 0.5, 0.5)]
-    runs = list(branch_lines(branch([0, 1, 2, 3], [0, 1, 2, 3], [1, 1, 1, 1], margins=margins, special=zeros)))
-    assert [run.validity for run in runs] == [ModelValidity.HOLDS, ModelValidity.ASSUMPTION, ModelValidity.LIMIT]
+    runs = list(
+        branch_lines(
+            branch([0, 1, 2, 3], [0, 1, 2, 3], [1, 1, 1, 1], margins=margins, special=zeros)
+        )
+    )
+    assert [run.validity for run in runs] == [
+        ModelValidity.HOLDS,
+        ModelValidity.ASSUMPTION,
+        ModelValidity.LIMIT,
+    ]
     ends = [(tuple(run.places[0]), tuple(run.places[-1])) for run in runs]
     assert ends == [((0, 0), (1.25, 1.2)), ((1.25, 1.2), (2.5, 2.6)), ((2.5, 2.6), (3, 3))]
 
@@ -81,7 +99,13 @@ def test_a_branch_is_cut_at_the_zero_of_a_margin_and_the_graver_one_counts():
 @pytest.mark.parametrize(("fold", "zero"), [(1.2, 1.8), (1.8, 1.2)])
 def test_stability_and_validity_may_change_between_the_same_two_points(fold, zero):
     special = [("LP", fold, fold), ("reaction", zero, zero)]
-    data = branch([0, 1, 2, 3], [0, 1, 2, 3], [1, 1, 0, 0], margins={"reaction": [1, 1, -1, -1]}, special=special)
+    data = branch(
+        [0, 1, 2, 3],
+        [0, 1, 2, 3],
+        [1, 1, 0, 0],
+        margins={"reaction": [1, 1, -1, -1]},
+        special=special,
+    )
     first, between, last = branch_lines(data)
     assert (first.stable, first.validity) == (True, ModelValidity.HOLDS)
     expected = (False, ModelValidity.HOLDS) if fold < zero else (True, ModelValidity.ASSUMPTION)
@@ -95,7 +119,14 @@ def test_a_margin_that_jumps_where_impacts_are_born_is_cut_at_the_grazing():
     margins = {"reaction": [1, 1, -1, -1]}
     crossings, special = [2, 2, 6, 6], [("GR", 1.9, 1.0)]
     holds, violated = branch_lines(
-        branch([0, 1, 2, 3], np.ones(4), np.ones(4), crossings=crossings, margins=margins, special=special)
+        branch(
+            [0, 1, 2, 3],
+            np.ones(4),
+            np.ones(4),
+            crossings=crossings,
+            margins=margins,
+            special=special,
+        )
     )
     assert tuple(holds.places[-1]) == tuple(violated.places[0]) == (1.9, 1.0)
     assert violated.validity is ModelValidity.ASSUMPTION
@@ -125,7 +156,9 @@ def test_validity_is_seen_in_colour_and_in_grey(axes):
 
 def test_marks_name_the_kinds_that_are_inside_and_are_thinned_out(axes):
     crowd = [("GR", 1.0 + 1e-4 * k, 1.0) for k in range(50)]
-    data = diagram(branch([0, 3], [1, 1], [1, 1], special=[*crowd, ("LP", 2.0, 1.0), ("PD", 9.0, 1.0)]))
+    data = diagram(
+        branch([0, 3], [1, 1], [1, 1], special=[*crowd, ("LP", 2.0, 1.0), ("PD", 9.0, 1.0)])
+    )
     response.draw_special(axes, data)
     counts = {line.get_marker(): len(line.get_xdata()) for line in axes.lines}
     assert counts == {"^": 1, "o": 1}
@@ -182,7 +215,11 @@ def test_the_legend_says_what_is_violated_and_what_is_beyond():
     wrong = branch([0, 3], [1, 1], [1, 1], margins={"reaction": [-1, -1], "reach": [1, 1]})
     beyond = branch([0, 3], [1, 1], [1, 1], margins={"reaction": [-1, -1], "reach": [-1, -1]})
     model, violated, farther = "stable, unstable (model holds)", "reaction violated", "beyond reach"
-    cases = [([valid], [model]), ([valid, wrong], [model, violated]), ([wrong, beyond], [violated, farther])]
+    cases = [
+        ([valid], [model]),
+        ([valid, wrong], [model, violated]),
+        ([wrong, beyond], [violated, farther]),
+    ]
     for branches, expected in cases:
         assert [label for label, _ in response.line_labels(branches)] == expected
     assert [label for label, _ in response.line_labels([folded()])] == ["stable", "unstable"]

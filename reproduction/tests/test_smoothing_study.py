@@ -1,4 +1,6 @@
-"""The smoothed equation beside the exact one: the study against SciPy, and its claims on data that would contradict them."""
+"""The smoothed equation beside the exact one: the study against SciPy, and its claims on data that
+would contradict them.
+"""
 
 import math
 from functools import cache
@@ -28,7 +30,13 @@ def smoothed(sharpness):
 def rate(t, y, frequency, sign):
     """`gov_eqn_theta` with any sign function, written again."""
     size = BETA0 + sign(y[0]) * y[0]
-    return [y[1], math.sin(size) * 0.5 * math.sin(frequency * t) - 0.5 * sign(y[0]) * math.cos(size) - 0.1 * y[1] - y[0]]
+    return [
+        y[1],
+        math.sin(size) * 0.5 * math.sin(frequency * t)
+        - 0.5 * sign(y[0]) * math.cos(size)
+        - 0.1 * y[1]
+        - y[0],
+    ]
 
 
 def settled(frequency, sharpness, state, periods=60):
@@ -39,7 +47,14 @@ def settled(frequency, sharpness, state, periods=60):
 
     period = 2 * math.pi / frequency
     run = solve_ivp(
-        rate, (0, periods * period), state, args=(frequency, sign), method="DOP853", rtol=1e-9, atol=1e-11, max_step=0.1
+        rate,
+        (0, periods * period),
+        state,
+        args=(frequency, sign),
+        method="DOP853",
+        rtol=1e-9,
+        atol=1e-11,
+        max_step=0.1,
     )
     late = run.t > (periods - 3) * period
     return float(abs(run.y[0][late]).max())
@@ -47,11 +62,19 @@ def settled(frequency, sharpness, state, periods=60):
 
 @pytest.mark.parametrize(
     ("frequency", "sharpness"),
-    [(0.6, 50.0), *(pytest.param(*each, marks=pytest.mark.thorough) for each in [(0.275, 50.0), (0.6, 200.0)])],
+    [
+        (0.6, 50.0),
+        *(
+            pytest.param(*each, marks=pytest.mark.thorough)
+            for each in [(0.275, 50.0), (0.6, 200.0)]
+        ),
+    ],
 )
 def test_smoothed_branches_are_those_of_an_independent_integrator(frequency, sharpness):
     (orbit,) = (orbit for orbit in smoothed(sharpness).at(frequency) if orbit.stable)
-    assert settled(frequency, sharpness, tuple(map(float, orbit.state))) == pytest.approx(orbit.amplitude, abs=2e-3)
+    assert settled(frequency, sharpness, tuple(map(float, orbit.state))) == pytest.approx(
+        orbit.amplitude, abs=2e-3
+    )
 
 
 @pytest.mark.thorough
@@ -66,7 +89,9 @@ def test_a_sharp_smoothing_leaves_the_hump_of_a_blunt_one_as_the_exact_motion_do
 
 def test_exact_evaluations_count_from_impact_to_impact():
     count, theta, velocity = smoothing._integrated(math.inf, 1e-10)
-    exact = smoothing.simulate(smoothing._system(None), theta=0.3, velocity=0.0, periods=20, tol=1e-14)
+    exact = smoothing.simulate(
+        smoothing._system(None), theta=0.3, velocity=0.0, periods=20, tol=1e-14
+    )
     assert (theta, velocity) == pytest.approx((exact.theta, exact.velocity), abs=1e-8)
     assert count > 1000
 
@@ -76,7 +101,9 @@ def test_every_claim_of_the_study_holds():
     found = verdicts(FIGURES["smoothing"].measure(data()))
     ours = {id for id, verdict in found.items() if verdict is ClaimVerdict.HOLDS}
     assert ours == {"smoothing-primary", "smoothing-order", "smoothing-grazings", "smoothing-work"}
-    assert {id for id, verdict in found.items() if verdict is ClaimVerdict.AS_PRINTED} == found.keys() - ours
+    assert {
+        id for id, verdict in found.items() if verdict is ClaimVerdict.AS_PRINTED
+    } == found.keys() - ours
 
 
 @pytest.mark.thorough

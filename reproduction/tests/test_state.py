@@ -35,7 +35,10 @@ def measure(data):
 
 def figure(**changes):
     words = {"name": "fig99", "title": "A line", "caption": "A line.", "module": __name__}
-    parts = {"panels": lambda **given: {"line": partial(compute, **given)}, "join": itemgetter("line")}
+    parts = {
+        "panels": lambda **given: {"line": partial(compute, **given)},
+        "join": itemgetter("line"),
+    }
     return PaperFigure(**{**words, **parts, "draw": draw, "measure": measure, **changes})
 
 
@@ -44,7 +47,9 @@ def registry(monkeypatch):
     calls.clear()
     figures = {"fig99": figure()}
     monkeypatch.setattr("saltus_paper.parts.FIGURES", figures)
-    tables = claim_tables() | {"fig99": {"line": ClaimEntry(place="here", statement="it rises", evidence="differences")}}
+    tables = claim_tables() | {
+        "fig99": {"line": ClaimEntry(place="here", statement="it rises", evidence="differences")}
+    }
     for module in (claim, state):
         monkeypatch.setattr(module, "claim_tables", lambda: tables)
     return figures
@@ -75,7 +80,11 @@ def test_the_report_is_not_rewritten_when_nothing_changes(tmp_path):
         ("tampered", "fig99.pdf"),
         *(
             pytest.param(*each, marks=pytest.mark.thorough)
-            for each in [("missing", "fig99.nc"), ("tampered", "fig99.png"), ("missing", "fig99.pdf")]
+            for each in [
+                ("missing", "fig99.nc"),
+                ("tampered", "fig99.png"),
+                ("missing", "fig99.pdf"),
+            ]
         ),
     ],
 )
@@ -112,7 +121,8 @@ def test_other_parameters_make_it_again(tmp_path, registry):
     ("module", "changes"),
     [
         ("saltus_paper.figures.fig08", True),
-        ("saltus.theory.quasi_static", True),  # inner files of rooms, whose names come through the front door
+        # inner files of rooms, whose names come through the front door
+        ("saltus.theory.quasi_static", True),
         ("saltus.theory.loaded_equilibria", True),
         ("saltus.flow.kernel.roots", True),
         ("saltus.systems.metainterface", True),
@@ -124,7 +134,9 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.attractors.attractor_search", False),
     ],
 )
-def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(module, changes, monkeypatch, tmp_path):
+def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(
+    module, changes, monkeypatch, tmp_path
+):
     from saltus_paper.figures import fig08
 
     figure = replace(fig08.FIGURE, draw=None)
@@ -133,7 +145,9 @@ def test_a_figure_is_out_of_date_by_a_change_in_what_it_uses_and_by_no_other(mod
     assert state.up_to_date(figure, tmp_path)
     original = state._source
     assert original(module)
-    monkeypatch.setattr(state, "_source", lambda name: original(name) + (b"#" if name == module else b""))
+    monkeypatch.setattr(
+        state, "_source", lambda name: original(name) + (b"#" if name == module else b"")
+    )
     assert state.up_to_date(figure, tmp_path) is not changes
 
 

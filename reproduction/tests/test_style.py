@@ -9,7 +9,10 @@ from saltus.plots import conventions as style
 
 
 def lightness(colour):
-    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in mpl.colors.to_rgb(colour))
+    red, green, blue = (
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+        for c in mpl.colors.to_rgb(colour)
+    )
     return 116 * np.cbrt(0.2126 * red + 0.7152 * green + 0.0722 * blue) - 16
 
 
@@ -20,10 +23,18 @@ def test_a_family_of_curves_gets_lighter_step_by_step():
 
 
 def test_no_two_conventions_share_line_style_and_lightness():
-    lines = (style.LOOK.stable_line, style.LOOK.unstable_line, style.LOOK.separatrix_line, style.LOOK.limit_line)
+    lines = (
+        style.LOOK.stable_line,
+        style.LOOK.unstable_line,
+        style.LOOK.separatrix_line,
+        style.LOOK.limit_line,
+    )
     for i, one in enumerate(lines):
         for two in lines[i + 1 :]:
-            assert one["linestyle"] != two["linestyle"] or abs(lightness(one["color"]) - lightness(two["color"])) > 10
+            assert (
+                one["linestyle"] != two["linestyle"]
+                or abs(lightness(one["color"]) - lightness(two["color"])) > 10
+            )
 
 
 def test_the_conventions_end_with_their_block():

@@ -1,6 +1,8 @@
-"""The front door of a room: the names that its `__init__.pyi` lists, each imported when it is first used.
+"""The front door of a room: the names that its `__init__.pyi` lists, each imported when it is first
+used.
 
-A room imports another one only through these names. Nothing is loaded before it is needed, so `import saltus` stays light.
+A room imports another one only through these names. Nothing is loaded before it is needed, so
+`import saltus` stays light.
 """
 
 from __future__ import annotations
@@ -16,11 +18,15 @@ from lazy_loader import attach_stub
 
 from saltus.errors import ParameterError, near
 
-FOR_USERS = ("saltus.theory",)  # rooms all of whose functions are for users, besides those that `saltus` itself names
+# rooms all of whose functions are for users, besides those that `saltus` itself names
+FOR_USERS = ("saltus.theory",)
 
 
-def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """`__getattr__`, `__dir__` and `__all__` of a package whose public names are those of the stub beside its `__init__`.
+def front_door(
+    package: str, file: str
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """`__getattr__`, `__dir__` and `__all__` of a package whose public names are those of the stub
+    beside its `__init__`.
 
     Raises
     ------
@@ -34,7 +40,8 @@ def front_door(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
         if name.startswith("__") or name in public:
             found = load(name)
             if package in FOR_USERS or name in vars(sys.modules["saltus"]).get("__all__", ()):
-                found = vars(sys.modules[package])[name] = _answering(found)  # lazy_loader 0.6 keeps there what it has loaded
+                # lazy_loader 0.6 keeps there what it has loaded
+                found = vars(sys.modules[package])[name] = _answering(found)
             return found
         if os.path.exists(os.path.join(os.path.dirname(file), f"{name}.py")):
             raise AttributeError(name)  # Python asks for the name of a file, which it then imports
@@ -58,7 +65,8 @@ def _elsewhere(name: str) -> str:
 
 
 class Room(ModuleType):
-    """A package of saltus; if it is called by mistake, the error names the functions that may be meant.
+    """A package of saltus; if it is called by mistake, the error names the functions that may be
+    meant.
 
     It is pickled by its name, as cloudpickle sends the modules that functions of notebooks use.
     """
@@ -69,13 +77,22 @@ class Room(ModuleType):
     def __call__(self, *given: Any, **named: Any) -> Any:
         own = self.__name__.rpartition(".")[2]
         doors = (vars(sys.modules["saltus"]).get("__all__", ()), self.__all__)
-        meant = next((found for door in doors if (found := [n for n in door if own[:-1] in n and n.islower() and n != own])), [])
+        meant = next(
+            (
+                found
+                for door in doors
+                if (found := [n for n in door if own[:-1] in n and n.islower() and n != own])
+            ),
+            [],
+        )
         hint = near(own, meant) if meant else "use one of its functions"
         raise ParameterError(f"{self.__name__} is a package, not a function; {hint}")
 
 
 def _answering(found: Any) -> Any:
-    """A public function or a dataclass, made to refuse arguments that it does not have; anything else is returned as it is."""
+    """A public function or a dataclass, made to refuse arguments that it does not have; anything
+    else is returned as it is.
+    """
     own = vars(found).get("__init__") if hasattr(found, "__dataclass_fields__") else found
     if not isinstance(own, FunctionType) or hasattr(own, "answers"):
         return found

@@ -1,11 +1,13 @@
 """The branches of a diagram as a few flat tables, and each branch as a dataset again.
 
-A file with a group for each of hundreds of branches takes minutes to open. All branches are therefore kept one after the other,
-as contiguous ragged arrays in the manner of the CF conventions:
+A file with a group for each of hundreds of branches takes minutes to open. All branches are
+therefore kept one after the other, as contiguous ragged arrays in the manner of the CF conventions:
 
-* `branches`, along `branch`: the attributes of each branch, how many points and special points it has (`point_count`,
+* `branches`, along `branch`: the attributes of each branch, how many points and special points it
+  has (`point_count`,
   `special_count`), and how many numbers each of its points has in `orbits` (`unknown_size`, ...);
-* `points`, along `point`, and `special`, along `special`: a column for each quantity, and the number of the `branch`;
+* `points`, along `point`, and `special`, along `special`: a column for each quantity, and the
+  number of the `branch`;
 * `orbits`: the quantities with several numbers at each point, row after row.
 """
 
@@ -24,36 +26,58 @@ if TYPE_CHECKING:
 
 ROWS = ("point", "special")  # dimensions along which branches follow one another
 TABLES = dict(zip(ROWS, ("points", "special"), strict=True))
-SAID = ("ends", "end_reasons", "end_kinds", "origin", "closed", "missed", "unconfirmed")  # attributes that each branch has
+# attributes that each branch has
+SAID = ("ends", "end_reasons", "end_kinds", "origin", "closed", "missed", "unconfirmed")
 
 
 def branch_tables(branches: Sequence[xarray.Dataset]) -> dict[str, xarray.Dataset]:
     """The tables of the branches of one system, each given as `Branch.to_xarray` gives it."""
     import xarray
 
-    counts = {dim: np.array([branch.sizes.get(dim, 0) for branch in branches], dtype=int) for dim in ROWS}
-    columns: dict[str, dict[str, Any]] = {table: {"branch": (dim, _numbers(counts[dim]))} for dim, table in TABLES.items()}
+    counts = {
+        dim: np.array([branch.sizes.get(dim, 0) for branch in branches], dtype=int) for dim in ROWS
+    }
+    columns: dict[str, dict[str, Any]] = {
+        table: {"branch": (dim, _numbers(counts[dim]))} for dim, table in TABLES.items()
+    }
     said: dict[str, Any] = {
-        f"{dim}_count": ("branch", counts[dim], {"sample_dimension": dim, "long_name": f"rows of a branch in `{table}`"})
+        f"{dim}_count": (
+            "branch",
+            counts[dim],
+            {"sample_dimension": dim, "long_name": f"rows of a branch in `{table}`"},
+        )
         for dim, table in TABLES.items()
     }
     wide: dict[str, Any] = {}
     for name in dict.fromkeys(str(name) for branch in branches for name in branch.variables):
         own = [branch.variables[name] for branch in branches if name in branch.variables]
-        values, dims = np.concatenate([variable.values.ravel() for variable in own]), tuple(map(str, own[0].dims))
+        values = np.concatenate([variable.values.ravel() for variable in own])
+        dims = tuple(map(str, own[0].dims))
         if len(dims) == 1:
             columns[TABLES[dims[0]]][name] = (dims[0], values, own[0].attrs)
             continue
         sizes = np.array([branch.sizes.get(dims[1], 0) for branch in branches], dtype=int)
-        said[f"{dims[1]}_size"] = ("branch", sizes, {"long_name": "numbers of each point of a branch in `orbits`"})
+        said[f"{dims[1]}_size"] = (
+            "branch",
+            sizes,
+            {"long_name": "numbers of each point of a branch in `orbits`"},
+        )
         wide[name] = (dims[1], values, own[0].attrs)
     for name in SAID:
         if branches and name in branches[0].attrs:
             listed = [branch.attrs[name] for branch in branches]
             said[name] = (("branch", "end")[: np.ndim(listed)], np.array(listed))
-    common = {name: value for branch in branches[:1] for name, value in branch.attrs.items() if name not in SAID}
+    common = {
+        name: value
+        for branch in branches[:1]
+        for name, value in branch.attrs.items()
+        if name not in SAID
+    }
     tables = {"branches": said, **columns, "orbits": wide}
-    return {name: xarray.Dataset(table, attrs=common if name == "branches" else {}) for name, table in tables.items()}
+    return {
+        name: xarray.Dataset(table, attrs=common if name == "branches" else {})
+        for name, table in tables.items()
+    }
 
 
 def _numbers(counts: np.ndarray) -> np.ndarray:
@@ -86,13 +110,24 @@ def branches_of(diagram: xarray.DataTree) -> Iterator[tuple[int, xarray.Dataset]
 
 
 def _check_tables(diagram: Any) -> None:
-    missing = [name for name in ("branches", *TABLES.values(), "orbits") if name not in getattr(diagram, "children", ())]
+    missing = [
+        name
+        for name in ("branches", *TABLES.values(), "orbits")
+        if name not in getattr(diagram, "children", ())
+    ]
     if missing:
-        raise ParameterError(f"diagram must be the tree of a diagram, or of one panel; this one has no {missing[0]!r}", "diagram")
+        raise ParameterError(
+            (
+                "diagram must be the tree of a diagram, or of one panel; this one has no "
+                f"{missing[0]!r}"
+            ),
+            "diagram",
+        )
 
 
 def branch_of(diagram: xarray.DataTree, number: int) -> xarray.Dataset:
-    """The branch of this number of a diagram, as `Branch.to_xarray` gives it; `orbits_of` makes its orbits again.
+    """The branch of this number of a diagram, as `Branch.to_xarray` gives it; `orbits_of` makes its
+    orbits again.
 
     Parameters
     ----------
@@ -123,8 +158,15 @@ class _Tables:
     """The tables of a diagram, and where each branch begins in them."""
 
     def __init__(self, diagram: Any) -> None:
-        self.said, *tables = (diagram[name].to_dataset() for name in ("branches", "points", "special", "orbits"))
-        self.columns = {name: column for table in tables for name, column in table.variables.items() if name != "branch"}
+        self.said, *tables = (
+            diagram[name].to_dataset() for name in ("branches", "points", "special", "orbits")
+        )
+        self.columns = {
+            name: column
+            for table in tables
+            for name, column in table.variables.items()
+            if name != "branch"
+        }
         self.sizes = {dim: self.said[f"{dim}_count"].values for dim in ROWS}
         for dim in {column.dims[0] for column in tables[-1].variables.values()}:
             self.sizes[dim] = self.sizes["point"] * self.said[f"{dim}_size"].values
@@ -135,14 +177,18 @@ class _Tables:
         """The branch of this number."""
         import xarray
 
-        points, variables = int(self.sizes["point"][number]), {}
+        points = int(self.sizes["point"][number])
+        variables = {}
         for name, column in self.columns.items():
             (dim,) = column.dims
-            first, size = int(self.starts[dim][number]), int(self.sizes[dim][number])
+            first = int(self.starts[dim][number])
+            size = int(self.sizes[dim][number])
             values = column.values[first : first + size]
             if dim in ROWS:
                 variables[name] = xarray.Variable(dim, values, column.attrs, fastpath=True)
             elif size:
-                variables[name] = xarray.Variable(("point", dim), values.reshape(points, -1), column.attrs, fastpath=True)
+                variables[name] = xarray.Variable(
+                    ("point", dim), values.reshape(points, -1), column.attrs, fastpath=True
+                )
         said = {name: self.said[name].values[number].tolist() for name in SAID if name in self.said}
         return xarray.Dataset(variables, attrs={**self.said.attrs, **said})

@@ -1,5 +1,6 @@
-"""Checks of arguments: values, shared by every model, load and impact law; and those that a public function does not have, which
-are refused with the names that are near. Of an object of a senseless type Python's own error says enough."""
+"""Checks of arguments: values, shared by every model, load and impact law; and those that a public
+function does not have, which are refused with the names that are near. Of an object of a senseless
+type Python's own error says enough."""
 
 from __future__ import annotations
 
@@ -27,32 +28,55 @@ RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angl
 
 @dataclass(frozen=True)
 class Limits:
-    """The most that may be asked for, on any machine; the memory that a request needs is estimated besides."""
+    """The most that may be asked for, on any machine; the memory that a request needs is estimated
+    besides.
+    """
 
-    count: int = 10_000_000  # Motions, points, samples: more of them at once are a typing error, and fit into no memory.
+    # Motions, points, samples: more of them at once are a typing error, and fit into no memory.
+    count: int = 10_000_000
     periods: int = 10**12  # Forcing periods, or units of time, of one motion: days of one core.
-    threads: int = 1024  # No machine has so many cores, and each thread takes memory before it does anything.
-    value: float = 1e100  # The size of any number: differences and squares of larger numbers overflow.
-    coordinates: int = 200  # Of a structure: one of more is reduced first, as few of its modes matter.
+    # No machine has so many cores, and each thread takes memory before it does anything.
+    threads: int = 1024
+    # The size of any number: differences and squares of larger numbers overflow.
+    value: float = 1e100
+    # Of a structure: one of more is reduced first, as few of its modes matter.
+    coordinates: int = 200
     order: int = 1000  # The order of a harmonic: the step of the integrator shrinks with it.
     seed: int = 2**63 - 1  # The largest number that files and random generators can hold.
-    motion: int = 2048  # Bytes that a motion of an ensemble takes; 1000 were measured without its samples.
-    dense: int = 6000  # Bytes that a forcing period of a motion with dense output takes; 5400 were measured.
-    work: float = 1e12  # Motions times forcing periods: four days of one core, at three million in a second.
-    operations: int = 600  # Loops over Taylor coefficients that take a minute to compile; saltus's own models have 92 at most.
+    # Bytes that a motion of an ensemble takes; 1000 were measured without its samples.
+    motion: int = 2048
+    # Bytes that a forcing period of a motion with dense output takes; 5400 were measured.
+    dense: int = 6000
+    # Motions times forcing periods: four days of one core, at three million in a second.
+    work: float = 1e12
+    # Loops over Taylor coefficients that take a minute to compile; saltus's own models have 92 at
+    # most.
+    operations: int = 600
     nodes: int = 100_000  # Operations of any kind in these equations that take a minute to compile.
-    optimised: int = 8  # Coordinates of a model whose code always goes through LLVM's passes, whose time grows faster than it.
+    # Coordinates of a model whose code always goes through LLVM's passes, whose time grows faster
+    # than it.
+    optimised: int = 8
     lanes: float = 3.0  # The factor of the time of compiling for vector lanes; 2.7 was measured.
-    compiling: float = 5.0  # The most minutes of compiling for lanes or derivatives; those of 32 cells are estimated at two.
-    memory: float = 0.8  # The share of the free memory that one request may take: the rest keeps the machine usable.
-    letters: float = 2e5  # Letters of LLVM's text that are compiled in a second; 1.7e5 to 3.5e5 were measured.
+    # The most minutes of compiling for lanes or derivatives; those of 32 cells are estimated at
+    # two.
+    compiling: float = 5.0
+    # The share of the free memory that one request may take: the rest keeps the machine usable.
+    memory: float = 0.8
+    # Letters of LLVM's text that are compiled in a second; 1.7e5 to 3.5e5 were measured.
+    letters: float = 2e5
     unsaid: float = 2.0  # Seconds of compiling without a word to whoever watches the progress.
-    any_machine: float = 1e8  # Bytes that are always free: smaller requests are not checked, as checking takes time.
+    # Bytes that are always free: smaller requests are not checked, as checking takes time.
+    any_machine: float = 1e8
 
 
 LIMITS = Limits()
 MOST = dict.fromkeys(("periods", "transient", "settle"), LIMITS.periods)
-MOST |= {"seed": LIMITS.seed, "threads": LIMITS.threads, "workers": LIMITS.threads, "order": LIMITS.order}
+MOST |= {
+    "seed": LIMITS.seed,
+    "threads": LIMITS.threads,
+    "workers": LIMITS.threads,
+    "order": LIMITS.order,
+}
 
 
 def check_number(name: str, value: Any, **bounds: Any) -> None:
@@ -61,7 +85,8 @@ def check_number(name: str, value: Any, **bounds: Any) -> None:
     Raises
     ------
     ParameterError
-        The error has the name, the range and the value, and a hint if the number is likely in degrees.
+        The error has the name, the range and the value, and a hint if the number is likely in
+        degrees.
     """
     plain = not bounds and type(value) is float and abs(value) <= LIMITS.value
     problem = None if plain else number_problem(value, **bounds)
@@ -78,8 +103,12 @@ def number_problem(
     at_most: float | None = None,
     unit: str = "",
 ) -> str | None:
-    """What is wrong with a value that must be a finite real number within bounds, such as "must lie in [0, 1], got 2"."""
-    number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+    """What is wrong with a value that must be a finite real number within bounds, such as "must lie
+    in [0, 1], got 2".
+    """
+    number = isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(
+        value, (bool, np.timedelta64)
+    )
     if number and isinstance(value, int) and abs(value) > sys.float_info.max:
         value = math.inf
     inside = (
@@ -91,32 +120,58 @@ def number_problem(
         and (at_most is None or value <= at_most)
     )
     if inside:
-        return None if abs(float(value)) <= LIMITS.value else f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
+        return (
+            None
+            if abs(float(value)) <= LIMITS.value
+            else f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
+        )
     wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
         return f"must {kind}, got {shown(value)}"
-    hint = " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
+    hint = (
+        " (degrees?)" if unit == "rad" and math.isfinite(value) and 3.2 < abs(value) <= 360 else ""
+    )
     return f"must {wanted}, got {shown(value)}{hint}"
 
 
-def _range_text(above: float | None, below: float | None, at_least: float | None, at_most: float | None) -> str:
+def _range_text(
+    above: float | None, below: float | None, at_least: float | None, at_most: float | None
+) -> str:
     if above is None and at_least is None and below is None and at_most is None:
         return "be finite"
-    left = f"({_short(above)}" if above is not None else "(-inf" if at_least is None else f"[{_short(at_least)}"
-    right = f"{_short(below)})" if below is not None else "inf)" if at_most is None else f"{_short(at_most)}]"
+    left = (
+        f"({_short(above)}"
+        if above is not None
+        else "(-inf"
+        if at_least is None
+        else f"[{_short(at_least)}"
+    )
+    right = (
+        f"{_short(below)})"
+        if below is not None
+        else "inf)"
+        if at_most is None
+        else f"{_short(at_most)}]"
+    )
     return f"lie in {left}, {right}"
 
 
 def _short(value: float) -> str:
-    for multiple, text in ((math.pi, "pi"), (math.pi / 2, "pi/2"), (-math.pi, "-pi"), (2 * math.pi, "2 pi")):
+    for multiple, text in (
+        (math.pi, "pi"),
+        (math.pi / 2, "pi/2"),
+        (-math.pi, "-pi"),
+        (2 * math.pi, "2 pi"),
+    ):
         if value == multiple:
             return text
     return f"{value:g}"
 
 
 def check_count(name: str, value: Any, at_least: int, at_most: int | None = None) -> None:
-    """Refuse anything but a whole number within the bounds; the upper bound is that of `Limits` if none is given.
+    """Refuse anything but a whole number within the bounds; the upper bound is that of `Limits` if
+    none is given.
 
     Raises
     ------
@@ -132,7 +187,8 @@ def check_count(name: str, value: Any, at_least: int, at_most: int | None = None
 
 
 def check_memory(name: str, size: float, what: str) -> None:
-    """Refuse a request that needs more than its share of the memory that is free, before anything is computed.
+    """Refuse a request that needs more than its share of the memory that is free, before anything
+    is computed.
 
     Parameters
     ----------
@@ -151,7 +207,8 @@ def check_memory(name: str, size: float, what: str) -> None:
     free = free_memory() if size > LIMITS.any_machine else math.inf
     if size > LIMITS.memory * free:
         raise ParameterError(
-            f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free", name
+            f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free",
+            name,
         )
 
 
@@ -173,7 +230,8 @@ def check_work(name: str, motions: float, periods: float) -> None:
 
 
 def check_starts(starts: Any, beside: int = 1) -> None:
-    """Refuse a number of initial states that is no such number, or that needs too much memory, `beside` times as many at once.
+    """Refuse a number of initial states that is no such number, or that needs too much memory,
+    `beside` times as many at once.
 
     Raises
     ------
@@ -186,11 +244,15 @@ def check_starts(starts: Any, beside: int = 1) -> None:
 
 
 def free_memory() -> float:
-    """The memory that is available to programs, in bytes; infinite if the operating system does not say it."""
+    """The memory that is available to programs, in bytes; infinite if the operating system does not
+    say it.
+    """
     found = [math.inf]
     with contextlib.suppress(OSError, ValueError, IndexError):
         lines = Path("/proc/meminfo").read_text().splitlines()
-        found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
+        found += [
+            1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")
+        ]
     with contextlib.suppress(OSError, ValueError):  # the limit of a container
         group = Path("/sys/fs/cgroup")
         used = float((group / "memory.current").read_text())
@@ -202,18 +264,27 @@ def free_memory() -> float:
 
 
 def check_dataset(
-    dataset: Any, source: str, variables: Iterable[str], attributes: Iterable[str] = (), name: str = "dataset"
+    dataset: Any,
+    source: str,
+    variables: Iterable[str],
+    attributes: Iterable[str] = (),
+    name: str = "dataset",
 ) -> None:
-    """Refuse a dataset that lacks variables or attributes of the datasets that `source`, a function, makes.
+    """Refuse a dataset that lacks variables or attributes of the datasets that `source`, a
+    function, makes.
 
     Raises
     ------
     ParameterError
         The error names what is missing.
     """
-    lacks = [each for each in variables if each not in dataset] + [each for each in attributes if each not in dataset.attrs]
+    lacks = [each for each in variables if each not in dataset] + [
+        each for each in attributes if each not in dataset.attrs
+    ]
     if lacks:
-        raise ParameterError(f"{name} must be the dataset of {source}; this one lacks {lacks[0]!r}", name)
+        raise ParameterError(
+            f"{name} must be the dataset of {source}; this one lacks {lacks[0]!r}", name
+        )
 
 
 def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
@@ -227,14 +298,19 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
     try:
         low, high = (float(x) for x in bounds)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} must be two numbers (lowest, highest), got {shown(bounds)}", name) from None
+        raise ParameterError(
+            f"{name} must be two numbers (lowest, highest), got {shown(bounds)}", name
+        ) from None
     if not -math.inf < low < high < math.inf:
-        raise ParameterError(f"{name} must be two numbers, the smaller one first, got {shown(bounds)}", name)
+        raise ParameterError(
+            f"{name} must be two numbers, the smaller one first, got {shown(bounds)}", name
+        )
     return low, high
 
 
 def check_step(step: Any) -> None:
-    """Refuse longest steps along a curve outside [1e-6, 1]: shorter ones take for ever, longer ones miss its features.
+    """Refuse longest steps along a curve outside [1e-6, 1]: shorter ones take for ever, longer ones
+    miss its features.
 
     Raises
     ------
@@ -245,21 +321,30 @@ def check_step(step: Any) -> None:
 
 
 def check_size(values: Any, name: str | None = None) -> None:
-    """Refuse more values than can be meant before they become an array: a range, or an array that repeats one number, may be
-    longer than the memory.
+    """Refuse more values than can be meant before they become an array: a range, or an array that
+    repeats one number, may be longer than the memory.
 
     Raises
     ------
     ParameterError
         The error has the number of values.
     """
-    size = getattr(values, "size", None) if hasattr(values, "ndim") else len(values) if hasattr(values, "__len__") else 0
+    size = (
+        getattr(values, "size", None)
+        if hasattr(values, "ndim")
+        else len(values)
+        if hasattr(values, "__len__")
+        else 0
+    )
     if isinstance(size, int) and size > LIMITS.count:
-        raise ParameterError(f"{name or 'a list'} has {size} values, and {LIMITS.count} are the most", name)
+        raise ParameterError(
+            f"{name or 'a list'} has {size} values, and {LIMITS.count} are the most", name
+        )
 
 
 def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
-    """An array of numbers; an empty one for anything else, so that functions that refuse an empty array refuse it too.
+    """An array of numbers; an empty one for anything else, so that functions that refuse an empty
+    array refuse it too.
 
     Raises
     ------
@@ -281,14 +366,22 @@ def check_axis(name: str, values: Any, either_way: bool = False) -> np.ndarray:
     Raises
     ------
     ParameterError
-        Anything but a list of finite increasing numbers, or of falling ones; the error has the name.
+        Anything but a list of finite increasing numbers, or of falling ones; the error has the
+        name.
     """
     axis = np.atleast_1d(as_numbers(values, name))
     falls = either_way and axis.ndim == 1 and axis.size > 1 and axis[0] > axis[-1]
     steps = np.diff(-axis if falls else axis)
-    if axis.ndim != 1 or not axis.size or not (np.abs(axis) <= LIMITS.value).all() or not (steps > 0).all():
+    if (
+        axis.ndim != 1
+        or not axis.size
+        or not (np.abs(axis) <= LIMITS.value).all()
+        or not (steps > 0).all()
+    ):
         order = "rise, or all fall, each beyond" if either_way else "rise, each above"
-        raise ParameterError(f"{name} must be numbers that {order} the one before, got {shown(values)}", name)
+        raise ParameterError(
+            f"{name} must be numbers that {order} the one before, got {shown(values)}", name
+        )
     return axis
 
 
@@ -321,9 +414,14 @@ def instants(times: Any) -> np.ndarray:
     try:
         asked = np.atleast_1d(np.asarray(times, dtype=float))
     except (TypeError, ValueError):
-        raise ParameterError(f"times must be a number or an array of numbers, got {shown(times)}", "times") from None
+        raise ParameterError(
+            f"times must be a number or an array of numbers, got {shown(times)}", "times"
+        ) from None
     if asked.ndim > 1:
-        raise ParameterError(f"times must be a number or a list of numbers, got an array of shape {asked.shape}", "times")
+        raise ParameterError(
+            f"times must be a number or a list of numbers, got an array of shape {asked.shape}",
+            "times",
+        )
     return asked
 
 
@@ -342,24 +440,30 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
         array = np.full((1, dimension), np.nan)
     if not (np.abs(array) <= LIMITS.value).all():
         each = "coordinate, velocity" if dimension == 2 else "coordinates, velocities"
-        raise ParameterError(f"{name} must be states ({each}), an array (n, {dimension}), got {shown(states)}", name)
+        raise ParameterError(
+            f"{name} must be states ({each}), an array (n, {dimension}), got {shown(states)}", name
+        )
     return array
 
 
 def notice_degrees(name: str, value: float) -> None:
-    """Warn of a whole number as an angle of more than a turn, which is allowed, and is hardly ever meant in radians."""
+    """Warn of a whole number as an angle of more than a turn, which is allowed, and is hardly ever
+    meant in radians.
+    """
     if abs(value) > 2.0 * math.pi and float(value).is_integer():
         text = f"{name} = {value:g} is read in radians; {value:g} degrees are np.radians({value:g}) = {math.radians(value):.6g}"
         warnings.warn(text, UserWarning, stacklevel=2)
 
 
 def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:
-    """Check fields of a frozen dataclass against the bounds of `check_number` and store them as plain floats.
+    """Check fields of a frozen dataclass against the bounds of `check_number` and store them as
+    plain floats.
 
     The unit of a field is that of its metadata, as in `field(metadata=RADIANS)`.
     """
     for name in names:
-        kind, value = cast(Any, type(owner)), getattr(owner, name)
+        kind = cast(Any, type(owner))
+        value = getattr(owner, name)
         if bounds or type(value) is not float or not abs(value) <= LIMITS.value:
             check_number(name, value, unit=_units_of(kind)[name], **bounds)
             object.__setattr__(owner, name, float(value))
@@ -372,23 +476,30 @@ def _units_of(kind: type) -> dict[str, str]:
 
 
 def check_environment() -> None:
-    """Refuse settings that would make numba fail with its own message when it is imported, or, without its compiler, much later.
+    """Refuse settings that would make numba fail with its own message when it is imported, or,
+    without its compiler, much later.
 
     Raises
     ------
     SaltusError
         NUMBA_DISABLE_JIT is set, or NUMBA_NUM_THREADS is no count.
     """
-    disabled, threads = os.environ.get("NUMBA_DISABLE_JIT", "0"), os.environ.get("NUMBA_NUM_THREADS", "1")
+    disabled = os.environ.get("NUMBA_DISABLE_JIT", "0")
+    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if disabled not in ("", "0"):
-        raise SaltusError("the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler; unset it")
+        raise SaltusError(
+            "the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler; unset it"
+        )
     if not (threads.isdecimal() and int(threads) > 0):
-        raise SaltusError(f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of threads; unset it")
+        raise SaltusError(
+            f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of threads; unset it"
+        )
 
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
-Numbers: TypeAlias = Any  # a number or an array of numbers, which the type checker cannot tell, as arrays have many types
+# a number or an array of numbers, which the type checker cannot tell, as arrays have many types
+Numbers: TypeAlias = Any
 
 
 class Checked(Protocol[P, R]):
@@ -404,14 +515,19 @@ class Checked(Protocol[P, R]):
 
 
 def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Checked[P, R]]:
-    """A decorator by which a function refuses arguments without meaning before it begins, and has `function.check(...)`.
+    """A decorator by which a function refuses arguments without meaning before it begins, and has
+    `function.check(...)`.
 
-    `check` is called with every argument of the function by its name, defaults included. Iterators are replaced by tuples, as
-    they can be read only once.
+    `check` is called with every argument of the function by its name, defaults included. Iterators
+    are replaced by tuples, as they can be read only once.
     """
 
     def decorate(function: Callable[P, R]) -> Checked[P, R]:
-        open_ended = [p.name for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD]
+        open_ended = [
+            p.name
+            for p in inspect.signature(function).parameters.values()
+            if p.kind is p.VAR_KEYWORD
+        ]
 
         def refuse(*given: Any, **named: Any) -> inspect.BoundArguments:
             bound = bound_arguments(function, given, named)
@@ -437,12 +553,18 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
 
 def answered(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, for users: an argument that it does not have is refused as `bound_arguments` does it."""
+    """The function, for users: an argument that it does not have is refused as `bound_arguments`
+    does it.
+    """
 
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
         try:
-            return told(function, *given, **named) if "progress" in named else function(*given, **named)
+            return (
+                told(function, *given, **named)
+                if "progress" in named
+                else function(*given, **named)
+            )
         except TypeError:
             bound_arguments(function, given, named)
             raise
@@ -452,14 +574,18 @@ def answered(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def told(function: Callable[P, R], *given: P.args, **named: P.kwargs) -> R:
-    """Call a function of which somebody may watch the progress: what takes long within it is told too."""
+    """Call a function of which somebody may watch the progress: what takes long within it is told
+    too.
+    """
     if not callable(named.get("progress")) or named["progress"] is silent:
         return function(*given, **named)
     with watched(named["progress"]) as named["progress"]:  # type: ignore[arg-type]
         return function(*given, **named)
 
 
-def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]) -> inspect.BoundArguments:
+def bound_arguments(
+    function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any]
+) -> inspect.BoundArguments:
     """The arguments of a call by their names.
 
     Raises
@@ -471,18 +597,26 @@ def bound_arguments(function: Callable[..., Any], given: tuple[Any, ...], named:
     try:
         return signature.bind(*given, **named)
     except TypeError as error:
-        sentence, known = str(error), signature.parameters
+        sentence = str(error)
+        known = signature.parameters
         if sentence == "too many positional arguments":
             names = getattr(getattr(given[0], "model", None), "coordinates", ())
-            example = ", ".join(f"{name}={shown(value, 20)}" for name, value in zip(names, given[1:], strict=False))
-            first = any(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for name, p in known.items() if name != "self")
+            example = ", ".join(
+                f"{name}={shown(value, 20)}" for name, value in zip(names, given[1:], strict=False)
+            )
+            first = any(
+                p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+                for name, p in known.items()
+                if name != "self"
+            )
             those = "the arguments after the first" if first else "all arguments"
             sentence += f"; give {those} by their names{f': {example}' if example else ''}"
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
             sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"
         else:
-            wrong = next((name for name in known if sentence.endswith(repr(name))), None)  # missing, or given twice
+            # missing, or given twice
+            wrong = next((name for name in known if sentence.endswith(repr(name))), None)
         owner, _, own = function.__qualname__.rpartition(".")
         name = owner.rpartition(".")[2] if own == "__init__" else own
         raise ParameterError(f"{name}() {sentence}", wrong) from None

@@ -1,4 +1,6 @@
-"""Enumerations whose members have a sentence: code compares the members, a reader gets the sentences."""
+"""Enumerations whose members have a sentence: code compares the members, a reader gets the
+sentences.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,9 @@ from typing import Any, Self
 
 
 class NumberedSentence(IntEnum):
-    """Members that stand in arrays as numbers and whose `str` is a sentence: `HELD = 1, "it is at rest at the contact"`."""
+    """Members that stand in arrays as numbers and whose `str` is a sentence: `HELD = 1, "it is at
+    rest at the contact"`.
+    """
 
     _value_: int
     sentence: str
@@ -15,7 +19,8 @@ class NumberedSentence(IntEnum):
     def __new__(cls, number: int, sentence: str = "") -> Self:
         """A member has its number as value, by which it is looked up."""
         member = int.__new__(cls, number)
-        member._value_, member.sentence = number, sentence
+        member._value_ = number
+        member.sentence = sentence
         return member
 
     def __str__(self) -> str:
@@ -24,7 +29,10 @@ class NumberedSentence(IntEnum):
 
 def flags(kind: type[NumberedSentence]) -> dict[str, Any]:
     """The attributes that say what the numbers of a variable mean, after the CF conventions."""
-    return {"flag_values": [int(member) for member in kind], "flag_meanings": " ".join(member.name.lower() for member in kind)}
+    return {
+        "flag_values": [int(member) for member in kind],
+        "flag_meanings": " ".join(member.name.lower() for member in kind),
+    }
 
 
 class Sentence(Enum):

@@ -1,4 +1,6 @@
-"""The errors that saltus raises for a user to act on; each message says what was wrong, where, and what would be right."""
+"""The errors that saltus raises for a user to act on; each message says what was wrong, where, and
+what would be right.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +8,14 @@ from collections.abc import Iterable
 from typing import Any
 
 LONGEST = 380  # the most characters of a sentence, as names from a file may have any length
-LONGEST_NAME, LONGEST_LIST = 80, 200  # the most characters of a name that is compared with known ones, and of their list
+# the most characters of a name that is compared with known ones, and of their list
+LONGEST_NAME = 80
+LONGEST_LIST = 200
 
 
 class SaltusError(Exception):
-    """The base of every error that saltus raises on purpose; the command line prints it as one sentence.
+    """The base of every error that saltus raises on purpose; the command line prints it as one
+    sentence.
 
     Parameters
     ----------
@@ -30,7 +35,8 @@ class SaltusError(Exception):
 class ParameterError(SaltusError, ValueError):
     """A value, a name or a combination of them that has no meaning for the system.
 
-    `parameter` is the dotted path of the wrong one, such as "load.frequency" or "max_period", or None if it is not a single one.
+    `parameter` is the dotted path of the wrong one, such as "load.frequency" or "max_period", or
+    None if it is not a single one.
 
     Parameters
     ----------
@@ -52,7 +58,8 @@ class ParameterError(SaltusError, ValueError):
         self.parameter = parameter
 
     def inside(self, owner: str) -> ParameterError:
-        """The error with the path of the parameter as a part of `owner`: "model.beta0 must ..." for "beta0 must ...".
+        """The error with the path of the parameter as a part of `owner`: "model.beta0 must ..." for
+        "beta0 must ...".
 
         Parameters
         ----------
@@ -62,9 +69,12 @@ class ParameterError(SaltusError, ValueError):
         message = str(self)
         if self.parameter is None:
             return ParameterError(f"{owner}: {message}", owner)
-        path, subject = f"{owner}.{self.parameter}", f"{self.parameter} "
+        path = f"{owner}.{self.parameter}"
+        subject = f"{self.parameter} "
         predicate = message.removeprefix(subject)
-        return ParameterError(f"{path}: {message}" if predicate == message else f"{path} {predicate}", path)
+        return ParameterError(
+            f"{path}: {message}" if predicate == message else f"{path} {predicate}", path
+        )
 
 
 class TraceError(SaltusError, TypeError):
@@ -78,7 +88,8 @@ class TraceError(SaltusError, TypeError):
 
 
 class MotionError(SaltusError, RuntimeError):
-    """A motion cannot be continued: it is not unique, an impact has no solution, or the numbers overflow.
+    """A motion cannot be continued: it is not unique, an impact has no solution, or the numbers
+    overflow.
 
     Examples
     --------
@@ -91,10 +102,11 @@ class MotionError(SaltusError, RuntimeError):
 
 
 class SweepError(SaltusError, RuntimeError):
-    """A sweep that cannot go on, or that ended without some of its chunks; what was computed is kept.
+    """A sweep that cannot go on, or that ended without some of its chunks; what was computed is
+    kept.
 
-    `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` has the computed chunks if no store keeps them, else
-    it is None.
+    `failures` are the chunks that failed (`saltus.sweep.Failure`); `dataset` has the computed
+    chunks if no store keeps them, else it is None.
 
     Parameters
     ----------
@@ -113,20 +125,25 @@ class SweepError(SaltusError, RuntimeError):
 
     def __init__(self, message: str, failures: Iterable[Any] = (), dataset: Any = None) -> None:
         super().__init__(message)
-        self.failures, self.dataset = tuple(failures), dataset
+        self.failures = tuple(failures)
+        self.dataset = dataset
 
 
 def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
-    """The end of a sentence about an unknown `name`: the similar names, or all known ones if none is similar.
+    """The end of a sentence about an unknown `name`: the similar names, or all known ones if none
+    is similar.
 
-    Names in `also`, the arguments of the function that is asked, are proposed in the same way, and listed behind.
+    Names in `also`, the arguments of the function that is asked, are proposed in the same way, and
+    listed behind.
     """
     import difflib
 
     also = tuple(also)
-    known = sorted(str(name) for name in known)  # users write the text of an enumeration's member, not its repr
+    # users write the text of an enumeration's member, not its repr
+    known = sorted(str(name) for name in known)
     asked = name[:LONGEST_NAME]
-    further = difflib.get_close_matches(asked, also, n=3, cutoff=0.7)  # theta is near threads, but is not meant
+    # theta is near threads, but is not meant
+    further = difflib.get_close_matches(asked, also, n=3, cutoff=0.7)
     close = difflib.get_close_matches(asked, [*known, *further], n=3, cutoff=0.6)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
@@ -136,14 +153,21 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
 def _listed(names: Iterable[str]) -> str:
     listed = ", ".join(sorted(names)) or "none"
-    return listed if len(listed) <= LONGEST_LIST else listed[:LONGEST_LIST].rpartition(", ")[0] + ", ..."
+    return (
+        listed
+        if len(listed) <= LONGEST_LIST
+        else listed[:LONGEST_LIST].rpartition(", ")[0] + ", ..."
+    )
 
 
 def shown(value: Any, most: int = 60) -> str:
-    """A value in the form in which a sentence shows it: on one line and not longer than `most` characters."""
+    """A value in the form in which a sentence shows it: on one line and not longer than `most`
+    characters.
+    """
     if isinstance(value, int) and abs(value) >= 10**20:
         return "a very large number"  # Python itself refuses to write some of them
-    value = value[:most] if isinstance(value, (str, bytes, list, tuple)) else value  # the rest would not be seen
+    # the rest would not be seen
+    value = value[:most] if isinstance(value, (str, bytes, list, tuple)) else value
     try:
         text = " ".join(repr(value).split())
     except Exception:  # a user's own class may raise anything
@@ -154,10 +178,16 @@ def shown(value: Any, most: int = 60) -> str:
 def shortened(sentence: str) -> str:
     """A sentence on one line, cut to `LONGEST` characters."""
     line = " ".join(sentence.split())
-    return line if len(line) <= LONGEST else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 + 5 :]}"
+    return (
+        line
+        if len(line) <= LONGEST
+        else f"{line[: LONGEST * 2 // 3]} ... {line[-LONGEST // 3 + 5 :]}"
+    )
 
 
 def printable(text: str, most: int = 400) -> str:
-    """Text from a file, for a terminal: on one line, without control characters, not longer than `most` characters."""
+    """Text from a file, for a terminal: on one line, without control characters, not longer than
+    `most` characters.
+    """
     plain = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text[: most + 1])
     return plain if len(plain) <= most else plain[: most - 3] + "..."

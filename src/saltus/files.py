@@ -1,7 +1,8 @@
 """Files that are complete or not there, and that notice when they are damaged.
 
-Every output is made in memory, written to a file beside its place, brought to the disk and moved there. A netCDF file ends with a
-checksum of all its bytes, after the part that HDF5 reads, so that it is checked before HDF5 opens it.
+Every output is made in memory, written to a file beside its place, brought to the disk and moved
+there. A netCDF file ends with a checksum of all its bytes, after the part that HDF5 reads, so that
+it is checked before HDF5 opens it.
 """
 
 from __future__ import annotations
@@ -23,23 +24,33 @@ from saltus.checks import check_memory
 from saltus.errors import ParameterError, shown
 
 PART = ".part"
-STALE = 60.0  # s; without locks, a half-written file that was not touched for so long is taken as left by a killed run
+# s; without locks, a half-written file that was not touched for so long is taken as left by a
+# killed run
+STALE = 60.0
 COPIES = 2  # the number of copies of a file's bytes that reading it makes
-HEAD, TAIL = b"\nsha256 of the bytes before: ", b" (saltus)\n"  # of the checksum: wiping out 64 bytes leaves one of them
-UNCHECKED = "has no checksum (saltus writes one behind each file), so that damage to its numbers cannot be excluded"
+# of the checksum: wiping out 64 bytes leaves one of them
+HEAD = b"\nsha256 of the bytes before: "
+TAIL = b" (saltus)\n"
+UNCHECKED = (
+    "has no checksum (saltus writes one behind each file), so that damage to its numbers "
+    "cannot be excluded"
+)
 HDF5 = b"\x89HDF\r\n\x1a\n"  # the first bytes of its files
-END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}  # where HDF5's superblock holds the file's length, by its version
+# where HDF5's superblock holds the file's length, by its version
+END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}
 
 
-# --- writing ---------------------------------------------------------------------------------------------------------------
+# --- writing -----------------------------------------------------------------
 
 
 def write_durably(path: Path, content: bytes, flush: bool = True) -> None:
-    """Write a file so that it is either complete or not there, also after a kill or a power failure.
+    """Write a file so that it is either complete or not there, also after a kill or a power
+    failure.
 
-    It is written to a file beside its place, brought to the disk, and moved there; its folder is made as needed. If this fails or
-    is interrupted, `path` is as it was before and nothing is left beside it. Without `flush` the disk is not waited for, which
-    takes some milliseconds: after a power failure the file may then lack its content, which its checksum tells.
+    It is written to a file beside its place, brought to the disk, and moved there; its folder is
+    made as needed. If this fails or is interrupted, `path` is as it was before and nothing is left
+    beside it. Without `flush` the disk is not waited for, which takes some milliseconds: after a
+    power failure the file may then lack its content, which its checksum tells.
 
     Raises
     ------
@@ -65,7 +76,9 @@ def write_durably(path: Path, content: bytes, flush: bool = True) -> None:
 
 
 def write_bytes(path: Path | str, content: bytes) -> Path:
-    """Write `content` to `path` durably, and remove what killed runs left half-written in its folder. Returns `path`."""
+    """Write `content` to `path` durably, and remove what killed runs left half-written in its
+    folder. Returns `path`.
+    """
     path = Path(path)
     write_durably(path, content)
     sweep_up(path.parent.glob(f".*{PART}"))
@@ -78,7 +91,9 @@ def write_text(path: Path | str, text: str) -> Path:
 
 
 def write_dataset(path: Path | str, dataset: Any) -> Path:
-    """Write an xarray Dataset or DataTree to `path` as `write_bytes` does, as netCDF with a checksum at its end."""
+    """Write an xarray Dataset or DataTree to `path` as `write_bytes` does, as netCDF with a
+    checksum at its end.
+    """
     buffer = io.BytesIO()
     dataset.to_netcdf(buffer, engine="h5netcdf")
     return write_bytes(path, sealed(buffer.getvalue()))
@@ -90,9 +105,11 @@ def sealed(content: bytes) -> bytes:
 
 
 def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> list[Path]:
-    """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure; `title` is that of the PDF.
+    """Write a matplotlib Figure as `stem`.png and `stem`.pdf, the same bytes for the same figure;
+    `title` is that of the PDF.
 
-    The PDF has the layout of the PNG, as computing a second layout would take a third of the time of both.
+    The PDF has the layout of the PNG, as computing a second layout would take a third of the time
+    of both.
     """
     png = write_picture(Path(f"{stem}.png"), figure)
     layout = figure.get_layout_engine()
@@ -104,18 +121,25 @@ def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> lis
 
 
 def write_picture(path: Path, figure: Any, title: str | None = None) -> Path:
-    """Write a matplotlib Figure in the format that the suffix of `path` names; `title` is that of a PDF.
+    """Write a matplotlib Figure in the format that the suffix of `path` names; `title` is that of a
+    PDF.
 
     Raises
     ------
     ParameterError
         Matplotlib has no such format.
     """
-    kind, buffer = path.suffix.removeprefix("."), io.BytesIO()
+    kind = path.suffix.removeprefix(".")
+    buffer = io.BytesIO()
     known = figure.canvas.get_supported_filetypes()
     if kind not in known:
-        raise ParameterError(f"{path} must end in .png, .pdf or .svg, for a picture of that format", "path")
-    metadata = {"pdf": {"CreationDate": None, "Title": title}, "svg": {"Date": None, "Title": title}}
+        raise ParameterError(
+            f"{path} must end in .png, .pdf or .svg, for a picture of that format", "path"
+        )
+    metadata = {
+        "pdf": {"CreationDate": None, "Title": title},
+        "svg": {"Date": None, "Title": title},
+    }
     figure.savefig(buffer, format=kind, metadata=metadata.get(kind, {}))
     return write_bytes(path, buffer.getvalue())
 
@@ -130,14 +154,16 @@ def sweep_up(parts: Iterable[Path]) -> None:
 
 
 def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | None:
-    """Lock an open file until it is closed or its process ends; with `wait`, wait for that. Returns whether it is locked, None if
-    the system has no locks."""
+    """Lock an open file until it is closed or its process ends; with `wait`, wait for that. Returns
+    whether it is locked, None if the system has no locks."""
     try:
         import fcntl
     except ImportError:
         return None
     try:
-        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB))
+        fcntl.flock(
+            file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
+        )
     except BlockingIOError:
         return False
     except OSError:
@@ -145,11 +171,12 @@ def lock(file: IO[bytes], shared: bool = False, wait: bool = False) -> bool | No
     return True
 
 
-# --- JSON ------------------------------------------------------------------------------------------------------------------
+# --- JSON --------------------------------------------------------------------
 
 
 def parsed_json(text: str | bytes) -> Any:
-    """The value of a JSON text; keys that are given twice are refused, as the last one would count without a notice.
+    """The value of a JSON text; keys that are given twice are refused, as the last one would count
+    without a notice.
 
     Raises
     ------
@@ -168,11 +195,12 @@ def parsed_json(text: str | bytes) -> Any:
     return json.loads(text, object_pairs_hook=once)
 
 
-# --- reading ---------------------------------------------------------------------------------------------------------------
+# --- reading -----------------------------------------------------------------
 
 
 def read_dataset(path: Path | str) -> Any:
-    """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5 reads it.
+    """The Dataset or DataTree in a netCDF file, in memory; its checksum is compared before HDF5
+    reads it.
 
     A file without a checksum, which another program has written, is `UNCHECKED`.
 
@@ -186,11 +214,14 @@ def read_dataset(path: Path | str) -> Any:
     path = Path(path)
     content = checked_content(path)
     try:
-        with xarray.open_datatree(io.BytesIO(content), engine="h5netcdf", phony_dims="access") as tree:
+        with xarray.open_datatree(
+            io.BytesIO(content), engine="h5netcdf", phony_dims="access"
+        ) as tree:
             variables = [variable for node in tree.subtree for variable in node.variables.values()]
             size = float(sum(variable.nbytes for variable in variables))
             check_memory(str(path), size, "its arrays")  # these may be larger than the file
-            for variable in variables:  # not `tree.load()`, which leaves one lazy that has the name of a child of the root
+            # not `tree.load()`, which leaves one lazy that has the name of a child of the root
+            for variable in variables:
                 variable.load()
     except ParameterError:
         raise
@@ -200,13 +231,16 @@ def read_dataset(path: Path | str) -> Any:
         said = next(iter(str(error).splitlines()), "") or type(error).__name__
         raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
     for node in tree.subtree:
-        node.set_close(None)  # the file is closed, and a handle to it need not be sent to other processes
+        # the file is closed, and a handle to it need not be sent to other processes
+        node.set_close(None)
     return tree if tree.children else tree.to_dataset()
 
 
 @contextlib.contextmanager
 def _without_unraisable() -> Iterator[None]:
-    """Suppress errors of objects that are deleted: a file that h5netcdf has opened only in part prints a traceback then."""
+    """Suppress errors of objects that are deleted: a file that h5netcdf has opened only in part
+    prints a traceback then.
+    """
     hook = sys.unraisablehook
     sys.unraisablehook = lambda lost: None
     try:
@@ -226,19 +260,34 @@ def checked_content(path: Path) -> bytes:
     try:
         if path.exists() and not path.is_file():  # reading a device or a pipe may never end
             raise ParameterError(f"{path} is no file that can be read")
-        check_memory(str(path), COPIES * path.stat().st_size, "its bytes")  # a sparse file may have any size
+        # a sparse file may have any size
+        check_memory(str(path), COPIES * path.stat().st_size, "its bytes")
         content = path.read_bytes()
     except OSError as error:
-        raise ParameterError(f"{path} cannot be read ({(error.strerror or str(error)).lower()})") from error
+        raise ParameterError(
+            f"{path} cannot be read ({(error.strerror or str(error)).lower()})"
+        ) from error
     if not has_checksum(content):
-        place = END_OF_FILE.get(content[8]) if content.startswith(HDF5) and len(content) > 52 else None
-        end = len(content) if place is None else int.from_bytes(content[place : place + 8], "little")
+        place = (
+            END_OF_FILE.get(content[8]) if content.startswith(HDF5) and len(content) > 52 else None
+        )
+        end = (
+            len(content) if place is None else int.from_bytes(content[place : place + 8], "little")
+        )
         if end != len(content):
-            raise ParameterError(f"{path} is damaged: it has {len(content)} bytes, and its data end at {end}; compute it again")
+            raise ParameterError(
+                f"{path} is damaged: it has {len(content)} bytes, and its data end at {end}; "
+                "compute it again"
+            )
         return content
-    head, middle, tail = content[:-_END], content[-_END : -len(TAIL)], content[-len(TAIL) :]
+    head = content[:-_END]
+    middle = content[-_END : -len(TAIL)]
+    tail = content[-len(TAIL) :]
     if middle != HEAD + _digest(head) or tail != TAIL:
-        raise ParameterError(f"{path} is damaged: its checksum is not that of its bytes; compute it again, or take a copy of it")
+        raise ParameterError(
+            f"{path} is damaged: its checksum is not that of its bytes; compute it again, or "
+            "take a copy of it"
+        )
     return head
 
 
@@ -255,11 +304,12 @@ def _digest(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest().encode()
 
 
-# --- folders ---------------------------------------------------------------------------------------------------------------
+# --- folders -----------------------------------------------------------------
 
 
 def check_writable(folder: Path | str) -> None:
-    """Refuse, before anything is computed, a folder in which no file can be made; nothing is left behind.
+    """Refuse, before anything is computed, a folder in which no file can be made; nothing is left
+    behind.
 
     Raises
     ------
@@ -272,7 +322,10 @@ def check_writable(folder: Path | str) -> None:
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
         if not existing.is_dir():
-            raise ParameterError(f"the output folder {folder} cannot be made: {existing} is a file; name another with --output")
+            raise ParameterError(
+                f"the output folder {folder} cannot be made: {existing} is a file; name another "
+                "with --output"
+            )
         with tempfile.TemporaryFile(dir=existing):
             pass
     except (OSError, ValueError) as error:
@@ -280,5 +333,6 @@ def check_writable(folder: Path | str) -> None:
             raise
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ParameterError(
-            f"the output folder {folder} cannot be written to ({reason.lower()}); name another with --output"
+            f"the output folder {folder} cannot be written to ({reason.lower()}); name another "
+            "with --output"
         ) from error

@@ -1,7 +1,7 @@
 """The progress of work: every function that takes a while calls `progress(fraction, what)`.
 
-`fraction` of the work is done, from 0 to 1, and `what` names in a few words what is being done. The first call comes when all
-arguments have been checked and computing begins.
+`fraction` of the work is done, from 0 to 1, and `what` names in a few words what is being done. The
+first call comes when all arguments have been checked and computing begins.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of o
 
 
 class LineBelowCell:
-    """One line below the cell of a notebook, which is written over as work goes on, as also in a notebook that is executed."""
+    """One line below the cell of a notebook, which is written over as work goes on, as also in a
+    notebook that is executed.
+    """
 
     def __init__(self) -> None:
         self._handle: Any = None
@@ -33,8 +35,12 @@ class LineBelowCell:
         shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
         if not hasattr(shell, "kernel"):
             return False
-        notebook, done = sys.modules["IPython"].display, fraction >= 1.0
-        line = f"<progress value='{fraction:.4f}' max='1'></progress> {100 * fraction:3.0f} % {html.escape(what)}"
+        notebook = sys.modules["IPython"].display
+        done = fraction >= 1.0
+        line = (
+            f"<progress value='{fraction:.4f}' max='1'></progress> {100 * fraction:3.0f} % "
+            f"{html.escape(what)}"
+        )
         if self._handle is None:
             self._handle = notebook.display(notebook.HTML(line), display_id=True)
         else:
@@ -48,7 +54,8 @@ def show_below_cell(figure: Any) -> None:
     """In a notebook, show a figure below the cell that makes it; elsewhere do nothing."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if hasattr(shell, "kernel"):
-        picture, notebook = io.BytesIO(), sys.modules["IPython"].display
+        picture = io.BytesIO()
+        notebook = sys.modules["IPython"].display
         figure.savefig(picture, format="png", dpi=110)
         notebook.display(notebook.Image(picture.getvalue()))
 
@@ -61,7 +68,8 @@ def silent(fraction: float, what: str) -> None:
 
 
 def show_progress(fraction: float, what: str) -> None:
-    """The progress of work in one line on stderr, or of a notebook below the cell, written over itself: `progress=show_progress`.
+    """The progress of work in one line on stderr, or of a notebook below the cell, written over
+    itself: `progress=show_progress`.
 
     Parameters
     ----------
@@ -80,14 +88,20 @@ def show_progress(fraction: float, what: str) -> None:
         return
     bar = "#" * round(20 * min(max(fraction, 0.0), 1.0))
     done = fraction >= 1.0
-    print(f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}", end="\n" if done else "", file=sys.stderr, flush=True)
+    print(
+        f"\r[{bar:<20}] {100 * fraction:3.0f} % {what:<40.40}",
+        end="\n" if done else "",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 class FractionMemory:
     """A progress that remembers the fraction, for parts of the work that know nothing of the whole."""
 
     def __init__(self, progress: Progress) -> None:
-        self.progress, self.fraction = progress, 0.0
+        self.progress = progress
+        self.fraction = 0.0
 
     def __call__(self, fraction: float, what: str) -> object:
         self.fraction = fraction
@@ -99,7 +113,9 @@ _watch: ContextVar[FractionMemory | None] = ContextVar("watch", default=None)
 
 @contextmanager
 def watched(progress: Progress) -> Iterator[FractionMemory]:
-    """While work goes on, `say` tells this progress; work is given the one that is returned in its place."""
+    """While work goes on, `say` tells this progress; work is given the one that is returned in its
+    place.
+    """
     watch = FractionMemory(progress)
     token = _watch.set(watch)
     try:
@@ -109,14 +125,17 @@ def watched(progress: Progress) -> Iterator[FractionMemory]:
 
 
 def say(what: str) -> None:
-    """Tell whoever watches the work of this thread what takes a while now, such as compiling, whichever function asked for it."""
+    """Tell whoever watches the work of this thread what takes a while now, such as compiling,
+    whichever function asked for it.
+    """
     watch = _watch.get()
     if watch is not None:
         watch.progress(watch.fraction, what)
 
 
 def part_of(progress: Progress, begin: float, end: float, what: str | None = None) -> Progress:
-    """The progress of a part of the work, during which the fraction of the whole work grows from `begin` to `end`.
+    """The progress of a part of the work, during which the fraction of the whole work grows from
+    `begin` to `end`.
 
     `what`, if it is given, replaces the names that the part gives to its own steps.
     """
@@ -128,7 +147,9 @@ def part_of(progress: Progress, begin: float, end: float, what: str | None = Non
 
 
 def growing(progress: Progress) -> Progress:
-    """A progress whose fraction never falls, for work of which some parts turn out to be longer than expected."""
+    """A progress whose fraction never falls, for work of which some parts turn out to be longer
+    than expected.
+    """
     most = 0.0
 
     def show(fraction: float, step: str) -> object:
@@ -139,7 +160,7 @@ def growing(progress: Progress) -> Progress:
     return show
 
 
-# --- tables in a notebook: HTML in which every text is escaped ------------------------------------------------------------
+# --- tables in a notebook: HTML in which every text is escaped ---------------
 
 MOST_ROWS = 40  # the most rows of a table; further ones are only counted
 CELL = "style='text-align:left;padding:1px 10px 1px 0;vertical-align:top'"
@@ -147,8 +168,15 @@ CELL = "style='text-align:left;padding:1px 10px 1px 0;vertical-align:top'"
 
 def html_table(title: str, facts: Mapping[str, Any]) -> str:
     """A table with a row for each fact; floats with 9 digits."""
-    rows = [f"<tr><th {CELL}>{_text(name)}</th><td {CELL}>{_text(value)}</td></tr>" for name, value in facts.items()]
-    more = f"<tr><td {CELL} colspan='2'>and {len(rows) - MOST_ROWS} more</td></tr>" if len(rows) > MOST_ROWS else ""
+    rows = [
+        f"<tr><th {CELL}>{_text(name)}</th><td {CELL}>{_text(value)}</td></tr>"
+        for name, value in facts.items()
+    ]
+    more = (
+        f"<tr><td {CELL} colspan='2'>and {len(rows) - MOST_ROWS} more</td></tr>"
+        if len(rows) > MOST_ROWS
+        else ""
+    )
     return f"<div><strong>{_text(title)}</strong><table>{''.join(rows[:MOST_ROWS])}{more}</table></div>"
 
 
@@ -157,10 +185,16 @@ def rows_table(columns: Mapping[str, Any]) -> str:
     count = max((len(values) for values in columns.values()), default=0)
     head = "".join(f"<th {CELL}>{_text(name)}</th>" for name in columns)
     rows = [
-        "<tr>" + "".join(f"<td {CELL}>{_text(_plain(values[i]))}</td>" for values in columns.values()) + "</tr>"
+        "<tr>"
+        + "".join(f"<td {CELL}>{_text(_plain(values[i]))}</td>" for values in columns.values())
+        + "</tr>"
         for i in range(min(count, MOST_ROWS))
     ]
-    more = f"<tr><td {CELL} colspan='{len(columns)}'>and {count - MOST_ROWS} more</td></tr>" if count > MOST_ROWS else ""
+    more = (
+        f"<tr><td {CELL} colspan='{len(columns)}'>and {count - MOST_ROWS} more</td></tr>"
+        if count > MOST_ROWS
+        else ""
+    )
     return f"<div><table><tr>{head}</tr>{''.join(rows)}{more}</table></div>"
 
 

@@ -1,5 +1,5 @@
-"""The base class of all results: a dataset, from which pictures, files and tables are made, whose attributes say where it comes
-from, and the facts of which a notebook shows."""
+"""The base class of all results: a dataset, from which pictures, files and tables are made, whose
+attributes say where it comes from, and the facts of which a notebook shows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ MOST_ENTRIES = 6  # the most entries of an array that is shown in a table
 
 
 class Result:
-    """The result of a public function: `to_xarray` gives its dataset, which `saltus.plot` draws and `saltus.to_mat` writes."""
+    """The result of a public function: `to_xarray` gives its dataset, which `saltus.plot` draws and
+    `saltus.to_mat` writes.
+    """
 
     def to_xarray(self) -> Any:
         """The result as a Dataset or a DataTree, whose attribute `kind` says which result it is."""
@@ -37,7 +39,8 @@ class Result:
         return table_of(self.to_xarray())
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the table as comma-separated text, every number with all of its digits; returns the path.
+        """Write the table as comma-separated text, every number with all of its digits; returns the
+        path.
 
         Parameters
         ----------
@@ -54,69 +57,108 @@ class Result:
 
     def _facts(self) -> dict[str, Any]:
         """The fields that are numbers, words or short arrays."""
-        fields: dict[str, Any] = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # type: ignore[arg-type]
+        fields: dict[str, Any] = {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)  # type: ignore[arg-type]
+        }
         return {
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items() if _is_short(value)
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in fields.items()
+            if _is_short(value)
         }
 
 
 def result_dataset(
-    kind: str, columns: Mapping[str, tuple[Any, ...]], coords: Any = None, system: System | None = None, **facts: Any
+    kind: str,
+    columns: Mapping[str, tuple[Any, ...]],
+    coords: Any = None,
+    system: System | None = None,
+    **facts: Any,
 ) -> xarray.Dataset:
-    """A Dataset of a `kind` with its provenance; `columns` are dimensions, values, unit and name in words of each variable."""
+    """A Dataset of a `kind` with its provenance; `columns` are dimensions, values, unit and name in
+    words of each variable.
+    """
     import xarray
 
     variables = {
         name: (dims, np.asarray(values), {"units": unit, "long_name": text})
         for name, (dims, values, unit, text) in columns.items()
     }
-    known = {"title": f"{kind.replace('_', ' ')} computed by saltus", "kind": kind} | provenance(system, **facts)
+    known = {"title": f"{kind.replace('_', ' ')} computed by saltus", "kind": kind} | provenance(
+        system, **facts
+    )
     return xarray.Dataset(variables, coords, known | {"Conventions": "CF-1.8"})
 
 
-# Results whose motions or cells lie on a grid, a row of the table being one of them, and the variable that is given over all of
-# the grid; of those without a name it is the first one.
+# Results whose motions or cells lie on a grid, a row of the table being one of them, and the
+# variable that is given over all of the grid; of those without a name it is the first one.
 ON_GRIDS = {
-    **dict.fromkeys(("ensemble", "overturning_spectrum", "stability_chart", "phase_portrait", "fragility"), ""),
+    **dict.fromkeys(
+        ("ensemble", "overturning_spectrum", "stability_chart", "phase_portrait", "fragility"), ""
+    ),
     "basins": "label",
     "frequency_sweep": "amplitude",
     "attractors along a parameter": "",
 }
 MAPPED = "mapped"  # the kind of what `map_over` gives, whose grid has the names that the user chose
-FIRST_PARTS = ("points", "chart", "cells")  # of a tree, which its table shows unless another one is asked for
+# of a tree, which its table shows unless another one is asked for
+FIRST_PARTS = ("points", "chart", "cells")
 
 
 def table_of(data: Any, table: str | None = None) -> pandas.DataFrame:
-    """A table of a Dataset or a DataTree: long, a row for each thing of one kind, and never a product of unrelated dimensions.
+    """A table of a Dataset or a DataTree: long, a row for each thing of one kind, and never a
+    product of unrelated dimensions.
 
-    A Dataset has a table for each of its dimensions, and for each of its variables over all dimensions of it; the first is that
-    of its first variable, or of the whole grid of an ensemble, with a column for each of its axes. A variable with one more
-    dimension has a column for each of its entries, named `variable_entry`. A DataTree has the tables of its parts, `points`
-    first if it has them. Single values have one row.
+    A Dataset has a table for each of its dimensions, and for each of its variables over all
+    dimensions of it; the first is that of its first variable, or of the whole grid of an ensemble,
+    with a column for each of its axes. A variable with one more dimension has a column for each of
+    its entries, named `variable_entry`. A DataTree has the tables of its parts, `points` first if
+    it has them. Single values have one row.
     """
     if getattr(data, "children", None):
-        parts = {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree if node.data_vars}
-        full = [name for name, part in parts.items() if any(variable.size for variable in part.data_vars.values())]
-        first = next((name for name in (*FIRST_PARTS, *full) if name in full), next(iter(parts), ""))
+        parts = {
+            node.path.strip("/"): node.to_dataset(inherit=False)
+            for node in data.subtree
+            if node.data_vars
+        }
+        full = [
+            name
+            for name, part in parts.items()
+            if any(variable.size for variable in part.data_vars.values())
+        ]
+        first = next(
+            (name for name in (*FIRST_PARTS, *full) if name in full), next(iter(parts), "")
+        )
         name, _, dim = (first if table is None else table).partition(".")
         if name not in parts:
-            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), parts)}", "table")
+            raise ParameterError(
+                f"there is no table {shown(table)}; {near(str(table), parts)}", "table"
+            )
         return table_of(parts[name], dim or None)
     over = _rows_of(data, table)
-    return _long_table(data, over) if len(over) > 1 else _wide_table(data, over[0] if over else None)
+    return (
+        _long_table(data, over) if len(over) > 1 else _wide_table(data, over[0] if over else None)
+    )
 
 
 def _rows_of(data: Any, table: str | None) -> tuple[str, ...]:
     """The dimensions whose entries are the rows of a table."""
-    variables = {str(name): tuple(map(str, variable.dims)) for name, variable in data.data_vars.items() if variable.dims}
-    first, kind = next(iter(variables.values()), ()), str(data.attrs.get("kind", ""))
+    variables = {
+        str(name): tuple(map(str, variable.dims))
+        for name, variable in data.data_vars.items()
+        if variable.dims
+    }
+    first = next(iter(variables.values()), ())
+    kind = str(data.attrs.get("kind", ""))
     known = dict.fromkeys(dims[0] for dims in variables.values())
     if table in known:
         return (str(table),)
     if table is not None:
         if table not in variables:
             also = [*known, *(name for name, dims in variables.items() if len(dims) > 1)]
-            raise ParameterError(f"there is no table {shown(table)}; {near(str(table), also)}", "table")
+            raise ParameterError(
+                f"there is no table {shown(table)}; {near(str(table), also)}", "table"
+            )
         return variables[table]
     if kind == MAPPED:
         axes = tuple(dim for dim in first if dim in data.coords)
@@ -125,21 +167,33 @@ def _rows_of(data: Any, table: str | None) -> tuple[str, ...]:
 
 
 def _long_table(data: Any, over: tuple[str, ...]) -> pandas.DataFrame:
-    """A row for each cell of a grid; variables with further dimensions, such as samples over time, are left out.
+    """A row for each cell of a grid; variables with further dimensions, such as samples over time,
+    are left out.
 
-    Arrays that a function of the user's own gives at each point of its grid have a column for each of their entries.
+    Arrays that a function of the user's own gives at each point of its grid have a column for each
+    of their entries.
     """
     import pandas
 
     shape = tuple(data.sizes[dim] for dim in over)
     places = np.indices(shape).reshape(len(over), -1)
-    columns: dict[str, Any] = {dim: data[dim].values[at] for dim, at in zip(over, places, strict=True)}
+    columns: dict[str, Any] = {
+        dim: data[dim].values[at] for dim, at in zip(over, places, strict=True)
+    }
     for name, variable in data.variables.items():
         further = [dim for dim in variable.dims if dim not in over]
         if name not in columns and not further:
             at = tuple(places[over.index(str(dim))] for dim in variable.dims)
-            columns[str(name)] = _in_words(variable)[at] if variable.dims else np.full(places.shape[1], variable.values)
-        elif data.attrs.get("kind") == MAPPED and len(further) == 1 and set(over) < set(variable.dims):
+            columns[str(name)] = (
+                _in_words(variable)[at]
+                if variable.dims
+                else np.full(places.shape[1], variable.values)
+            )
+        elif (
+            data.attrs.get("kind") == MAPPED
+            and len(further) == 1
+            and set(over) < set(variable.dims)
+        ):
             entries = variable.transpose(*over, ...).values.reshape(places.shape[1], -1).T
             columns |= {f"{name}_{entry}": column for entry, column in enumerate(entries)}
     return pandas.DataFrame(columns)
@@ -158,16 +212,25 @@ def _wide_table(data: Any, over: str | None) -> pandas.DataFrame:
         elif over in variable.dims and variable.ndim == 2:
             spread = variable.transpose(over, ...)
             entries = spread[spread.dims[1]].values.tolist()
-            columns |= {f"{name}_{entry}": column for entry, column in zip(entries, spread.values.T, strict=True)}
+            columns |= {
+                f"{name}_{entry}": column
+                for entry, column in zip(entries, spread.values.T, strict=True)
+            }
     index = None if over is None else pandas.Index(data[over].values, name=str(over))
     return pandas.DataFrame(columns, index=index)
 
 
 def _in_words(variable: Any) -> np.ndarray:
     """The values of a variable, numbers that stand for words as these."""
-    words, values = str(variable.attrs.get("flag_meanings", "")).split(), np.asarray(variable.values)
+    words = str(variable.attrs.get("flag_meanings", "")).split()
+    values = np.asarray(variable.values)
     numbers = variable.attrs.get("flag_values", range(len(words)))
-    if not words or "flag_masks" in variable.attrs or not values.size or list(numbers) != list(range(len(words))):
+    if (
+        not words
+        or "flag_masks" in variable.attrs
+        or not values.size
+        or list(numbers) != list(range(len(words)))
+    ):
         return values
     return np.array(words)[values] if values.min() >= 0 and values.max() < len(words) else values
 
@@ -178,16 +241,19 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
     Parameters
     ----------
     result
-        A result, such as a branch, or a Dataset or a DataTree that saltus has made, such as an ensemble or a diagram.
+        A result, such as a branch, or a Dataset or a DataTree that saltus has made, such as an
+        ensemble or a diagram.
     table
-        Which of its tables: the name of a dimension, such as "special" of a branch or "jump" of a sweep, of a variable, whose
-        table has a row for each of its numbers, or of a part of a tree, such as "special" or "bands" of a diagram. By default
-        that of its points, of all motions of an ensemble, or of all cells of basins or of a grid of one's own.
+        Which of its tables: the name of a dimension, such as "special" of a branch or "jump" of a
+        sweep, of a variable, whose table has a row for each of its numbers, or of a part of a tree,
+        such as "special" or "bands" of a diagram. By default that of its points, of all motions of
+        an ensemble, or of all cells of basins or of a grid of one's own.
 
     Raises
     ------
     ParameterError
-        Something that is no result, or a table that it does not have; the error names those that it has.
+        Something that is no result, or a table that it does not have; the error names those that it
+        has.
 
     Examples
     --------
@@ -198,15 +264,21 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
     ['LP']
     """
     if hasattr(result, "to_pandas") and not hasattr(result, "data_vars"):
-        made: pandas.DataFrame = result.to_pandas() if table is None else table_of(result.to_xarray(), table)
+        made: pandas.DataFrame = (
+            result.to_pandas() if table is None else table_of(result.to_xarray(), table)
+        )
         return made
     if not (hasattr(result, "data_vars") and hasattr(result, "attrs")):
-        raise ParameterError(f"result must be a Dataset, a DataTree or what has to_pandas, got {shown(result)}", "result")
+        raise ParameterError(
+            f"result must be a Dataset, a DataTree or what has to_pandas, got {shown(result)}",
+            "result",
+        )
     return table_of(result, table)
 
 
 def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
-    """Write a table of any result as comma-separated text, every number with all of its digits; returns the path.
+    """Write a table of any result as comma-separated text, every number with all of its digits;
+    returns the path.
 
     Parameters
     ----------
@@ -228,7 +300,9 @@ def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
     from saltus.files import write_text
 
     if not isinstance(path, (str, Path)):
-        raise ParameterError(f"the path comes first, to_csv(path, result); got {shown(path)}", "path")
+        raise ParameterError(
+            f"the path comes first, to_csv(path, result); got {shown(path)}", "path"
+        )
     return write_text(path, to_pandas(result, table).to_csv(lineterminator="\n"))
 
 
@@ -265,26 +339,35 @@ def _is_short(value: Any) -> bool:
     return value is None or isinstance(value, (int, float, str, Enum))
 
 
-# Raised whenever the same request gives other numbers than before: results of another version are refused and not continued.
+# Raised whenever the same request gives other numbers than before: results of another version are
+# refused and not continued.
 RESULT_VERSION = 14
 
 
-def provenance(system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any) -> dict[str, Any]:
-    """The attributes `saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol` and `seed`, as far as they are
-    given, and further ones.
+def provenance(
+    system: System | None = None, *, tol: float | None = None, seed: int | None = None, **more: Any
+) -> dict[str, Any]:
+    """The attributes `saltus_version`, `result_version`, `system` and `equations` (as JSON), `tol`
+    and `seed`, as far as they are given, and further ones.
 
-    The system's JSON has its numbers, and `equations` a digest of each part of its equations (`saltus.taylor.equations_of`).
+    The system's JSON has its numbers, and `equations` a digest of each part of its equations
+    (`saltus.taylor.equations_of`).
     """
     from saltus import __version__
 
     kept: dict[str, Any] = {"saltus_version": __version__, "result_version": RESULT_VERSION}
     if system is not None:
         kept |= {"system": system.to_json()} | identity(system)
-    return kept | {name: value for name, value in (("tol", tol), ("seed", seed)) if value is not None} | more
+    return (
+        kept
+        | {name: value for name, value in (("tol", tol), ("seed", seed)) if value is not None}
+        | more
+    )
 
 
 def identity(system: System) -> dict[str, Any]:
-    """The attributes that `check_provenance` compares, `result_version` and `equations`, for parts that are computed elsewhere.
+    """The attributes that `check_provenance` compares, `result_version` and `equations`, for parts
+    that are computed elsewhere.
 
     Raises
     ------
@@ -296,8 +379,11 @@ def identity(system: System) -> dict[str, Any]:
     return {"result_version": RESULT_VERSION, "equations": json.dumps(equations_of(system))}
 
 
-def check_provenance(attributes: Mapping[str, Any], system: System, what: str, remedy: str = "compute it again") -> None:
-    """Refuse a result, `what`, whose attributes are not those of this system and of this version of saltus.
+def check_provenance(
+    attributes: Mapping[str, Any], system: System, what: str, remedy: str = "compute it again"
+) -> None:
+    """Refuse a result, `what`, whose attributes are not those of this system and of this version of
+    saltus.
 
     Raises
     ------
@@ -310,10 +396,18 @@ def check_provenance(attributes: Mapping[str, Any], system: System, what: str, r
 
 
 def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]:
-    version, name = attributes.get("result_version"), type(system.model).__name__
+    version = attributes.get("result_version")
+    name = type(system.model).__name__
     if version != RESULT_VERSION:
-        by = f"saltus {attributes['saltus_version']}" if "saltus_version" in attributes else "another saltus"
-        yield f"it is by {by}, whose results are of version {version if version is not None else 1}, and here of {RESULT_VERSION}"
+        by = (
+            f"saltus {attributes['saltus_version']}"
+            if "saltus_version" in attributes
+            else "another saltus"
+        )
+        yield (
+            f"it is by {by}, whose results are of version "
+            f"{version if version is not None else 1}, and here of {RESULT_VERSION}"
+        )
         return
     try:
         there = dict(parsed_json(attributes["equations"]))
@@ -323,4 +417,7 @@ def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]
     here = json.loads(identity(system)["equations"])
     changed = [part for part in here if here[part] != there.get(part)]
     if changed:
-        yield f"the {' and the '.join(changed)} of {name} {'has' if len(changed) == 1 else 'have'} changed since"
+        yield (
+            f"the {' and the '.join(changed)} of {name} "
+            f"{'has' if len(changed) == 1 else 'have'} changed since"
+        )

@@ -17,7 +17,9 @@ def test_births_and_deaths_bracket_the_folds_and_the_jump_changes_the_identity()
     found = attractors_along(forced(), "load.frequency", np.linspace(0.83, 0.93, 11), starts=32)
     events = list(zip(found["event_kind"].values, found["event_label"].values, strict=True))
     assert events == [("birth", 2), ("death", 1)]
-    for fold, before, after in zip(FOLDS, found["event_before"].values, found["event_after"].values, strict=True):
+    for fold, before, after in zip(
+        FOLDS, found["event_before"].values, found["event_after"].values, strict=True
+    ):
         assert before < fold < after
     lower = found["amplitude"].sel(attractor=2).values
     assert np.isfinite(lower).sum() == 9
@@ -29,7 +31,13 @@ def test_births_and_deaths_bracket_the_folds_and_the_jump_changes_the_identity()
 def test_rest_is_always_0_and_goes_with_the_load_that_releases_it() -> None:
     values = [ONSET - 2e-3, ONSET + 2e-3, 0.05, HELD - 2e-3, HELD + 2e-3]
     found = attractors_along(forced(), "load.horizontal.amplitude", values, starts=96)
-    assert np.isfinite(found["fraction"].sel(attractor=0).values).tolist() == [True, True, True, True, False]
+    assert np.isfinite(found["fraction"].sel(attractor=0).values).tolist() == [
+        True,
+        True,
+        True,
+        True,
+        False,
+    ]
     assert found["kind"].sel(attractor=0).values.tolist() == ["rest"] * 4 + [""]
     motion = found["fraction"].sel(attractor=1).values
     assert np.isfinite(motion).tolist() == [False, True, True, True, True]
@@ -41,9 +49,12 @@ def test_an_attractor_without_starts_of_its_own_is_carried_along() -> None:
     values = [0.80, 0.83, 0.86, 0.88, 0.90]
     alone = attractors_along(system, "load.frequency", values, starts=1, seed=4)
     amplitude = alone["amplitude"].sel(attractor=1).values
-    branch = saltus.continue_orbit(saltus.find_orbit(forced(W=0.8), theta=0.3), "load.frequency", (0.7, 0.92))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(forced(W=0.8), theta=0.3), "load.frequency", (0.7, 0.92)
+    )
     upper = [max(orbit.amplitude for orbit in branch.at(value) if orbit.stable) for value in values]
-    assert amplitude == pytest.approx(upper, rel=1e-9)  # the large motion is followed past the birth of the small one
+    # the large motion is followed past the birth of the small one
+    assert amplitude == pytest.approx(upper, rel=1e-9)
 
 
 def test_a_doubling_changes_the_period_where_the_closed_form_says_and_not_the_identity() -> None:
@@ -58,7 +69,9 @@ def test_a_doubling_changes_the_period_where_the_closed_form_says_and_not_the_id
 
 
 def test_mirror_images_are_not_exchanged() -> None:
-    found = attractors_along(forced(0.2, V=-1.6), "load.horizontal.amplitude", np.linspace(0.2, 0.32, 4), starts=24)
+    found = attractors_along(
+        forced(0.2, V=-1.6), "load.horizontal.amplitude", np.linspace(0.2, 0.32, 4), starts=24
+    )
     assert found["event_kind"].size == 0
     assert (found["largest_theta"].sel(attractor=1).values > 1.0).all()
     assert (found["smallest_theta"].sel(attractor=2).values < -1.0).all()

@@ -38,7 +38,8 @@ def test_error_bars_cover_the_true_mean_of_correlated_series_as_often_as_they_sa
         series[j] = memory * series[j - 1] + noise[j]
     bars, covered = uncertainty(series), np.abs(average(series)) < uncertainty(series)
     assert covered.mean() > 0.92
-    # and not by being endless: the standard error of the plain mean is (1 / (1 - memory)) / sqrt(count)
+    # and not by being endless: the standard error of the plain mean is (1 / (1 - memory)) /
+    # sqrt(count)
     assert np.median(bars) < 5 * (1 / (1 - memory)) / np.sqrt(count)
 
 

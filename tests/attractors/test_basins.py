@@ -1,4 +1,6 @@
-"""Basins on a grid: the labels and times that single simulations give, new attractors, blocks, and the picture."""
+"""Basins on a grid: the labels and times that single simulations give, new attractors, blocks, and
+the picture.
+"""
 
 import json
 from dataclasses import replace
@@ -32,7 +34,9 @@ def picture(found: Attractors) -> xarray.Dataset:
     return basins_of_attraction(SYSTEM, theta=THETA, velocity=VELOCITY, found=found)
 
 
-def test_labels_and_times_are_those_of_single_simulations(found: Attractors, picture: xarray.Dataset) -> None:
+def test_labels_and_times_are_those_of_single_simulations(
+    found: Attractors, picture: xarray.Dataset
+) -> None:
     rng = np.random.default_rng(0)
     for i, j in zip(rng.integers(0, 11, 12), rng.integers(0, 13, 12), strict=True):
         path = strobes(SYSTEM, np.array([THETA[j], VELOCITY[i]]), 90)
@@ -44,7 +48,10 @@ def test_labels_and_times_are_those_of_single_simulations(found: Attractors, pic
 
 def test_the_shares_are_those_of_the_cells(picture: xarray.Dataset) -> None:
     for label in (1, 2):
-        assert float(picture["cells"].sel(attractor=label)) == (picture["label"].values == label).mean()
+        assert (
+            float(picture["cells"].sel(attractor=label))
+            == (picture["label"].values == label).mean()
+        )
     assert picture.attrs["undecided"] == 0.0
 
 
@@ -55,7 +62,9 @@ def test_sampled_fractions_agree_with_the_area() -> None:
     assert abs(float(area) - sampled.fraction) < 3.0 * sampled.error
 
 
-def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: Attractors, picture: xarray.Dataset) -> None:
+def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(
+    found: Attractors, picture: xarray.Dataset
+) -> None:
     less = replace(found, members=found.members[1:])
     again = basins_of_attraction(SYSTEM, theta=THETA, velocity=VELOCITY, found=less)
     assert again["attractor"].values.tolist() == [2, 3]
@@ -65,9 +74,16 @@ def test_an_attractor_that_was_not_known_gets_a_label_after_the_others(found: At
 
 
 def test_a_second_state_of_rest_has_a_label_of_its_own() -> None:
-    """As models with several contacts may have several; the first one has the label of rest, whatever else is known."""
+    """As models with several contacts may have several; the first one has the label of rest,
+    whatever else is known.
+    """
     (rest,) = (member for member in find_attractors(steady(-0.5), starts=8) if member.label == 0)
-    assert [_relabelled([rest], known)[0].label for known in ([], [1, 2], [0], [0, 1])] == [0, 0, 1, 2]
+    assert [_relabelled([rest], known)[0].label for known in ([], [1, 2], [0], [0, 1])] == [
+        0,
+        0,
+        1,
+        2,
+    ]
 
 
 def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:
@@ -77,9 +93,15 @@ def test_a_cell_on_an_attractor_has_reached_it(found: Attractors) -> None:
     assert float(here["time"][0, 0]) == 0.0
 
 
-def test_blocks_with_plain_arguments_give_the_whole(found: Attractors, picture: xarray.Dataset) -> None:
+def test_blocks_with_plain_arguments_give_the_whole(
+    found: Attractors, picture: xarray.Dataset
+) -> None:
     plane = Grid(("theta", "velocity"), THETA, VELOCITY, {"theta": 0.0, "velocity": 0.0})
-    arguments = json.loads(json.dumps(cell_arguments(SYSTEM, Labelling(SYSTEM, found.targets, 500, 1e-2, 1e-11), plane)))
+    arguments = json.loads(
+        json.dumps(
+            cell_arguments(SYSTEM, Labelling(SYSTEM, found.targets, 500, 1e-2, 1e-11), plane)
+        )
+    )
     for rows in (slice(0, 4), slice(4, 11)):
         block = cells(arguments, {"velocity": VELOCITY[rows].tolist(), "theta": THETA.tolist()})
         assert np.array_equal(block["label"], picture["label"].values[rows])
@@ -94,7 +116,9 @@ def test_captured_cells_are_at_rest_at_a_time_of_their_own() -> None:
 
 
 def test_too_few_periods_leave_cells_undecided_and_say_so(found: Attractors) -> None:
-    picture = basins_of_attraction(SYSTEM, theta=THETA[:2], velocity=VELOCITY[:2], found=found, periods=32)
+    picture = basins_of_attraction(
+        SYSTEM, theta=THETA[:2], velocity=VELOCITY[:2], found=found, periods=32
+    )
     assert (picture["label"].values == -1).all()
     assert np.isnan(picture["time"].values).all()
     assert picture.attrs["undecided"] == 1.0
@@ -112,7 +136,10 @@ def test_the_basins_of_mirrored_equilibria_are_mirror_images() -> None:
 def test_a_grid_of_its_own_keeps_to_the_side_of_the_wall() -> None:
     system = walled()
     picture = basins_of_attraction(
-        system, found=find_attractors(system, starts=8, window=((0.5, 1.5), (-0.5, 0.5))), velocity=[0.0], x=None
+        system,
+        found=find_attractors(system, starts=8, window=((0.5, 1.5), (-0.5, 0.5))),
+        velocity=[0.0],
+        x=None,
     )
     assert picture["x"].values.max() <= 1.0
     assert (picture["label"].values == 1).all()
@@ -156,12 +183,15 @@ def test_the_picture_shows_each_basin_in_its_own_lightness(picture: xarray.Datas
     (ax,) = figure.axes
     mesh = ax.collections[0]
     shown = np.unique(np.asarray(mesh.get_array()).ravel())
-    greys = [float(np.dot(mpl.colors.to_rgb(mesh.cmap(int(n))), (0.2126, 0.7152, 0.0722))) for n in shown]
+    greys = [
+        float(np.dot(mpl.colors.to_rgb(mesh.cmap(int(n))), (0.2126, 0.7152, 0.0722))) for n in shown
+    ]
     assert len(shown) == 2
     assert abs(greys[0] - greys[1]) > 0.3
     marks = [line for line in ax.lines if line.get_marker() in ("o", "s")]
     assert [(float(m.get_xdata()[0]), float(m.get_ydata()[0])) for m in marks] == [
-        (float(picture["section_theta"][i, 0]), float(picture["section_velocity"][i, 0])) for i in range(2)
+        (float(picture["section_theta"][i, 0]), float(picture["section_velocity"][i, 0]))
+        for i in range(2)
     ]
     assert "(rad)" in ax.get_xlabel()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]

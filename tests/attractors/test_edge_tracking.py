@@ -1,4 +1,6 @@
-"""The saddles between basins, found by tracking the edge, and the curves that a picture of basins brings with it."""
+"""The saddles between basins, found by tracking the edge, and the curves that a picture of basins
+brings with it.
+"""
 
 import numpy as np
 import pytest
@@ -31,7 +33,9 @@ def label(found: Attractors, states: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.thorough
-def test_the_edge_is_between_two_ends_as_near_as_rounding_lets_it_be(found: Attractors, picture: xarray.Dataset) -> None:
+def test_the_edge_is_between_two_ends_as_near_as_rounding_lets_it_be(
+    found: Attractors, picture: xarray.Dataset
+) -> None:
     low, high = edges(lambda states: label(found, states), picture["label"].values, GRID, GRID)
     assert len(low) == 12
     assert np.abs(high - low).max() < 1e-13
@@ -52,14 +56,21 @@ def test_a_picture_brings_the_curves_where_its_basins_meet(picture: xarray.Datas
     labels = picture["label"].values
     rows, columns = np.nonzero(labels[:, 1:] != labels[:, :-1])
     edge = np.stack([0.5 * (GRID[columns] + GRID[columns + 1]), GRID[rows]], axis=1)
-    curve = np.stack([picture["boundary_theta"].values, picture["boundary_velocity"].values], axis=1)
+    curve = np.stack(
+        [picture["boundary_theta"].values, picture["boundary_velocity"].values], axis=1
+    )
     assert cKDTree(curve[np.isfinite(curve).all(axis=1)]).query(edge)[0].max() < GRID[1] - GRID[0]
 
 
 def test_under_a_constant_load_they_are_separatrices() -> None:
     picture = basins_of_attraction(steady(), theta=GRID, velocity=GRID, curves=True)
     start = np.array([picture["boundary_theta"].values[0], picture["boundary_velocity"].values[0]])
-    assert abs(float(steady().model.acceleration(0.0, start[0], 0.0, np.sign(start[0]), steady().load))) < 1e-5
+    assert (
+        abs(
+            float(steady().model.acceleration(0.0, start[0], 0.0, np.sign(start[0]), steady().load))
+        )
+        < 1e-5
+    )
     assert abs(start[1]) < 1e-5
 
 

@@ -1,4 +1,6 @@
-"""Lyapunov exponents against linear theory, the multipliers of orbits, the mean divergence, and each other's methods."""
+"""Lyapunov exponents against linear theory, the multipliers of orbits, the mean divergence, and
+each other's methods.
+"""
 
 import math
 import subprocess
@@ -23,7 +25,9 @@ from saltus.theory import equilibria
 def test_they_are_exact_below_the_wall_of_a_piecewise_linear_oscillator(damping, stiffness):
     """The real parts of the roots of s^2 + c s + k, a pair in two of the cases."""
     expected = np.sort(np.roots([1.0, damping, stiffness]).real)[::-1]
-    found = lyapunov_spectrum(walled(c=damping, k=stiffness, wall=20.0), x=0.1, periods=400, transient=10)
+    found = lyapunov_spectrum(
+        walled(c=damping, k=stiffness, wall=20.0), x=0.1, periods=400, transient=10
+    )
     np.testing.assert_allclose(found.values, expected, rtol=0, atol=5e-9)
     assert (np.abs(found.values - expected) <= found.errors + 5e-9).all()
     assert found.stroboscopic == pytest.approx(expected[0], abs=1e-7)
@@ -34,7 +38,9 @@ def test_they_are_exact_below_the_wall_of_a_piecewise_linear_oscillator(damping,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chain(saltus.Model):
-    """Two equal masses, each with a spring and a damper c to the ground, and a spring and a damper d between them."""
+    """Two equal masses, each with a spring and a damper c to the ground, and a spring and a damper
+    d between them.
+    """
 
     stiffness: float = 2.0
     damping: float = 0.1
@@ -50,11 +56,15 @@ class Chain(saltus.Model):
 
 @pytest.mark.thorough
 def test_they_are_exact_with_two_coordinates():
-    """The masses together have s^2 + c s + 1, against each other s^2 + (c + 2 d) s + 1 + 2 k: real parts -c/2, -(c + 2 d)/2."""
+    """The masses together have s^2 + c s + 1, against each other s^2 + (c + 2 d) s + 1 + 2 k: real
+    parts -c/2, -(c + 2 d)/2.
+    """
     force = saltus.Load(frequency=1.7, force=saltus.Harmonic(amplitude=0.2))
     system = saltus.System(model=Chain(), load=force)
     expected = np.array([-0.05, -0.05, -0.25, -0.25])
-    found = lyapunov_spectrum(system, left=0.1, right=0.0, velocity=(0.0, 0.1), periods=400, transient=5)
+    found = lyapunov_spectrum(
+        system, left=0.1, right=0.0, velocity=(0.0, 0.1), periods=400, transient=5
+    )
     np.testing.assert_allclose(found.values, expected, rtol=0, atol=1e-6)
     assert found.values.sum() == pytest.approx(-0.6, abs=1e-9)
     assert found.stroboscopic == pytest.approx(expected[0], abs=1e-5)
@@ -62,22 +72,30 @@ def test_they_are_exact_with_two_coordinates():
 
 @pytest.mark.parametrize("frequency", [None, 1.3])
 def test_they_are_the_eigenvalues_of_a_damped_pendulum_at_rest(frequency):
-    """At the deformed equilibrium under constant loads, whose eigenvalues `theory` has; with and without a clock."""
+    """At the deformed equilibrium under constant loads, whose eigenvalues `theory` has; with and
+    without a clock.
+    """
     model = saltus.Metainterface(beta0=math.radians(80), damping=0.1)
     constant = saltus.System(model=model, load=saltus.Load(vertical=0.5))
     system = constant if frequency is None else forced(0.0, frequency, V=0.5)
     equilibrium = next(q for q in equilibria(constant) if q.stable and q.theta > 0)
     found = lyapunov_spectrum(system, theta=equilibrium.theta, periods=300, transient=0)
     np.testing.assert_allclose(found.values, np.real(equilibrium.eigenvalues), rtol=0, atol=1e-8)
-    assert found.duration == pytest.approx(300 * (1.0 if frequency is None else 2 * math.pi / frequency))
+    assert found.duration == pytest.approx(
+        300 * (1.0 if frequency is None else 2 * math.pi / frequency)
+    )
 
 
 def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
-    """Near the fold at Hhat = 0.02199 the multipliers are real and unequal; they come from the orbit's own equations."""
+    """Near the fold at Hhat = 0.02199 the multipliers are real and unequal; they come from the
+    orbit's own equations.
+    """
     near = saltus.find_orbit(forced(0.0225, 1.0), theta=-2.5, velocity=-0.5).state
     orbit = saltus.find_orbit(forced(0.0221, 1.0), theta=near[0], velocity=near[1])
     theta, velocity = orbit.state
-    found = lyapunov_spectrum(orbit.system, theta=theta, velocity=velocity, periods=200, transient=0)
+    found = lyapunov_spectrum(
+        orbit.system, theta=theta, velocity=velocity, periods=200, transient=0
+    )
     expected = np.log(np.abs(orbit.multipliers)) / (2 * math.pi)
     assert expected[0] - expected[1] > 0.05
     np.testing.assert_allclose(found.values, expected, rtol=0, atol=1e-7)
@@ -85,18 +103,23 @@ def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
 
 
 @pytest.mark.parametrize(("frequency", "amplitude"), [(1.6, 3.0), (0.38, 0.2)])
-def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_largest_one(frequency, amplitude):
+def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_largest_one(
+    frequency, amplitude
+):
     found = lyapunov_spectrum(forced(amplitude, frequency), theta=0.3, periods=200, transient=100)
     assert found.values.sum() == pytest.approx(-0.1, abs=1e-8)
     assert found.sum_defect < 1e-8
     assert found.largest_condition < 1e6
     assert found.positive
     assert found.agrees
-    assert abs(found.stroboscopic - found.values[0]) < 0.25 * found.values[0]  # and the bars are not endless
+    # and the bars are not endless
+    assert abs(found.stroboscopic - found.values[0]) < 0.25 * found.values[0]
 
 
 def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():
-    """The divergence is that of the crossings: 2 ln e an impact, -C c / (1 + m) on the lower side, -C on the upper one."""
+    """The divergence is that of the crossings: 2 ln e an impact, -C c / (1 + m) on the lower side,
+    -C on the upper one.
+    """
     system = forced(3.0, 1.6, e=0.95, m=0.3, k=1.4, c=2.0)
     found = lyapunov_spectrum(system, theta=0.5, periods=64, transient=50)
     assert found.sum_defect < 1e-8
@@ -122,7 +145,9 @@ def test_the_sum_of_the_exponents_is_the_divergence_of_random_systems():
             "c": rng.uniform(0.0, 2.0),
         }
         system = forced(W=rng.uniform(0.3, 3.0), H=rng.uniform(0.5, 4.0), **numbers)
-        found = lyapunov_spectrum(system, theta=rng.uniform(-1, 1), periods=48, transient=20, two_trajectories=False)
+        found = lyapunov_spectrum(
+            system, theta=rng.uniform(-1, 1), periods=48, transient=20, two_trajectories=False
+        )
         if found.note is None:
             assert found.sum_defect < 1e-8
             checked += 1
@@ -133,14 +158,20 @@ def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_
     """T+ = r T-, with a moving ground: (v+ dv+/dv-) / v- by differences of the law itself."""
     system = saltus.System(
         model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
-        load=saltus.Load(frequency=1.0, ground_horizontal=saltus.Harmonic(amplitude=0.1), vertical=-0.5),
+        load=saltus.Load(
+            frequency=1.0, ground_horizontal=saltus.Harmonic(amplitude=0.1), vertical=-0.5
+        ),
         impact=saltus.EnergyRestitution(0.9),
     )
     motion = saltus.simulate(system, theta=0.6, duration=8.0)
     law, model, load = system.impact, system.model, system.load
     expected = -0.1 * 8.0
     for t, s, v, after in zip(
-        *(getattr(motion.impacts, n) for n in ("time", "side", "velocity_before", "velocity_after")), strict=True
+        *(
+            getattr(motion.impacts, n)
+            for n in ("time", "side", "velocity_before", "velocity_after")
+        ),
+        strict=True,
     ):
         step = 1e-5
         ends = [float(law.velocity_after(model, t, v + d, s, -s, load)) for d in (-step, step)]
@@ -150,15 +181,26 @@ def test_the_contraction_of_an_impact_that_depends_on_the_ground_is_that_of_its_
 
 
 def test_the_lanes_have_the_same_exponents_as_the_single_motion():
-    """A settled motion, one in the transient and one with a period in many pieces, under losses and unequal layers."""
+    """A settled motion, one in the transient and one with a period in many pieces, under losses and
+    unequal layers.
+    """
     systems = [forced(0.5, w, e=0.95, m=0.3) for w in (0.15, 0.7, 1.0)]
     assert [span_count(s.load.period) for s in systems] == [7, 2, 1]
-    many = lyapunov_many(systems[0], {"load.frequency": [0.15, 0.7, 1.0]}, theta=0.9, periods=40, transient=10, tol=1e-12)
+    many = lyapunov_many(
+        systems[0],
+        {"load.frequency": [0.15, 0.7, 1.0]},
+        theta=0.9,
+        periods=40,
+        transient=10,
+        tol=1e-12,
+    )
     for i, system in enumerate(systems):
         one = lyapunov_spectrum(system, theta=0.9, periods=40, transient=10, two_trajectories=False)
         np.testing.assert_allclose(many.exponent[i], one.values, rtol=0, atol=1e-7)
         np.testing.assert_allclose(many.error[i], one.errors, rtol=1e-4, atol=1e-9)
-        np.testing.assert_allclose([many.at_half[i], many.later_half[i]], one.halves, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(
+            [many.at_half[i], many.later_half[i]], one.halves, rtol=0, atol=1e-7
+        )
 
 
 def test_the_values_that_are_known_of_the_three_chaotic_motions():
@@ -174,10 +216,17 @@ def test_the_values_that_are_known_of_the_three_chaotic_motions():
 
 @pytest.mark.parametrize("frequency", [1.0, 1.1])
 def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
-    """Hhat = 3, as the paper's piercing of the chaotic band says; after 1200 periods, from 24 states."""
+    """Hhat = 3, as the paper's piercing of the chaotic band says; after 1200 periods, from 24
+    states.
+    """
     states = spread(24)
     found = lyapunov_many(
-        forced(3.0, frequency), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=1000, tol=1e-10
+        forced(3.0, frequency),
+        theta=states[:, 0],
+        velocity=states[:, 1],
+        periods=200,
+        transient=1000,
+        tol=1e-10,
     )
     chaotic = found.positive & (found.period == 0)
     assert chaotic.sum() >= 3
@@ -186,9 +235,18 @@ def test_chaos_and_a_periodic_motion_coexist_at_large_amplitude(frequency):
 
 
 def test_error_bars_hold_between_independent_motions_on_one_attractor():
-    """The exponents of 64 motions scatter about their common mean within their bars in 95 of 100 cases; 85 at the least here."""
+    """The exponents of 64 motions scatter about their common mean within their bars in 95 of 100
+    cases; 85 at the least here.
+    """
     states = spread(64, 1.0)
-    found = lyapunov_many(forced(3.0, 1.6), theta=states[:, 0], velocity=states[:, 1], periods=200, transient=100, tol=1e-10)
+    found = lyapunov_many(
+        forced(3.0, 1.6),
+        theta=states[:, 0],
+        velocity=states[:, 1],
+        periods=200,
+        transient=100,
+        tol=1e-10,
+    )
     apart = np.abs(found.exponent[:, 0] - found.exponent[:, 0].mean())
     assert (apart < found.error[:, 0]).mean() > 0.85
     scatter = float(found.exponent[:, 0].std())
@@ -196,9 +254,14 @@ def test_error_bars_hold_between_independent_motions_on_one_attractor():
 
 
 def test_growth_by_shear_alone_is_not_taken_for_chaos():
-    """Without damping, on a torus, derivatives grow in proportion to the time; in a longer run the exponent falls."""
+    """Without damping, on a torus, derivatives grow in proportion to the time; in a longer run the
+    exponent falls.
+    """
     system = forced(0.05, 1.3, C=0.0)
-    short, long = (lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, two_trajectories=False) for n in (64, 400))
+    short, long = (
+        lyapunov_spectrum(system, theta=0.5, periods=n, transient=100, two_trajectories=False)
+        for n in (64, 400)
+    )
     assert short.values[0] > 0.0
     assert long.values[0] < 0.5 * short.values[0]
     assert not short.positive
@@ -211,13 +274,17 @@ def test_rest_with_a_loss_at_impacts_leaves_nothing():
     assert np.isneginf(found.values).all()
     assert (found.errors == 0.0).all()
     assert "rests at contact" in found.note
-    many = lyapunov_many(forced(0.05, 0.5), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100)
+    many = lyapunov_many(
+        forced(0.05, 0.5), {"impact.e": [0.5, 1.0]}, theta=0.1, periods=32, transient=100
+    )
     assert np.isneginf(many.exponent[0]).all()
     assert (many.ending == Ending.REST).all()
 
 
 def test_impacts_that_lose_nothing_have_no_exponents_at_rest():
-    """The motion nears rest as exp(-C t / 3), but its phase is lost, and rest itself has no derivative."""
+    """The motion nears rest as exp(-C t / 3), but its phase is lost, and rest itself has no
+    derivative.
+    """
     for theta in (0.1, 0.0):
         found = lyapunov_spectrum(forced(0.05, 0.5), theta=theta, periods=32, transient=150)
         assert np.isnan(found.values).all()
@@ -228,7 +295,9 @@ def test_impacts_that_lose_nothing_have_no_exponents_at_rest():
 
 
 def test_a_periodic_rest_has_exponents_of_minus_infinity():
-    """A loss at impacts, and a load that pulls the system off its contact once in a while: it has rested before each release."""
+    """A loss at impacts, and a load that pulls the system off its contact once in a while: it has
+    rested before each release.
+    """
     found = lyapunov_spectrum(forced(0.12, 0.05, e=0.3), theta=0.05, periods=32, transient=2)
     assert np.isneginf(found.values).all()
 
@@ -236,7 +305,13 @@ def test_a_periodic_rest_has_exponents_of_minus_infinity():
 def test_results_are_labelled_and_do_not_depend_on_what_else_is_computed():
     amplitudes = xr.DataArray([0.4, 0.5, 3.0], dims="amplitude")
     starts = xr.DataArray([0.3, 0.9], dims="theta0")
-    found = lyapunov_many(forced(1.0, 1.0), {"load.horizontal.amplitude": amplitudes}, theta=starts, periods=32, transient=5)
+    found = lyapunov_many(
+        forced(1.0, 1.0),
+        {"load.horizontal.amplitude": amplitudes},
+        theta=starts,
+        periods=32,
+        transient=5,
+    )
     assert found.exponent.dims == ("theta0", "amplitude", "index")
     assert all("units" in variable.attrs for variable in found.data_vars.values())
     assert saltus.System.from_json(found.attrs["system"]) == forced(1.0, 1.0)
@@ -261,7 +336,13 @@ def test_threads_do_not_get_in_each_others_way_in_a_fresh_process():
 def test_progress_goes_from_nothing_to_all():
     for follow in (lyapunov_many, lyapunov_spectrum):
         told = []
-        follow(forced(0.5, 1.0), theta=0.3, periods=64, transient=5, progress=lambda done, _, told=told: told.append(done))
+        follow(
+            forced(0.5, 1.0),
+            theta=0.3,
+            periods=64,
+            transient=5,
+            progress=lambda done, _, told=told: told.append(done),
+        )
         assert told == sorted(told)
         assert told[-1] == 1.0
 
@@ -269,8 +350,12 @@ def test_progress_goes_from_nothing_to_all():
 def test_the_factor_of_impacts_is_that_of_the_law():
     arrays = {"impact.e": np.array([0.5, 1.0])}
     np.testing.assert_allclose(impact_factor(forced(0.5, 1.0), arrays), [0.25, 1.0])
-    inelastic = forced(0.5, 1.0).with_({"impact": saltus.InelasticImpact(), "model.mass_ratio": 0.3})
-    assert float(impact_factor(inelastic, {})) == pytest.approx(math.cos(math.radians(160)) ** 2 / 1.3)
+    inelastic = forced(0.5, 1.0).with_(
+        {"impact": saltus.InelasticImpact(), "model.mass_ratio": 0.3}
+    )
+    assert float(impact_factor(inelastic, {})) == pytest.approx(
+        math.cos(math.radians(160)) ** 2 / 1.3
+    )
 
 
 def test_pieces_are_short():
@@ -288,7 +373,14 @@ RECORD = saltus.Record([0.0, 1.0], [0.0, 1.0])
         ({"periods": 31}, "periods must"),
         ({"periods": 40.5}, "periods must be a whole number"),
         ({"transient": -1}, "transient must"),
-        ({"system": saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD))}, "is a Record"),
+        (
+            {
+                "system": saltus.System(
+                    model=saltus.Metainterface(beta0=1.4), load=saltus.Load(horizontal=RECORD)
+                )
+            },
+            "is a Record",
+        ),
         ({"theta": math.nan}, "theta must be"),
         ({"phi": 0.3}, "no coordinate 'phi'"),
         ({"tol": 1.0}, "tol must"),

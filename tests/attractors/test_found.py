@@ -1,4 +1,6 @@
-"""The set of attractors: complete between known borders, certified, told from their mirror images, with honest shares."""
+"""The set of attractors: complete between known borders, certified, told from their mirror images,
+with honest shares.
+"""
 
 import math
 
@@ -17,10 +19,14 @@ from saltus.theory import equilibria
 @pytest.fixture(scope="module")
 def branch() -> saltus.Branch:
     """The period-1 motions at H = 0.5, which coexist between the folds."""
-    return saltus.continue_orbit(saltus.find_orbit(forced(), theta=0.3), "load.frequency", (0.8, 1.0))
+    return saltus.continue_orbit(
+        saltus.find_orbit(forced(), theta=0.3), "load.frequency", (0.8, 1.0)
+    )
 
 
-def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(branch: saltus.Branch) -> None:
+def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(
+    branch: saltus.Branch,
+) -> None:
     found = find_attractors(forced(W=0.88), starts=64)
     expected = sorted(orbit.amplitude for orbit in branch.at(0.88) if orbit.stable)
     assert len(expected) == 2
@@ -31,16 +37,20 @@ def test_the_attractors_between_two_folds_are_the_stable_orbits_of_the_branch(br
 
 
 @pytest.mark.parametrize(
-    ("W", "count"), [(FOLDS[0] - 0.004, 1), (FOLDS[0] + 0.004, 2), (FOLDS[1] - 0.004, 2), (FOLDS[1] + 0.004, 1)]
+    ("W", "count"),
+    [(FOLDS[0] - 0.004, 1), (FOLDS[0] + 0.004, 2), (FOLDS[1] - 0.004, 2), (FOLDS[1] + 0.004, 1)],
 )
 def test_their_number_changes_at_the_folds(W: float, count: int) -> None:
     assert len(find_attractors(forced(W=W), starts=48)) == count
 
 
 @pytest.mark.parametrize(
-    ("H", "kinds"), [(ONSET - 5e-4, ["rest"]), (ONSET + 5e-4, ["rest", "periodic"]), (HELD + 2e-3, ["periodic"])]
+    ("H", "kinds"),
+    [(ONSET - 5e-4, ["rest"]), (ONSET + 5e-4, ["rest", "periodic"]), (HELD + 2e-3, ["periodic"])],
 )
-def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(H: float, kinds: list[str]) -> None:
+def test_rest_and_motion_coexist_from_the_onset_to_the_load_that_releases(
+    H: float, kinds: list[str]
+) -> None:
     found = find_attractors(forced(H), starts=96)
     assert [str(member.kind) for member in found] == kinds
     assert found.undecided == 0
@@ -69,12 +79,18 @@ def test_mirror_images_are_two_attractors_even_where_no_start_leads_to_one() -> 
 
 def test_a_symmetric_cycle_is_its_own_mirror_image() -> None:
     found = find_attractors(forced(1.0, 2.4), starts=48)
-    assert [(member.label, member.period, member.mirror) for member in found] == [(1, 1, 1), (2, 3, 2), (3, 3, 3)]
+    assert [(member.label, member.period, member.mirror) for member in found] == [
+        (1, 1, 1),
+        (2, 3, 2),
+        (3, 3, 3),
+    ]
     assert all(len(member.states) == member.period for member in found)
 
 
 def test_labels_do_not_depend_on_the_sample() -> None:
-    one, other = (find_attractors(forced(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9)))
+    one, other = (
+        find_attractors(forced(1.0, 2.4), starts=n, seed=seed) for n, seed in ((40, 1), (56, 9))
+    )
     assert [m.amplitude for m in one] == pytest.approx([m.amplitude for m in other], rel=1e-9)
 
 
@@ -90,7 +106,9 @@ def test_an_oscillator_that_never_reaches_its_wall_has_one_attractor_and_its_clo
     found = find_attractors(walled(), starts=32, window=((-1.0, 3.0), (-2.0, 2.0)))
     (member,) = found
     assert member.amplitude == pytest.approx(0.2 / abs(1.0 - 1.3**2 + 0.13j), rel=1e-10)
-    assert float(found.to_xarray()["multiplier"][0]) == pytest.approx(math.exp(-0.1 * math.pi / 1.3), rel=1e-9)
+    assert float(found.to_xarray()["multiplier"][0]) == pytest.approx(
+        math.exp(-0.1 * math.pi / 1.3), rel=1e-9
+    )
     assert member.mirror == -1
 
 
@@ -113,7 +131,9 @@ def test_known_stable_orbits_count_and_repelling_ones_do_not(branch: saltus.Bran
 def test_further_starts_find_but_do_not_count() -> None:
     system = forced(W=0.88)
     whole = find_attractors(system, starts=32)
-    found = find_attractors(system, starts=1, also=np.concatenate([member.states for member in whole]))
+    found = find_attractors(
+        system, starts=1, also=np.concatenate([member.states for member in whole])
+    )
     assert len(found) == 2
     assert sum(member.starts for member in found) == 1
 
@@ -179,9 +199,16 @@ def test_chaos_and_a_periodic_motion_coexist() -> None:
         (lambda: find_attractors(forced(), also=[[1.0, np.inf]]), "also"),
         (lambda: find_attractors(forced(), known=[3]), "known must be"),
         (lambda: find_attractors("loaded"), "System"),
-        (lambda: find_attractors(saltus.System(model=saltus.TwoLayer(beta0=1.4)), window=((-1.0, 1.0), (-1.0, 1.0))), "4 pairs"),
         (
-            lambda: find_attractors(forced().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})),
+            lambda: find_attractors(
+                saltus.System(model=saltus.TwoLayer(beta0=1.4)), window=((-1.0, 1.0), (-1.0, 1.0))
+            ),
+            "4 pairs",
+        ),
+        (
+            lambda: find_attractors(
+                forced().with_({"load.horizontal": saltus.Record([0.0, 1.0], [0.0, 1.0])})
+            ),
             "does not repeat",
         ),
     ],

@@ -1,4 +1,6 @@
-"""Measures of basins against closed forms: half planes, a Cantor set, noise, sectors, the basins of Newton's method."""
+"""Measures of basins against closed forms: half planes, a Cantor set, noise, sectors, the basins of
+Newton's method.
+"""
 
 import math
 
@@ -10,7 +12,9 @@ from saltus.errors import ParameterError
 
 
 def newton(n: int) -> np.ndarray:
-    """Which cube root of 1 Newton's method finds from each point of a square: three basins with one common boundary."""
+    """Which cube root of 1 Newton's method finds from each point of a square: three basins with one
+    common boundary.
+    """
     x = np.linspace(-1.5, 1.5, n) + 0.0071
     z = x[None, :] + 1j * x[:, None]
     for _ in range(60):
@@ -21,11 +25,15 @@ def newton(n: int) -> np.ndarray:
 def sectors(n: int) -> np.ndarray:
     """Three sectors of 120 degrees, which meet in one point."""
     x = np.linspace(-1.0, 1.0, n) + 0.0013
-    return np.floor((np.arctan2(x[:, None], x[None, :]) + math.pi) / (2.0 * math.pi / 3.0 + 1e-9)).astype(int)
+    return np.floor(
+        (np.arctan2(x[:, None], x[None, :]) + math.pi) / (2.0 * math.pi / 3.0 + 1e-9)
+    ).astype(int)
 
 
 def cantor(generations: int) -> np.ndarray:
-    """A line of 3^g cells, the removed thirds labelled by turns: its boundary is the middle-thirds Cantor set."""
+    """A line of 3^g cells, the removed thirds labelled by turns: its boundary is the middle-thirds
+    Cantor set.
+    """
     labels = np.zeros(1, dtype=int)
     for generation in range(generations):
         third = len(labels)
@@ -48,7 +56,8 @@ def test_the_entropy_of_a_half_plane_is_counted_by_hand() -> None:
 def test_the_entropy_of_noise_is_that_of_its_labels() -> None:
     labels = np.random.default_rng(0).integers(0, 4, (400, 400))
     found = basin_entropy(labels, box=20)
-    assert found.entropy == pytest.approx(math.log(4.0) - 3.0 / (2.0 * 400), abs=2e-4)  # Miller's bias of 400 samples
+    # Miller's bias of 400 samples
+    assert found.entropy == pytest.approx(math.log(4.0) - 3.0 / (2.0 * 400), abs=2e-4)
     assert found.fractal
 
 
@@ -96,7 +105,8 @@ def test_newtons_basins_are_wada_and_sectors_are_not() -> None:
     assert found.verdict == "wada"
     parted = wada(sectors(400))
     assert parted.verdict == "not wada"
-    # each of the three rays is a boundary two cells wide, and all basins are within 5 cells only next to the centre
+    # each of the three rays is a boundary two cells wide, and all basins are within 5 cells only
+    # next to the centre
     assert parted.shares[-1] < 5 * 2 * 5 / parted.boundary_cells * 3
 
 

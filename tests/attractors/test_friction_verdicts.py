@@ -1,4 +1,6 @@
-"""Exponents and verdicts of motions with dry friction, beside closed forms, multipliers and neighbouring motions."""
+"""Exponents and verdicts of motions with dry friction, beside closed forms, multipliers and
+neighbouring motions.
+"""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +17,9 @@ from saltus.systems import Harmonic, Load, System
 
 
 def forced(amplitude, frequency, model=BeltOscillator, **numbers):
-    return System(model=model(**numbers), load=Load(frequency=frequency, force=Harmonic(amplitude=amplitude)))
+    return System(
+        model=model(**numbers), load=Load(frequency=frequency, force=Harmonic(amplitude=amplitude))
+    )
 
 
 CHAOTIC = forced(0.5, 0.64, Falling, kinetic=0.4, static=0.4, belt_speed=0.5)
@@ -23,18 +27,26 @@ STICKS = forced(0.3, 0.7, kinetic=0.2, static=0.3, belt_speed=0.1, damping=0.02)
 
 
 def test_a_motion_that_sticks_in_every_period_has_the_exponent_of_its_multiplier_and_one_of_minus_infinity():
-    """While it sticks all that is left of a state is its place, so that one multiplier is exactly 0."""
+    """While it sticks all that is left of a state is its place, so that one multiplier is exactly
+    0.
+    """
     orbit = saltus.find_orbit(STICKS, x=0.1)
     found = lyapunov_spectrum(STICKS, **orbit.start(), periods=64, transient=0)
-    assert found.values[0] == pytest.approx(math.log(abs(orbit.multipliers[0])) / orbit.duration, abs=1e-9)
+    assert found.values[0] == pytest.approx(
+        math.log(abs(orbit.multipliers[0])) / orbit.duration, abs=1e-9
+    )
     assert found.values[1] == -math.inf
-    assert np.linalg.det(saltus.sensitivities(STICKS, **orbit.start(), periods=1).state) == pytest.approx(0.0, abs=1e-15)
+    assert np.linalg.det(
+        saltus.sensitivities(STICKS, **orbit.start(), periods=1).state
+    ) == pytest.approx(0.0, abs=1e-15)
     assert found.agrees
 
 
 def test_a_motion_that_only_slides_has_the_exponents_of_a_damped_oscillator():
     """On a fast belt the friction is a constant force: -c / 2 twice."""
-    found = lyapunov_spectrum(forced(0.1, 0.7, damping=0.1, belt_speed=3.0), x=0.1, periods=200, transient=20)
+    found = lyapunov_spectrum(
+        forced(0.1, 0.7, damping=0.1, belt_speed=3.0), x=0.1, periods=200, transient=20
+    )
     np.testing.assert_allclose(found.values, -0.05, rtol=0, atol=1e-5)
     assert found.agrees
 
@@ -63,10 +75,19 @@ def test_chaos_with_stick_and_slip_has_the_exponent_of_two_neighbouring_motions(
         other = saltus.simulate(CHAOTIC, **moved, periods=1, dense=False)
         change = np.array([other.x - one.x, other.velocity - one.velocity])
         growth.append(math.log(np.linalg.norm(change) / apart))
-        direction, state = change * (apart / np.linalg.norm(change)), {"x": one.x, "velocity": one.velocity}
+        direction, state = (
+            change * (apart / np.linalg.norm(change)),
+            {"x": one.x, "velocity": one.velocity},
+        )
     length = CHAOTIC.load.period
-    error = np.std([np.mean(part) for part in np.split(np.array(growth), 12)], ddof=1) / math.sqrt(12) / length
-    assert abs(np.mean(growth) / length - exponents.values[0]) < 3 * math.hypot(error, exponents.errors[0] / 2)
+    error = (
+        np.std([np.mean(part) for part in np.split(np.array(growth), 12)], ddof=1)
+        / math.sqrt(12)
+        / length
+    )
+    assert abs(np.mean(growth) / length - exponents.values[0]) < 3 * math.hypot(
+        error, exponents.errors[0] / 2
+    )
 
 
 def test_many_exponents_at_once_are_those_of_one():
@@ -78,7 +99,9 @@ def test_many_exponents_at_once_are_those_of_one():
 
 
 def test_a_body_that_stays_on_still_ground_is_at_rest_wherever_it_stands():
-    """The load is below mu_s N - k abs(x): motions beside it come to stand beside it, so that one exponent is 0."""
+    """The load is below mu_s N - k abs(x): motions beside it come to stand beside it, so that one
+    exponent is 0.
+    """
     still = forced(0.1, 0.7, belt_speed=0.0)
     verdict = classify(still, x=0.1, velocity=0.1, periods=300, transient=20)
     assert str(verdict.kind) == "rest"
@@ -94,14 +117,25 @@ class Stribeck(saltus.ContactModel):
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force",)
-    frictions = (saltus.Friction(name="belt", coordinate="x", kinetic=0.15, static=0.3, ground_speed=0.8, stribeck_speed=0.2),)
+    frictions = (
+        saltus.Friction(
+            name="belt",
+            coordinate="x",
+            kinetic=0.15,
+            static=0.3,
+            ground_speed=0.8,
+            stribeck_speed=0.2,
+        ),
+    )
 
     def force(self, t, x, velocity, load):
         return load.force(t) - x - 0.05 * velocity
 
 
 def sticking(x, velocity, steps=314, periods=24):
-    """Which of many motions of the belt's mass under 0.01 sin(t) stick in the last two periods, by an implicit time stepping."""
+    """Which of many motions of the belt's mass under 0.01 sin(t) stick in the last two periods, by
+    an implicit time stepping.
+    """
     h, stuck, speed = 2 * math.pi / steps, np.zeros(x.shape, dtype=bool), velocity - 0.8
     for k in range(periods * steps):
         middle = x + 0.5 * h * (speed + 0.8)
@@ -114,10 +148,14 @@ def sticking(x, velocity, steps=314, periods=24):
 
 
 def test_the_share_of_starts_that_slide_on_beside_stick_slip_is_that_of_a_time_stepping():
-    found = saltus.find_attractors(forced(0.01, 1.0, Stribeck), window=((-1.5, 1.5), (-1.5, 1.5)), starts=128)
+    found = saltus.find_attractors(
+        forced(0.01, 1.0, Stribeck), window=((-1.5, 1.5), (-1.5, 1.5)), starts=128
+    )
     assert len(found) == 2
     slides = min(found, key=lambda one: one.amplitude)
     share = 1.0 - sticking(*np.random.default_rng(5).uniform(-1.5, 1.5, (2, 2000))).mean()
     assert 0.1 < share < 0.3
-    assert abs(slides.fraction - share) < 2.5 * math.hypot(slides.error, math.sqrt(share * (1.0 - share) / 2000))
+    assert abs(slides.fraction - share) < 2.5 * math.hypot(
+        slides.error, math.sqrt(share * (1.0 - share) / 2000)
+    )
     assert 0.02 < slides.error < 0.05

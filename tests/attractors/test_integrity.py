@@ -1,4 +1,6 @@
-"""The integrity of basins: of shapes whose measures are known, and the distance from a separatrix whose energy is known."""
+"""The integrity of basins: of shapes whose measures are known, and the distance from a separatrix
+whose energy is known.
+"""
 
 import numpy as np
 import pytest
@@ -12,10 +14,13 @@ from saltus.errors import ParameterError
 def picture(label, across, up, states):
     """A dataset as `basins_of_attraction` makes it: two attractors, 1 with these states."""
     section = {
-        f"section_{name}": (("attractor", "state"), [column, np.full(len(column), np.nan)]) for name, column in states.items()
+        f"section_{name}": (("attractor", "state"), [column, np.full(len(column), np.nan)])
+        for name, column in states.items()
     }
     data = {"label": (("velocity", "x"), label), **section}
-    return xr.Dataset(data, {"x": across, "velocity": up, "attractor": [1, 2]}, {"plane": ["x", "velocity"]})
+    return xr.Dataset(
+        data, {"x": across, "velocity": up, "attractor": [1, 2]}, {"plane": ["x", "velocity"]}
+    )
 
 
 def disc(n=201, radius=0.6, middle=(0.1, -0.05), state=(0.3, -0.05)):
@@ -34,12 +39,16 @@ def test_a_disc_has_its_area_its_radius_and_the_distance_of_its_attractor():
 
 
 def test_grids_converge_to_the_measures_of_the_disc():
-    errors = [abs(float(saltus.basin_integrity(disc(n)).sel(attractor=1).factor) - 0.6) for n in (51, 401)]
+    errors = [
+        abs(float(saltus.basin_integrity(disc(n)).sel(attractor=1).factor) - 0.6) for n in (51, 401)
+    ]
     assert errors[1] < errors[0] / 4
 
 
 def test_the_distance_from_a_circle_is_exact_from_few_of_its_points():
-    """Forty points of a circle of radius 1: chords would be wrong by 3e-3, the curve through the points is right to 1e-7."""
+    """Forty points of a circle of radius 1: chords would be wrong by 3e-3, the curve through the
+    points is right to 1e-7.
+    """
     angle = np.linspace(0.0, 2 * np.pi, 40)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     broken = np.concatenate([circle[:20], [[np.nan, np.nan]], circle[19:]])
@@ -49,18 +58,25 @@ def test_the_distance_from_a_circle_is_exact_from_few_of_its_points():
 
 def test_the_distance_of_rest_from_the_separatrices_of_a_tristable_cell_is_that_of_their_energy():
     """Without loss v^2 / 2 + V(theta) is that of the saddle all along its separatrix."""
-    cell = saltus.System(model=saltus.Metainterface(beta0=np.deg2rad(80)), load=saltus.Load(vertical=-1.5))
+    cell = saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80)), load=saltus.Load(vertical=-1.5)
+    )
     curves = saltus.separatrices(cell, window=((-2.0, 2.0), (-2.0, 2.0)), step=0.1)
     states = [np.stack([curve.theta, curve.velocity], axis=1) for curve in curves]
     saddle = max(curve.saddle for curve in curves)
     barrier = saltus.theory.potential_energy(cell, saddle)
 
     def away(theta):
-        return np.hypot(theta, np.sqrt(2 * max(barrier - saltus.theory.potential_energy(cell, theta), 0.0)))
+        return np.hypot(
+            theta, np.sqrt(2 * max(barrier - saltus.theory.potential_energy(cell, theta), 0.0))
+        )
 
-    expected = minimize_scalar(away, bounds=(0.0, saddle), method="bounded", options={"xatol": 1e-12}).fun
+    expected = minimize_scalar(
+        away, bounds=(0.0, saddle), method="bounded", options={"xatol": 1e-12}
+    ).fun
     found = saltus.basin_integrity(disc(state=(0.0, 0.0)), states).sel(attractor=1)
-    assert float(found.distance_from_curve) == pytest.approx(expected, abs=1e-6)  # it begins 1e-6 beside the saddle
+    # it begins 1e-6 beside the saddle
+    assert float(found.distance_from_curve) == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_basin_that_is_the_whole_grid_is_bounded_by_it_alone():

@@ -31,7 +31,9 @@ def states_of(system, count):
 
 @pytest.mark.thorough
 def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
-    """Over the same 12 periods from the same states, after the same four in which they turn to the direction that grows."""
+    """Over the same 12 periods from the same states, after the same four in which they turn to the
+    direction that grows.
+    """
     states, lengths = states_of(DYING, 5), np.array([DYING.load.period])
     rates, time = Neighbours(DYING, states[None], {}, turning=4, tol=1e-11).rates(np.array([0]), 12)
     begin, direction, _ = stretched(DYING, states, np.full_like(states, 0.5), {}, 4, 1e-11)
@@ -40,8 +42,12 @@ def test_neighbours_part_as_the_derivatives_say_through_impacts_that_die_away():
     np.testing.assert_allclose(rates[0], growth / time[0], rtol=0, atol=2e-4)
 
 
-@pytest.mark.parametrize(("damping", "together"), [(0.1, False), pytest.param(1.0, True, marks=pytest.mark.thorough)])
-def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbours_become_one(damping, together):
+@pytest.mark.parametrize(
+    ("damping", "together"), [(0.1, False), pytest.param(1.0, True, marks=pytest.mark.thorough)]
+)
+def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbours_become_one(
+    damping, together
+):
     """With much damping these pairs come nearer in four periods than two motions can tell."""
     orbit = saltus.find_orbit(layers(2.0, damping=damping, e=0.0), theta_1=0.1, theta_2=0.0)
     expected = math.log(abs(orbit.multipliers[0])) / orbit.duration
@@ -52,11 +58,16 @@ def test_the_exponent_of_an_orbit_is_that_of_its_multiplier_also_where_neighbour
 
 
 def test_an_exponent_does_not_depend_on_what_else_is_asked():
-    """A group alone and beside one of another frequency, whose pairs are brought together after other times."""
+    """A group alone and beside one of another frequency, whose pairs are brought together after
+    other times.
+    """
     states = np.stack([states_of(DYING, 4)] * 2)
     frequencies = np.array([1.02, 0.61])
     both, alone = (
-        LargestExponents(DYING, states[:n], {"load.frequency": frequencies[:n]}, shortest=16, tol=1e-10) for n in (2, 1)
+        LargestExponents(
+            DYING, states[:n], {"load.frequency": frequencies[:n]}, shortest=16, tol=1e-10
+        )
+        for n in (2, 1)
     )
     both.go_on(np.array([0, 1]), 16)
     alone.go_on(np.array([0]), 16)

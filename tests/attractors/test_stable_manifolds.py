@@ -1,4 +1,6 @@
-"""Stable manifolds: invariant, drawn to the saddle, and where basins meet; separatrices against closed forms and SciPy."""
+"""Stable manifolds: invariant, drawn to the saddle, and where basins meet; separatrices against
+closed forms and SciPy.
+"""
 
 import math
 
@@ -13,7 +15,12 @@ from shared_systems import forced, steady, walled
 import saltus
 from saltus.attractors.basins.grid import basins_of_attraction
 from saltus.attractors.phase_plane import saddles, separatrices
-from saltus.attractors.saddle_manifolds import MANIFOLDS, Manifold, stable_manifold, unstable_manifold
+from saltus.attractors.saddle_manifolds import (
+    MANIFOLDS,
+    Manifold,
+    stable_manifold,
+    unstable_manifold,
+)
 from saltus.errors import ParameterError
 from saltus.systems.reversed import reversed_load, reversed_system
 from saltus.theory import equilibria, wall_orbits
@@ -41,7 +48,9 @@ def longer() -> Manifold:
 
 @pytest.fixture(scope="module")
 def turning() -> Manifold:
-    """Of an orbit that has doubled its period, whose multipliers are below 0, with impacts that lose speed."""
+    """Of an orbit that has doubled its period, whose multipliers are below 0, with impacts that
+    lose speed.
+    """
     system = walled(0.5, 2.6, wall=0.3, e=0.5)
     family = wall_orbits(system, 2)
     speed = 1.02 * family.doubling_speed
@@ -63,12 +72,16 @@ def edge_of(labels: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("which", ["curve", "longer", "turning"])
-def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: pytest.FixtureRequest) -> None:
+def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(
+    which: str, request: pytest.FixtureRequest
+) -> None:
     found: Manifold = request.getfixturevalue(which)
     system, q = found.orbit.system, found.orbit.period
     rng, tried = np.random.default_rng(0), 0
     for branch in found.branches:
-        inside = np.flatnonzero(np.isfinite(branch.states).all(axis=1) & (np.abs(branch.states).max(axis=1) < 3.0))
+        inside = np.flatnonzero(
+            np.isfinite(branch.states).all(axis=1) & (np.abs(branch.states).max(axis=1) < 3.0)
+        )
         for i in rng.choice(inside, 6):
             periods = math.floor(branch.place[i] * q + 1e-9)
             share = branch.place[i] - periods / q
@@ -78,7 +91,8 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
             point = (branch.point + periods) % q
             offset = end - found.orbit_states[point]
             along = offset @ found.directions[point]
-            rounds = (branch.point + periods) // q  # directions are carried from point 0 on, and turn where a round is complete
+            # directions are carried from point 0 on, and turn where a round is complete
+            rounds = (branch.point + periods) // q
             assert np.sign(along) == branch.side * np.sign(found.multiplier) ** rounds
             assert np.abs(offset - along * found.directions[point]).max() < 1e-8
             assert np.abs(offset).max() < 10.0 * MANIFOLDS.offset / min(1.0, abs(found.multiplier))
@@ -88,20 +102,34 @@ def test_forward_it_shrinks_onto_its_first_segment_to_1e_8(which: str, request: 
 
 
 def test_each_point_goes_to_its_place_a_period_before(curve: Manifold) -> None:
-    """The map shifts the place by 1: so the image of the points of one level are points of the level before, to 1e-8."""
+    """The map shifts the place by 1: so the image of the points of one level are points of the
+    level before, to 1e-8.
+    """
     for branch in curve.branches:
         levels = [np.flatnonzero(np.floor(branch.place + 1e-12) == n) for n in (6, 7)]
         before = {round(float(branch.place[i]) % 1.0, 12): branch.states[i] for i in levels[0]}
-        pairs = [(i, before[key]) for i in levels[1] if (key := round(float(branch.place[i]) % 1.0, 12)) in before]
+        pairs = [
+            (i, before[key])
+            for i in levels[1]
+            if (key := round(float(branch.place[i]) % 1.0, 12)) in before
+        ]
         assert len(pairs) >= 8
         for i, image in pairs[1:9]:
-            assert strobes(curve.orbit.system, branch.states[i], 1)[-1] == pytest.approx(image, abs=1e-8)
+            assert strobes(curve.orbit.system, branch.states[i], 1)[-1] == pytest.approx(
+                image, abs=1e-8
+            )
 
 
-def test_motions_from_it_approach_the_saddle_and_those_beside_it_leave_to_both_sides(curve: Manifold) -> None:
+def test_motions_from_it_approach_the_saddle_and_those_beside_it_leave_to_both_sides(
+    curve: Manifold,
+) -> None:
     system, stable = curve.orbit.system, [1.58618614, 2.25614202]
     branch = curve.branches[0]
-    inside = np.flatnonzero(np.isfinite(branch.states).all(axis=1) & (branch.place > 6) & (np.abs(branch.states[:, 0]) < 2.5))
+    inside = np.flatnonzero(
+        np.isfinite(branch.states).all(axis=1)
+        & (branch.place > 6)
+        & (np.abs(branch.states[:, 0]) < 2.5)
+    )
     i = inside[len(inside) // 2]
     path = strobes(system, branch.states[i], 14)
     apart = np.abs(path - curve.orbit_states[0]).max(axis=1)
@@ -112,7 +140,9 @@ def test_motions_from_it_approach_the_saddle_and_those_beside_it_leave_to_both_s
     for sign in (1.0, -1.0):
         theta, velocity = strobes(system, branch.states[i] + sign * aside, 70)[-1]
         ends.append(saltus.simulate(system, theta=theta, velocity=velocity, periods=1))
-    highest = sorted(np.abs(motion.at(np.linspace(0.0, motion.time, 2001))[0]).max() for motion in ends)
+    highest = sorted(
+        np.abs(motion.at(np.linspace(0.0, motion.time, 2001))[0]).max() for motion in ends
+    )
     assert highest == pytest.approx(stable, abs=1e-3)
 
 
@@ -128,7 +158,9 @@ def test_the_boundary_of_the_basins_lies_on_it_to_a_cell(curve: Manifold) -> Non
     assert cKDTree(edge).query(inside)[0].max() < 1.5 * cell
 
 
-def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the_basins_meet_on_it() -> None:
+def test_with_impacts_that_lose_speed_the_multiplier_is_the_closed_forms_and_the_basins_meet_on_it() -> (
+    None
+):
     system = walled(0.6, 2.6, wall=0.3, e=0.5)
     family = wall_orbits(system, 2)
     speed = brentq(lambda v: family.amplitude(v) - 0.6, 1e-6, family.fold_speed)
@@ -157,11 +189,15 @@ def test_neighbours_are_as_close_as_the_step(curve: Manifold) -> None:
 
 def test_the_unstable_manifold_leads_to_both_attractors(saddle: saltus.PeriodicOrbit) -> None:
     found = unstable_manifold(saddle, periods=80, step=0.05)
-    assert found.multiplier * stable_manifold(saddle, periods=1, step=0.2).multiplier == pytest.approx(
+    assert found.multiplier * stable_manifold(
+        saddle, periods=1, step=0.2
+    ).multiplier == pytest.approx(
         math.exp(-0.1 * 2.0 * math.pi / 0.88), rel=1e-9
     )  # the determinant of the map
     ends = sorted(float(branch.states[-1, 0]) for branch in found.branches)
-    attracting = saltus.search_orbits(forced(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0).orbits
+    attracting = saltus.search_orbits(
+        forced(W=0.88), "load.frequency", [0.88], max_period=1, starts=16, repelling=0
+    ).orbits
     assert ends == pytest.approx(sorted(orbit.state[0] for orbit in attracting), abs=1e-5)
 
 
@@ -172,13 +208,22 @@ def test_only_saddles_have_manifolds(saddle: saltus.PeriodicOrbit) -> None:
         stable_manifold(saddle, window=((1.0, 0.0), (0.0, 1.0)))
 
 
-@pytest.mark.parametrize("system", [forced(0.4, 0.9), walled(0.5, wall=0.7)], ids=["metainterface", "wall with a loss"])
+@pytest.mark.parametrize(
+    "system", [forced(0.4, 0.9), walled(0.5, wall=0.7)], ids=["metainterface", "wall with a loss"]
+)
 def test_backward_motions_come_from_where_forward_ones_began(system: saltus.System) -> None:
     name = system.model.coordinates[0]
-    motion = saltus.simulate(system, **{name: 0.3}, velocity=0.25, time=0.4, duration=17.0, tol=1e-14)
+    motion = saltus.simulate(
+        system, **{name: 0.3}, velocity=0.25, time=0.4, duration=17.0, tol=1e-14
+    )
     assert len(motion.impacts) >= 2
     back = saltus.simulate(
-        reversed_system(system), **{name: getattr(motion, name)}, velocity=-motion.velocity, time=-17.4, duration=17.0, tol=1e-14
+        reversed_system(system),
+        **{name: getattr(motion, name)},
+        velocity=-motion.velocity,
+        time=-17.4,
+        duration=17.0,
+        tol=1e-14,
     )
     assert getattr(back, name) == pytest.approx(0.3, abs=1e-10)
     assert back.velocity == pytest.approx(-0.25, abs=1e-10)
@@ -186,36 +231,55 @@ def test_backward_motions_come_from_where_forward_ones_began(system: saltus.Syst
 
 
 def test_a_reversed_load_is_the_load_at_minus_the_time() -> None:
-    record = saltus.Record([0.0, 0.4, 1.0, 1.7, 2.2], [0.0, 0.3, -0.2, 0.5, 0.1], quantity="velocity")
+    record = saltus.Record(
+        [0.0, 0.4, 1.0, 1.7, 2.2], [0.0, 0.3, -0.2, 0.5, 0.1], quantity="velocity"
+    )
     load = saltus.Load(
         frequency=1.3,
-        horizontal=saltus.Harmonic(0.4, mean=0.1, phase=0.7, order=2) + saltus.Harmonic(0.2, phase=-1.0) + 0.3,
+        horizontal=saltus.Harmonic(0.4, mean=0.1, phase=0.7, order=2)
+        + saltus.Harmonic(0.2, phase=-1.0)
+        + 0.3,
         vertical=-0.5,
         ground_horizontal=record,
     )
     back, times = reversed_load(load), np.linspace(-2.1, 2.1, 29)
     for name in ("horizontal", "vertical", "ground_horizontal"):
         one, other = getattr(load, name), getattr(back, name)
-        assert other.acceleration(times) == pytest.approx(np.asarray(one.acceleration(-times)), abs=1e-12)
+        assert other.acceleration(times) == pytest.approx(
+            np.asarray(one.acceleration(-times)), abs=1e-12
+        )
         assert other.velocity(times) == pytest.approx(-np.asarray(one.velocity(-times)), abs=1e-12)
         if name != "ground_horizontal":
             assert other(times) == pytest.approx(np.asarray(one(-times)), abs=1e-12)
 
 
-@pytest.mark.parametrize("impact", [saltus.VelocityReduction(0.0), saltus.EnergyRestitution(0.9), saltus.InelasticImpact()])
+@pytest.mark.parametrize(
+    "impact",
+    [saltus.VelocityReduction(0.0), saltus.EnergyRestitution(0.9), saltus.InelasticImpact()],
+)
 def test_impacts_without_an_inverse_are_refused(impact) -> None:
     with pytest.raises(ParameterError, match="cannot be followed backward"):
         reversed_system(forced().with_({"impact": impact}))
 
 
-def test_the_separatrices_of_a_rocking_block_have_the_energy_of_its_saddles_up_to_the_next_impact() -> None:
+def test_the_separatrices_of_a_rocking_block_have_the_energy_of_its_saddles_up_to_the_next_impact() -> (
+    None
+):
     """v^2 / 2 + cos(alpha - |theta|) = 1. All of them come from overturned blocks."""
-    block = saltus.System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(0.9))
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(0.9)
+    )
     found = separatrices(block, window=((-2.0, 2.0), (-2.0, 2.0)))
-    assert [(round(branch.saddle, 9), str(branch.end)) for branch in found] == [(s, "limit") for s in (-0.3, -0.3, 0.3, 0.3)]
+    assert [(round(branch.saddle, 9), str(branch.end)) for branch in found] == [
+        (s, "limit") for s in (-0.3, -0.3, 0.3, 0.3)
+    ]
     assert sorted(len(branch.impacts) for branch in found) == [0, 0, 1, 1]
     for branch in found:
-        first = branch.time >= branch.impacts[0, 0] if len(branch.impacts) else np.ones(branch.time.size, dtype=bool)
+        first = (
+            branch.time >= branch.impacts[0, 0]
+            if len(branch.impacts)
+            else np.ones(branch.time.size, dtype=bool)
+        )
         theta, velocity = branch.theta[first], branch.velocity[first]
         assert first.sum() > 20
         energy = velocity**2 / 2 + np.cos(0.3 - np.abs(theta))
@@ -236,15 +300,30 @@ def test_without_damping_a_separatrix_has_the_energy_of_its_saddle() -> None:
 
 def test_separatrices_cross_the_contact_where_an_independent_integration_does() -> None:
     system = steady()
-    points = [e for e in equilibria(system) if e.eigenvalues is not None and e.eigenvalues[0].real > 0 > e.eigenvalues[1].real]
+    points = [
+        e
+        for e in equilibria(system)
+        if e.eigenvalues is not None and e.eigenvalues[0].real > 0 > e.eigenvalues[1].real
+    ]
     assert [s.place for s in saddles(system)] == pytest.approx([p.theta for p in points], abs=1e-12)
     ours = separatrices(system)
     for point in points:
         for outward in (True, False):
-            theirs = manifold(system, point, stable=True, outward=outward, saddles=[p.theta for p in points], bound=9.0)
+            theirs = manifold(
+                system,
+                point,
+                stable=True,
+                outward=outward,
+                saddles=[p.theta for p in points],
+                bound=9.0,
+            )
             speeds = theirs.velocity[theirs.theta == 0.0][::2]
             away = math.copysign(1.0, point.theta) * (1.0 if outward else -1.0)
-            (mine,) = (b for b in ours if b.saddle == pytest.approx(point.theta) and (b.theta[1] > b.saddle) == (away > 0))
+            (mine,) = (
+                b
+                for b in ours
+                if b.saddle == pytest.approx(point.theta) and (b.theta[1] > b.saddle) == (away > 0)
+            )
             count = min(len(speeds), len(mine.impacts))
             assert count >= 2
             assert mine.impacts[:count, 1] == pytest.approx(speeds[:count], abs=1e-7)
@@ -256,7 +335,10 @@ def test_separatrices_part_the_basins_of_a_constant_load() -> None:
     places = edge_of(labels)
     cell = np.array([theta[1] - theta[0], velocity[1] - velocity[0]])
     edge = np.stack([theta[places[:, 1]], velocity[places[:, 0]]], axis=1) / cell
-    on = np.concatenate([np.stack([b.theta, b.velocity], axis=1) for b in separatrices(system)]) / cell
+    on = (
+        np.concatenate([np.stack([b.theta, b.velocity], axis=1) for b in separatrices(system)])
+        / cell
+    )
     assert cKDTree(on[np.isfinite(on).all(axis=1)]).query(edge)[0].max() < 1.5
 
 

@@ -36,17 +36,21 @@ def test_it_sees_order_on_cycles(rate):
 
 @pytest.mark.parametrize(("rate", "bands"), [(3.575, 8), (3.59, 4), (3.65, 2)])
 def test_chaos_in_several_bands_is_seen_on_every_nth_number(rate, bands):
-    """Below 3.5926 the logistic map has chaos in 4 bands or more, below 3.6786 in 2. That it is chaos its exponent shows, the
-    average of ln abs(f'), which has nothing to do with the test."""
+    """Below 3.5926 the logistic map has chaos in 4 bands or more, below 3.6786 in 2. That it is
+    chaos its exponent shows, the average of ln abs(f'), which has nothing to do with the test."""
     series = logistic(rate, 20_000)
     assert np.mean(np.log(np.abs(rate * (1 - 2 * series)))) > 0.05
     assert zero_one_test(series[:8000], every=bands).K > 0.95
     assert zero_one_of_bands(series[:8000]).K > 0.95
-    assert zero_one_test(series[:8000], every=bands) == replace(zero_one_test(series[:8000:bands]), every=bands)
+    assert zero_one_test(series[:8000], every=bands) == replace(
+        zero_one_test(series[:8000:bands]), every=bands
+    )
 
 
 def test_weak_chaos_in_very_many_bands_looks_regular_to_it():
-    """Why it has no vote on chaos: at the rate 3.57 the exponent is 0.0105, and K of 20 000 numbers is near 0."""
+    """Why it has no vote on chaos: at the rate 3.57 the exponent is 0.0105, and K of 20 000 numbers
+    is near 0.
+    """
     series = logistic(3.57, 20_000, skip=10_000)
     assert np.mean(np.log(np.abs(3.57 * (1 - 2 * series)))) == pytest.approx(0.0105, abs=0.001)
     assert zero_one_test(series).K < 0.05
@@ -78,7 +82,9 @@ def test_the_mean_square_displacement_is_that_of_its_definition():
     found = _displacement(values, c, longest)
     for row, frequency in zip(found, c[:, 0], strict=True):
         path = np.cumsum(values * np.exp(1j * frequency * np.arange(1, 301)))
-        direct = [np.mean([abs(path[j + n] - path[j]) ** 2 for j in range(270)]) for n in range(1, 31)]
+        direct = [
+            np.mean([abs(path[j + n] - path[j]) ** 2 for j in range(270)]) for n in range(1, 31)
+        ]
         np.testing.assert_allclose(row, direct, rtol=1e-10)
 
 

@@ -1,4 +1,6 @@
-"""Systems that several tests of verdicts and exponents share; those of the metainterface have one structure, compiled once."""
+"""Systems that several tests of verdicts and exponents share; those of the metainterface have one
+structure, compiled once.
+"""
 
 import numpy as np
 

@@ -1,4 +1,6 @@
-"""The corrected adiabatic invariant behind capture: its bounds against the invariant itself, computed from its definition."""
+"""The corrected adiabatic invariant behind capture: its bounds against the invariant itself,
+computed from its definition.
+"""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -16,7 +18,9 @@ from saltus.taylor.tracing import trace
 
 @dataclass(frozen=True, kw_only=True)
 class Bent(OneContactModel):
-    """Two sides with every term that the normal form knows: w'' = -pull - c w' - k w - d w'^2 - g w w' - n w^2 - p w'^3."""
+    """Two sides with every term that the normal form knows: w'' = -pull - c w' - k w - d w'^2 - g w
+    w' - n w^2 - p w'^3.
+    """
 
     pull: tuple[float, float]
     damping: tuple[float, float]
@@ -30,7 +34,15 @@ class Bent(OneContactModel):
             return pair[0] * (1 + side) / 2 + pair[1] * (1 - side) / 2
 
         w, u, (d, g, n, p) = side * x, side * velocity, self.terms
-        free = at(self.pull) + at(self.damping) * u + at(self.slope) * w + d * u * u + g * w * u + n * w * w + p * u * u * u
+        free = (
+            at(self.pull)
+            + at(self.damping) * u
+            + at(self.slope) * w
+            + d * u * u
+            + g * w * u
+            + n * w * w
+            + p * u * u * u
+        )
         return load.wind(t) - side * free
 
 
@@ -88,7 +100,9 @@ class Invariant:
         """v'/v and x' at the leading order, polynomials in x."""
         q, c = rate(self.alpha, t) / (2 * self.alpha(t)), self.case[1][self.side < 0]
         zero = np.zeros_like(t)
-        return np.array([q, zero, -(q + c)]), times(np.array([zero, -(q + c)]), np.array([1 + zero, zero, -1 + zero]))
+        return np.array([q, zero, -(q + c)]), times(
+            np.array([zero, -(q + c)]), np.array([1 + zero, zero, -1 + zero])
+        )
 
     def h1(self, t):
         """alpha h1_x = 3 (v'/v) + G'/G + kappa, odd in x."""
@@ -134,12 +148,17 @@ def budgets_of(name, speed, cells):
     bounds = [side.bounds(leaves) for side in sides]
     forms = [normal_form(bounds[i], bounds[1 - i]) for i in (0, 1)]
     v = np.full((1, 1), speed)
-    return {s: budget(f, o.boxed(leaves, f.pull, v), v) for s, f, o in zip((1, -1), forms, sides, strict=True)}
+    return {
+        s: budget(f, o.boxed(leaves, f.pull, v), v)
+        for s, f, o in zip((1, -1), forms, sides, strict=True)
+    }
 
 
 @pytest.mark.parametrize("name", [pytest.param("equal", marks=pytest.mark.thorough), "unequal"])
 def test_the_invariant_changes_no_faster_than_its_bounds_say(name):
-    """dL/dt <= -kappa + v^2 M at random states, with dL/dt from the definition of L; and M is not far above what is met."""
+    """dL/dt <= -kappa + v^2 M at random states, with dL/dt from the definition of L; and M is not
+    far above what is met.
+    """
     cells, speed = 512, 0.1
     found, rng = budgets_of(name, speed, cells), np.random.default_rng(11)
     for side in (1, -1):
@@ -161,6 +180,8 @@ def test_the_corrections_of_the_invariant_are_bounded_and_agree_at_impacts(name)
         for h, bound in ((first, found[side].form.first), (second, found[side].form.second)):
             assert (np.abs(value(h, x)) <= bound[cell, 0] + 1e-6).all()
             assert bound.max() < 3 * np.abs(value(h, x)).max()
-        assert value(first, -1.0) == pytest.approx(value(Invariant(name, -side).h1(t), 1.0), abs=1e-7)
+        assert value(first, -1.0) == pytest.approx(
+            value(Invariant(name, -side).h1(t), 1.0), abs=1e-7
+        )
         assert np.abs(value(second, 1.0)).max() < 1e-7
         assert np.abs(value(first, 1.0)).max() <= found[side].form.jump.max() + 1e-7

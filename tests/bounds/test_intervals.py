@@ -1,4 +1,6 @@
-"""Interval bounds of traced expressions: they hold for every value of the leaves, and are no wider than they need to be."""
+"""Interval bounds of traced expressions: they hold for every value of the leaves, and are no wider
+than they need to be.
+"""
 
 import math
 
@@ -25,14 +27,17 @@ MPMATH = {
     "div": lambda x, y: x / y if y else NOTHING,
     "maximum": lambda x, y: x + y if isinstance(x + y, mp.mpc) else max(x, y),
     "minimum": lambda x, y: x + y if isinstance(x + y, mp.mpc) else min(x, y),
-    "greater": lambda x, y: mp.mpf(not isinstance(x + y, mp.mpc) and x > y),  # what has no value is not greater
+    # what has no value is not greater
+    "greater": lambda x, y: mp.mpf(not isinstance(x + y, mp.mpc) and x > y),
     "less_equal": lambda x, y: mp.mpf(x <= y),
     "pow": mp.power,
 } | {name: getattr(mp, name) for name in ONE_OPERAND}
 
 
 def exactly(node, values):
-    """The expression at one point, to 40 digits; of `where` only the branch that is taken, as the other may have no value."""
+    """The expression at one point, to 40 digits; of `where` only the branch that is taken, as the
+    other may have no value.
+    """
     if node.op == "number":
         return mp.mpf(node.value)
     if not node.args:
@@ -48,8 +53,16 @@ def graphs():
 
     def grow(below):
         one = st.builds(lambda op, x: combine(op, x), st.sampled_from(ONE_OPERAND), below)
-        two = st.builds(lambda op, x, y: combine(op, x, y), st.sampled_from(TWO_OPERANDS), below, below)
-        chosen = st.builds(lambda x, y, a, b: combine("where", combine("greater", x, y), a, b), below, below, below, below)
+        two = st.builds(
+            lambda op, x, y: combine(op, x, y), st.sampled_from(TWO_OPERANDS), below, below
+        )
+        chosen = st.builds(
+            lambda x, y, a, b: combine("where", combine("greater", x, y), a, b),
+            below,
+            below,
+            below,
+            below,
+        )
         return one | two | chosen | st.builds(lambda x, n: power(x, n), below, st.integers(-2, 4))
 
     return st.recursive(leaf, grow, max_leaves=12)
@@ -61,7 +74,9 @@ ranges = st.tuples(st.floats(-4, 4), st.sampled_from([0.0, 1e-9, 0.01, 0.5, 3.0]
 @settings(deadline=None, max_examples=150)
 @given(graphs(), st.tuples(ranges, ranges, ranges), st.integers(0, 2**32 - 1))
 def test_bounds_hold_at_every_point(root, boxes, seed):
-    spans = {leaf: Interval(lo, lo + width) for leaf, (lo, width) in zip(LEAVES, boxes, strict=True)}
+    spans = {
+        leaf: Interval(lo, lo + width) for leaf, (lo, width) in zip(LEAVES, boxes, strict=True)
+    }
     (bounds,) = enclose([root], spans.__getitem__)
     fractions = np.vstack([np.zeros(3), np.ones(3), np.random.default_rng(seed).random((6, 3))])
     if not (np.isfinite(bounds.lo) and np.isfinite(bounds.hi)):
@@ -130,14 +145,20 @@ def test_outside_its_domain_an_operation_proves_nothing(root, lo, hi):
 @pytest.mark.parametrize("op", ["sin", "cos", "exp", "tanh", "cosh"])
 def test_what_is_made_of_nothing_known_is_not_known(op):
     x = LEAVES[0]
-    for root in (combine(op, combine("sqrt", x)), combine(op, combine("log", x)), combine(op, 1.0 / x) + x):
+    for root in (
+        combine(op, combine("sqrt", x)),
+        combine(op, combine("log", x)),
+        combine(op, 1.0 / x) + x,
+    ):
         (bounds,) = enclose([root], lambda _: Interval(-1.0, 1.0))
         assert np.isnan(bounds.lo)
         assert np.isnan(bounds.hi)
 
 
 def test_powers_with_an_exponent_that_is_not_whole_are_bounded():
-    (bounds,) = enclose([power(LEAVES[0], 1.5)], lambda _: Interval(np.array([0.0, 0.25]), np.array([1.0, 4.0])))
+    (bounds,) = enclose(
+        [power(LEAVES[0], 1.5)], lambda _: Interval(np.array([0.0, 0.25]), np.array([1.0, 4.0]))
+    )
     assert bounds.lo == pytest.approx([0.0, 0.125], rel=1e-13)
     assert bounds.hi == pytest.approx([1.0, 8.0], rel=1e-13)
 
@@ -145,7 +166,10 @@ def test_powers_with_an_exponent_that_is_not_whole_are_bounded():
 def test_a_comparison_that_is_open_leaves_both_branches_and_a_closed_one_its_own():
     x, y, _ = LEAVES
     root = combine("where", combine("greater", x, 0.5), y, -y)
-    spans = {x: Interval(np.array([0.6, 0.0, 0.0]), np.array([1.0, 0.5, 1.0])), y: Interval(2.0, 3.0)}
+    spans = {
+        x: Interval(np.array([0.6, 0.0, 0.0]), np.array([1.0, 0.5, 1.0])),
+        y: Interval(2.0, 3.0),
+    }
     (bounds,) = enclose([root], spans.__getitem__)
     assert bounds.lo == pytest.approx([2.0, -3.0, -3.0], rel=1e-15)
     assert bounds.hi == pytest.approx([3.0, -2.0, 3.0], rel=1e-15)
@@ -155,16 +179,23 @@ def test_the_bounds_of_a_model_hold_its_accelerations():
     """Sampled through the model's own numbers, over boxes of time, state and parameters at once."""
     rng = np.random.default_rng(8)
     load = Load(
-        frequency=1.0, horizontal=Harmonic(0.3, phase=0.4) + Harmonic(0.1, order=3), vertical=-0.5, ground_vertical=Harmonic(0.02)
+        frequency=1.0,
+        horizontal=Harmonic(0.3, phase=0.4) + Harmonic(0.1, order=3),
+        vertical=-0.5,
+        ground_vertical=Harmonic(0.02),
     )
-    system = System(model=Metainterface(beta0=1.3, damping=0.1, mass_ratio=0.3, stiffness_ratio=1.2), load=load)
+    system = System(
+        model=Metainterface(beta0=1.3, damping=0.1, mass_ratio=0.3, stiffness_ratio=1.2), load=load
+    )
     traced, (root,) = trace(system), trace(system).acceleration
     low = np.array(list(system.parameters.values()))
     low[traced.parameters.index("load.frequency")] = 1.7
     for side in (1, -1):
         centre = np.array([0.4 * side, 0.2, 2.0])
         width = rng.uniform(0, 0.3, (200, 3))
-        parts = {LEAVES[i]: Interval(centre[i] - width[:, i], centre[i] + width[:, i]) for i in range(3)}
+        parts = {
+            LEAVES[i]: Interval(centre[i] - width[:, i], centre[i] + width[:, i]) for i in range(3)
+        }
         (bounds,) = enclose([root], lambda n, parts=parts, side=side: _leaf(n, parts, side, low))
         point = centre + rng.uniform(-1, 1, (200, 3)) * width
         moved = system.with_({"load.frequency": 1.7})
@@ -181,6 +212,8 @@ def _leaf(node, parts, side, numbers):
 
 
 def test_a_turn_of_many_periods_is_no_turn():
-    (bounds,) = enclose([combine("sin", LEAVES[0])], lambda _: Interval(100 * math.pi + 0.1, 100 * math.pi + 0.2))
+    (bounds,) = enclose(
+        [combine("sin", LEAVES[0])], lambda _: Interval(100 * math.pi + 0.1, 100 * math.pi + 0.2)
+    )
     assert bounds.lo == pytest.approx(math.sin(0.1), rel=1e-9)
     assert bounds.hi == pytest.approx(math.sin(0.2), rel=1e-9)

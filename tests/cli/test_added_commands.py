@@ -1,4 +1,6 @@
-"""Commands of other packages: they are added by entry points, and one that is missing or broken says so in a sentence."""
+"""Commands of other packages: they are added by entry points, and one that is missing or broken
+says so in a sentence.
+"""
 
 import sys
 from importlib.metadata import EntryPoint
@@ -20,7 +22,9 @@ def greet(name: str, loud: bool = False) -> None:
 
 @pytest.fixture
 def run(monkeypatch):
-    """Run a command line to which these entry points add commands; its exit status, and what it says."""
+    """Run a command line to which these entry points add commands; its exit status, and what it
+    says.
+    """
 
     def with_entries(entries, *arguments):
         points = [EntryPoint(name, value, added_commands.GROUP) for name, value in entries.items()]
@@ -39,10 +43,15 @@ def test_a_command_is_added_with_its_arguments_and_options(run):
 
 
 def test_its_errors_end_with_one_sentence(run):
-    assert run({"greet": "a_package:greet"}, "greet", "nobody") == (2, "saltus: nobody cannot be greeted\n")
+    assert run({"greet": "a_package:greet"}, "greet", "nobody") == (
+        2,
+        "saltus: nobody cannot be greeted\n",
+    )
 
 
-@pytest.mark.parametrize("command", [["reproduce"], ["reproduce", "fig04", "--force"], ["report", "results"]])
+@pytest.mark.parametrize(
+    "command", [["reproduce"], ["reproduce", "fig04", "--force"], ["report", "results"]]
+)
 def test_without_its_package_a_known_command_says_how_to_get_it(run, command):
     status, said = run({}, *command)
     assert status == 2

@@ -12,17 +12,32 @@ import xarray
 
 from saltus import files
 from saltus.errors import ParameterError
-from saltus.files import check_writable, has_checksum, read_dataset, write_bytes, write_dataset, write_figure, write_text
+from saltus.files import (
+    check_writable,
+    has_checksum,
+    read_dataset,
+    write_bytes,
+    write_dataset,
+    write_figure,
+    write_text,
+)
 
 
 def small():
     """A dataset with numbers, words and attributes."""
-    variables = {"wave": ("x", np.sin(np.arange(5.0))), "name": ("x", list("abcde")), "side": ("x", np.arange(5, dtype="i1"))}
-    return xarray.Dataset(variables, {"x": np.arange(5.0)}, {"kind": "waves", "tol": 1e-12, "window": [0.0, 1.0]})
+    variables = {
+        "wave": ("x", np.sin(np.arange(5.0))),
+        "name": ("x", list("abcde")),
+        "side": ("x", np.arange(5, dtype="i1")),
+    }
+    return xarray.Dataset(
+        variables, {"x": np.arange(5.0)}, {"kind": "waves", "tol": 1e-12, "window": [0.0, 1.0]}
+    )
 
 
 def test_every_variable_is_in_memory_also_one_with_the_name_of_a_group(tmp_path):
-    groups = {"wave": small(), "other": small()}  # small() has a variable of the name of the first group
+    # small() has a variable of the name of the first group
+    groups = {"wave": small(), "other": small()}
     path = write_dataset(tmp_path / "tree.nc", xarray.DataTree.from_dict(groups))
     tree = read_dataset(path)
     path.unlink()
@@ -36,7 +51,9 @@ def test_the_file_and_its_folders_are_made(tmp_path):
     assert os.listdir(path.parent) == ["b.txt"]
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))])
+@pytest.mark.parametrize(
+    "error", [KeyboardInterrupt, SystemExit, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))]
+)
 def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch, error):
     path = tmp_path / "b.txt"
     path.write_text("old")
@@ -77,7 +94,9 @@ def test_what_a_killed_process_left_is_removed_and_what_another_writes_is_not(tm
 
 
 def test_a_disk_that_is_full_at_any_byte_is_told(tmp_path):
-    """The system lets a file grow to so many bytes only; the process lives, and nothing half is there."""
+    """The system lets a file grow to so many bytes only; the process lives, and nothing half is
+    there.
+    """
     size = len(write_dataset(tmp_path / "whole.nc", small()).read_bytes())
     (tmp_path / "whole.nc").unlink()
     limits, path = (0, 1, size // 2, size - 1), tmp_path / "a.nc"
@@ -95,12 +114,16 @@ def test_a_disk_that_is_full_at_any_byte_is_told(tmp_path):
         "    except typer.Exit as end:\n"
         f"        print(end.exit_code, os.listdir({str(tmp_path)!r}))\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert done.stdout.splitlines() == ["2 []"] * len(limits)
-    assert done.stderr.splitlines() == [f"saltus: {path} cannot be read or written (file too large)"] * len(limits)
+    assert done.stderr.splitlines() == [
+        f"saltus: {path} cannot be read or written (file too large)"
+    ] * len(limits)
 
 
-# --- checksums -------------------------------------------------------------------------------------------------------------
+# --- checksums ---------------------------------------------------------------
 
 
 def test_a_dataset_comes_back_and_other_programs_read_it(tmp_path):
@@ -117,7 +140,9 @@ def test_a_dataset_comes_back_and_other_programs_read_it(tmp_path):
 def flips(content: bytes, count: int):
     """So many copies, each with one bit flipped; the last bits, of the checksum, among them."""
     rng = random.Random(0)
-    places = [rng.randrange(8 * len(content)) for _ in range(count)] + list(range(8 * len(content) - 8, 8 * len(content)))
+    places = [rng.randrange(8 * len(content)) for _ in range(count)] + list(
+        range(8 * len(content) - 8, 8 * len(content))
+    )
     for place in places:
         flipped = bytearray(content)
         flipped[place // 8] ^= 1 << place % 8
@@ -129,7 +154,10 @@ def test_a_flipped_bit_is_noticed(tmp_path, count):
     path = write_dataset(tmp_path / "a.nc", small())
     for content in flips(path.read_bytes(), count):
         path.write_bytes(content)
-        with pytest.raises(ParameterError, match=r"a\.nc is damaged: its checksum is not that of its bytes; compute it again"):
+        with pytest.raises(
+            ParameterError,
+            match=r"a\.nc is damaged: its checksum is not that of its bytes; compute it again",
+        ):
             read_dataset(path)
 
 
@@ -149,7 +177,9 @@ def test_zeroed_bytes_are_noticed_before_hdf5_opens_the_file(tmp_path, begin, mo
 @pytest.mark.parametrize("wiped", [103, 150, 400])
 @pytest.mark.parametrize("by", [b"", b"\0"])
 def test_a_file_that_has_lost_its_checksum_with_its_last_data_is_noticed(tmp_path, wiped, by):
-    """Where the 103 bytes of the checksum are cut off and nothing else, the data end where HDF5 says: they are as before."""
+    """Where the 103 bytes of the checksum are cut off and nothing else, the data end where HDF5
+    says: they are as before.
+    """
     path = write_dataset(tmp_path / "a.nc", small())
     content = path.read_bytes()
     path.write_bytes(content[:-wiped] + by * wiped)
@@ -157,7 +187,9 @@ def test_a_file_that_has_lost_its_checksum_with_its_last_data_is_noticed(tmp_pat
     if wiped == 103 and not by:
         assert read_dataset(path).identical(small())
     else:
-        with pytest.raises(ParameterError, match=r"a\.nc is damaged: it has \d+ bytes, and its data end at \d+"):
+        with pytest.raises(
+            ParameterError, match=r"a\.nc is damaged: it has \d+ bytes, and its data end at \d+"
+        ):
             read_dataset(path)
 
 
@@ -181,7 +213,7 @@ def test_pictures_are_the_same_bytes_for_the_same_data(tmp_path):
     assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
 
 
-# --- folders ---------------------------------------------------------------------------------------------------------------
+# --- folders -----------------------------------------------------------------
 
 
 def test_check_writable_leaves_nothing_behind(tmp_path):
@@ -203,20 +235,26 @@ def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     def refuse(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)  # a real folder would let the superuser in
+    # a real folder would let the superuser in
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
     with pytest.raises(ParameterError, match=r"cannot be written to \(permission denied\)"):
         check_writable(tmp_path / "a")
 
 
 def test_a_size_that_a_file_claims_is_not_allocated(tmp_path):
-    """A file of a few kilobytes whose array has never been written, and is of 8 TB if one believes it."""
+    """A file of a few kilobytes whose array has never been written, and is of 8 TB if one believes
+    it.
+    """
     import h5netcdf
 
     with h5netcdf.File(tmp_path / "vast.nc", "w") as file:
         file.dimensions = {"x": 10**6, "y": 10**6}
         file.create_variable("wave", ("x", "y"), "f8", chunks=(1000, 1000))
     assert (tmp_path / "vast.nc").stat().st_size < 100_000
-    with pytest.raises(ParameterError, match=r"vast\.nc is too large: its arrays need about 8e\+03 GB of memory, and"):
+    with pytest.raises(
+        ParameterError,
+        match=r"vast\.nc is too large: its arrays need about 8e\+03 GB of memory, and",
+    ):
         read_dataset(tmp_path / "vast.nc")
 
 
@@ -243,5 +281,7 @@ def test_a_file_of_more_bytes_than_there_is_memory_is_refused_before_it_is_read(
     path = tmp_path / "sparse.nc"
     with path.open("wb") as file:
         file.truncate(1 << 43)
-    with pytest.raises(ParameterError, match=r"sparse.nc is too large: its bytes need about .* GB of memory"):
+    with pytest.raises(
+        ParameterError, match=r"sparse.nc is too large: its bytes need about .* GB of memory"
+    ):
         read_dataset(path)

@@ -1,4 +1,6 @@
-"""`saltus run` on a stability chart with `curves`: the exact borders, the quasi-static one, and what is said of them."""
+"""`saltus run` on a stability chart with `curves`: the exact borders, the quasi-static one, and
+what is said of them.
+"""
 
 import re
 
@@ -31,7 +33,10 @@ def test_a_chart_with_curves_is_written_said_and_drawn_twice_with_its_borders(sa
     (tmp_path / "study.toml").write_text(STUDY)
     done = saltus("run", tmp_path / "study.toml", "-o", tmp_path / "out")
     assert done.exit_code == 0
-    said = r"Of (\d+) ends of motions .* (\d+) are located between them, (\d+) are none, .* and (\d+) are not explained"
+    said = (
+        r"Of (\d+) ends of motions .* (\d+) are located between them, (\d+) are none, .* and "
+        r"(\d+) are not explained"
+    )
     total, *parts = map(int, re.search(said, done.stdout).groups())
     assert total == sum(parts) > 0
     assert parts[2] == 0
@@ -39,11 +44,25 @@ def test_a_chart_with_curves_is_written_said_and_drawn_twice_with_its_borders(sa
     assert re.search(r"ends +1 chunk remembered", shown)
     assert re.search(r"curves +1 chunk remembered", shown)
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"stability_chart.nc", "stability_chart.zarr", "stability_chart.png", "stability_chart.pdf"} <= names
+    assert {
+        "stability_chart.nc",
+        "stability_chart.zarr",
+        "stability_chart.png",
+        "stability_chart.pdf",
+    } <= names
     with xr.open_datatree(tmp_path / "out" / "stability_chart.nc", engine="h5netcdf") as tree:
-        curve, static = tree["borders/curve_00"].to_dataset().load(), tree["static"].to_dataset().load()
+        curve, static = (
+            tree["borders/curve_00"].to_dataset().load(),
+            tree["static"].to_dataset().load(),
+        )
     assert curve.attrs["kind"] == "LP"
-    at = np.interp(-0.5, *(curve[name].values[np.argsort(curve["vertical"].values)] for name in ("vertical", "horizontal")))
+    at = np.interp(
+        -0.5,
+        *(
+            curve[name].values[np.argsort(curve["vertical"].values)]
+            for name in ("vertical", "horizontal")
+        ),
+    )
     assert at == pytest.approx(0.0219879514, rel=1e-3)  # issue 5
     inside = static["vertical"].values > -0.9
     expected = critical_horizontal(np.deg2rad(80), static["vertical"].values[inside])

@@ -15,22 +15,29 @@ def test_doctor_finds_a_closed_form(saltus):
 
 def test_doctor_names_what_is_too_old(saltus, monkeypatch):
     version = metadata.version
-    monkeypatch.setattr(metadata, "version", lambda name: "0.1" if name == "scipy" else version(name))
+    monkeypatch.setattr(
+        metadata, "version", lambda name: "0.1" if name == "scipy" else version(name)
+    )
     found = saltus("doctor")
     assert found.exit_code == 2
     assert re.search(r"saltus: scipy 0\.1 is not allowed: saltus needs scipy", found.stderr)
 
 
 def test_doctor_names_what_another_package_no_longer_does(saltus, monkeypatch):
-    """As lazy_loader 0.6, which kept the functions that it had loaded, so that nothing looked at their arguments; and as a
-    generator of NumPy with other numbers."""
+    """As lazy_loader 0.6, which kept the functions that it had loaded, so that nothing looked at
+    their arguments; and as a generator of NumPy with other numbers."""
     from saltus import theory
 
     monkeypatch.setattr(theory, "final_time", inspect.unwrap(theory.final_time))
-    monkeypatch.setattr(np.random, "default_rng", lambda seed: np.random.Generator(np.random.MT19937(seed)))
+    monkeypatch.setattr(
+        np.random, "default_rng", lambda seed: np.random.Generator(np.random.MT19937(seed))
+    )
     found = saltus("doctor")
     assert found.exit_code == 2
     said = " ".join(found.stderr.split())
-    assert "public functions (lazy_loader): an unknown argument is not answered with the near ones" in said
+    assert (
+        "public functions (lazy_loader): an unknown argument is not answered with the near ones"
+        in said
+    )
     assert "random numbers (NumPy): a seed gives other random numbers" in said
     assert "netCDF files" not in said

@@ -15,7 +15,9 @@ from saltus.systems import IMPACTS, MODELS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
-ORBITS = "".join((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("orbits", "spectra"))
+ORBITS = "".join(
+    (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("orbits", "spectra")
+)
 ENSEMBLES = (ROOT / "docs" / "ensembles.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 
@@ -30,19 +32,29 @@ def test_every_way_to_write_a_channel(tmp_path):
     (tmp_path / "quake.csv").write_text("0,0\n1,1\n2,0\n")
     path = tmp_path / "study.toml"
     for line in BLOCKS[1].splitlines():
-        path.write_text(f'[model]\ntype = "Metainterface"\nbeta0 = 1\n[load]\nfrequency = 2\n{line}\n')
+        path.write_text(
+            f'[model]\ntype = "Metainterface"\nbeta0 = 1\n[load]\nfrequency = 2\n{line}\n'
+        )
         assert len(load_study(path).system.load.channels) == 1
 
 
 def test_the_models_table_is_that_of_the_classes():
-    rows = {row[0]: row for row in re.findall(r"^\| `(\w+)` \| ([^|]*)\| ([^|]*)\| ([^|]*)\| ([^|]*)\|$", TEXT, re.MULTILINE)}
-    assert set(rows) == {name for name, cls in MODELS.items() if cls.__module__.startswith("saltus.")}
+    rows = {
+        row[0]: row
+        for row in re.findall(
+            r"^\| `(\w+)` \| ([^|]*)\| ([^|]*)\| ([^|]*)\| ([^|]*)\|$", TEXT, re.MULTILINE
+        )
+    }
+    assert set(rows) == {
+        name for name, cls in MODELS.items() if cls.__module__.startswith("saltus.")
+    }
     for name, (_, needs, optional, channels, coordinates) in rows.items():
         model = MODELS[name]
         following = ("coefficients", "records", "form")  # of a structure, from its matrices
         named = re.findall(r"`(\w+)`", re.sub(r"\([^)]*\)", "", needs + optional))
         assert named == [f.name for f in dataclasses.fields(model) if f.name not in following]
-        if not isinstance(vars(model).get("coordinates"), property):  # else their number is in the model's numbers
+        # else their number is in the model's numbers
+        if not isinstance(vars(model).get("coordinates"), property):
             assert re.findall(r"`(\w+)`", coordinates) == list(model.coordinates)
         if "the same" not in channels and name != "Structure":
             assert re.findall(r"`(\w+)`", channels) == list(model.channels)
@@ -54,7 +66,7 @@ def test_the_impact_laws_are_all_named():
         assert re.findall(r"`(\w+)`", rows[name]) == [f.name for f in dataclasses.fields(law)]
 
 
-# --- Python ------------------------------------------------------------------------------------------------------------------
+# --- Python ------------------------------------------------------------------
 
 
 def section(title):
@@ -62,7 +74,9 @@ def section(title):
 
 
 def test_the_arguments_of_simulate_many_are_all_there():
-    named = re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", section("Arguments"), re.MULTILINE)))
+    named = re.findall(
+        r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", section("Arguments"), re.MULTILINE))
+    )
     arguments = set(inspect.signature(saltus.simulate_many).parameters) - {"system", "coordinates"}
     assert set(named) - {"theta", "x", "theta_1", "theta_2"} == arguments
 
@@ -84,14 +98,20 @@ def test_the_variables_and_the_stops_of_an_ensemble_are_all_there():
         sensitivities=(),
     )
     tables = section("What is returned").split("| `stop` | |")
-    variables, stops = (re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", t, re.MULTILINE))) for t in tables)
+    variables, stops = (
+        re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*)\|", t, re.MULTILINE)))
+        for t in tables
+    )
     assert set(variables) == set(ensemble)
     assert stops == ensemble.stop.attrs["flag_meanings"].split()
 
 
 def test_the_thresholds_of_capture_are_those_of_the_system_above():
     numbers = np.array(
-        re.findall(r"^\| ([\d.]+) \| ([\d.e-]+) \| ([\d.e-]+) \|$", section("Ending early"), re.MULTILINE), dtype=float
+        re.findall(
+            r"^\| ([\d.]+) \| ([\d.e-]+) \| ([\d.e-]+) \|$", section("Ending early"), re.MULTILINE
+        ),
+        dtype=float,
     )
     assert len(numbers) == 5
     system = saltus.System(
@@ -102,7 +122,7 @@ def test_the_thresholds_of_capture_are_those_of_the_system_above():
     np.testing.assert_allclose(capture_speed(system, paths), numbers[:, 1:], rtol=0.05)
 
 
-# --- orbits ------------------------------------------------------------------------------------------------------------------
+# --- orbits ------------------------------------------------------------------
 
 
 def orbits_section(title):
@@ -132,10 +152,21 @@ def test_the_options_of_a_diagram_are_all_there():
     from saltus import bifurcation_diagram, response_spectrum
 
     options = set(inspect.signature(bifurcation_diagram).parameters) - {"system", "path"}
-    rows = dict(re.findall(r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE))
-    named = {name: default.strip() for cell, default in rows.items() for name in re.findall(r"`(\w+)`", cell)}
+    rows = dict(
+        re.findall(
+            r"^\| (`[^|]*)\|([^|]*)\|[^|]*\|$", orbits_section("Spectra and diagrams"), re.MULTILINE
+        )
+    )
+    named = {
+        name: default.strip()
+        for cell, default in rows.items()
+        for name in re.findall(r"`(\w+)`", cell)
+    }
     assert options <= set(named)
-    bounds = [inspect.signature(f).parameters["bounds"].default for f in (response_spectrum, bifurcation_diagram)]
+    bounds = [
+        inspect.signature(f).parameters["bounds"].default
+        for f in (response_spectrum, bifurcation_diagram)
+    ]
     assert named["bounds"] == ", ".join(f"({low:g}, {high:g})" for low, high in bounds)
     for name in ("max_period", "repelling", "step"):
         assert named[name] == f"{inspect.signature(bifurcation_diagram).parameters[name].default:g}"
@@ -148,4 +179,6 @@ def test_the_nodes_and_variables_of_a_diagram_are_all_there():
     _, rest = orbits_section("Spectra and diagrams").split("| node | |")
     nodes, variables = rest.split("| variable of a branch |")
     assert set(first_cells(nodes)) == set(tree.children)
-    assert set(first_cells(variables)) - {"releases", "rests"} == set(saltus.branch_of(tree, 0).data_vars)
+    assert set(first_cells(variables)) - {"releases", "rests"} == set(
+        saltus.branch_of(tree, 0).data_vars
+    )

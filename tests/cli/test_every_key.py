@@ -1,4 +1,6 @@
-"""Every key of a study with every kind of bad value: one sentence before anything is computed, or it has a meaning."""
+"""Every key of a study with every kind of bad value: one sentence before anything is computed, or
+it has a meaning.
+"""
 
 import math
 
@@ -21,15 +23,54 @@ ASKS = {
 }
 BAD = (
     *(1e22, 1e308, -1e308, 9223372036854775807, -1, 0, 0.5, 1e-320, math.nan, math.inf, True),
-    *("", "x" * 5000, "[bold]", "1e3", [], [1e22], [math.nan, 1], ["a", "b"], [[1]], {}, {"from": 0, "to": 1, "count": 10**9}),
-    *({"from": 1e308, "to": -1e308, "count": 3}, {"self": 1}, [1, 2, 3], [[-1e308, 1e308], [-1e308, 1e308]]),
+    *(
+        "",
+        "x" * 5000,
+        "[bold]",
+        "1e3",
+        [],
+        [1e22],
+        [math.nan, 1],
+        ["a", "b"],
+        [[1]],
+        {},
+        {"from": 0, "to": 1, "count": 10**9},
+    ),
+    *(
+        {"from": 1e308, "to": -1e308, "count": 3},
+        {"self": 1},
+        [1, 2, 3],
+        [[-1e308, 1e308], [-1e308, 1e308]],
+    ),
 )
 PLACES = [
-    *(("model", key) for key in ("type", "beta0", "damping", "stiffness_ratio", "nothing", "x" * 5000)),
-    *(("load", key) for key in ("frequency", "horizontal", "vertical", "self", "frequency.x", "x" * 5000)),
-    *(("load.horizontal", key) for key in ("amplitude", "mean", "phase", "order", "file", "time", "value", "self")),
+    *(
+        ("model", key)
+        for key in ("type", "beta0", "damping", "stiffness_ratio", "nothing", "x" * 5000)
+    ),
+    *(
+        ("load", key)
+        for key in ("frequency", "horizontal", "vertical", "self", "frequency.x", "x" * 5000)
+    ),
+    *(
+        ("load.horizontal", key)
+        for key in ("amplitude", "mean", "phase", "order", "file", "time", "value", "self")
+    ),
     *(("impact", key) for key in ("type", "e", "r", "self")),
-    *(("simulate", key) for key in ("theta", "velocity", "periods", "duration", "tol", "time", "side", "stop_at", "samples")),
+    *(
+        ("simulate", key)
+        for key in (
+            "theta",
+            "velocity",
+            "periods",
+            "duration",
+            "tol",
+            "time",
+            "side",
+            "stop_at",
+            "samples",
+        )
+    ),
     *((kind, key) for kind in QUESTIONS for key in sorted(keys_of(kind, ("theta",)))),
 ]
 MUST_BE_REFUSED = [
@@ -54,7 +95,9 @@ class Computed(Exception):
 
 @pytest.fixture
 def asked(saltus, tmp_path, monkeypatch):
-    """Ask with one key changed: the sentence with which it is refused, or None where it would be computed."""
+    """Ask with one key changed: the sentence with which it is refused, or None where it would be
+    computed.
+    """
     import saltus.cli.run_command as command
     from saltus.flow.lanes import ensemble
     from saltus.flow.motion import simulate as simulation
@@ -72,11 +115,15 @@ def asked(saltus, tmp_path, monkeypatch):
 
     def ask(part, key, value):
         kind = part if part in ASKS else "simulate"
-        study = {name: dict(table) for name, table in SYSTEM.items()} | {kind: dict(ASKS.get(kind, {"theta": 0.3, "periods": 3}))}
+        study = {name: dict(table) for name, table in SYSTEM.items()} | {
+            kind: dict(ASKS.get(kind, {"theta": 0.3, "periods": 3}))
+        }
         if part == "load.horizontal":
             study["load"]["horizontal"] = {"amplitude": 0.5, key: value}
         else:
-            study.setdefault(part, {"type": "VelocityReduction"} if part == "impact" else {})[key] = value
+            study.setdefault(part, {"type": "VelocityReduction"} if part == "impact" else {})[
+                key
+            ] = value
         (tmp_path / "study.toml").write_text(tomli_w.dumps(study))
         try:
             result = saltus("run", tmp_path / "study.toml", "-o", tmp_path / "out")

@@ -76,7 +76,9 @@ def test_a_process_that_ignores_interrupts_goes_on():
 
 
 def test_an_interrupt_outside_any_command_says_the_same():
-    """As while modules are loaded, where an interrupt may become another error, or in typer, which ends without a word."""
+    """As while modules are loaded, where an interrupt may become another error, or in typer, which
+    ends without a word.
+    """
     script = (
         "import os, signal, sys, saltus.cli\n"
         "import saltus.cli.app as app\n"
@@ -85,6 +87,8 @@ def test_an_interrupt_outside_any_command_says_the_same():
         "saltus.cli.main()\n"
         "print('went on')\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "saltus: interrupted; no file was left half-written\n"

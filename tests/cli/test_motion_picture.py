@@ -11,7 +11,9 @@ from saltus.plots.motion import arcs, coordinates, draw_motion
 
 
 def wall(**more):
-    system = saltus.System(model=saltus.WallOscillator(wall=0.5), impact=saltus.VelocityReduction(0.8))
+    system = saltus.System(
+        model=saltus.WallOscillator(wall=0.5), impact=saltus.VelocityReduction(0.8)
+    )
     return saltus.simulate(system, x=-1.0, duration=10.0, **more)
 
 
@@ -54,10 +56,14 @@ def test_the_last_forcing_period_is_drawn_on_top():
 
 
 def test_limits_are_drawn_where_they_are_reached():
-    system = saltus.System(model=saltus.Metainterface(beta0=math.radians(80)), load=saltus.Load(horizontal=5.0))
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=math.radians(80)), load=saltus.Load(horizontal=5.0)
+    )
     motion = saltus.simulate(system, theta=0.1, duration=6.0, stop_at=["kinematic_limit"])
     history = figure_of(draw_motion(motion.to_xarray())).axes[0]
-    levels = {round(line.get_ydata()[0], 12) for line in history.lines if len(line.get_ydata()) == 2}
+    levels = {
+        round(line.get_ydata()[0], 12) for line in history.lines if len(line.get_ydata()) == 2
+    }
     assert round(math.radians(100), 12) in levels
 
 
@@ -70,7 +76,9 @@ def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
     model = saltus.CellChain(cells=4, beta0=1.4, mass_ratio=0.2)
     system = saltus.System(model=model, load=saltus.Load(frequency=1.0, vertical=-0.5))
     start = dict.fromkeys(model.coordinates, 0.0) | {"lower_1": 0.2}
-    figure = figure_of(draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray()))
+    figure = figure_of(
+        draw_motion(saltus.simulate(system, **start, velocity=(0.0,) * 8, periods=2).to_xarray())
+    )
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
         rf"$\mathrm{{{name.replace('_', chr(92) + '_')}}}$" for name in model.coordinates
     ]
@@ -79,5 +87,7 @@ def test_every_coordinate_of_a_chain_is_drawn_with_a_line_of_its_own():
 
 
 def test_what_slides_is_no_coordinate():
-    motion = saltus.simulate(saltus.System(model=saltus.BeltOscillator()), x=0.0, velocity=0.1, duration=20.0)
+    motion = saltus.simulate(
+        saltus.System(model=saltus.BeltOscillator()), x=0.0, velocity=0.1, duration=20.0
+    )
     assert coordinates(motion.to_xarray()) == ["x"]

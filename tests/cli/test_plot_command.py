@@ -24,7 +24,10 @@ ASKS = {
 LONGEST = ("bifurcation_diagram", "stability_chart", "attractors", "phase_portrait")
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.thorough if kind in LONGEST else ()) for kind in ASKS])
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=pytest.mark.thorough if kind in LONGEST else ()) for kind in ASKS],
+)
 def test_every_kind_of_result_is_drawn_again_as_it_was(kind, saltus, tmp_path):
     system = FORCED if kind != "phase_portrait" else MODEL + "[load]\nvertical = -0.5\n"
     (tmp_path / "study.toml").write_text(system + ASKS[kind])
@@ -51,7 +54,10 @@ def netcdf(path, attrs=None, **variables):
 def test_numbers_that_no_axis_can_hold_are_refused(refused, tmp_path):
     netcdf(tmp_path / "huge.nc", {"kind": "motion"}, theta=("time", [0.0, -1e308, 1e308]))
     sentence = refused("plot", tmp_path / "huge.nc")
-    assert sentence == f"saltus: {tmp_path / 'huge.nc'} cannot be drawn: theta has numbers above 1e+100 in size"
+    assert (
+        sentence
+        == f"saltus: {tmp_path / 'huge.nc'} cannot be drawn: theta has numbers above 1e+100 in size"
+    )
 
 
 def test_what_is_no_result_is_told(refused, tmp_path):
@@ -74,7 +80,9 @@ def test_what_is_no_result_is_told(refused, tmp_path):
 
 
 def test_a_file_without_a_checksum_is_drawn_and_said_to_be_unchecked(saltus, tmp_path):
-    """A user's own program read a motion and wrote it again; drawn beside the same motion as saltus wrote it."""
+    """A user's own program read a motion and wrote it again; drawn beside the same motion as saltus
+    wrote it.
+    """
     (tmp_path / "study.toml").write_text(FORCED + ASKS["motion"])
     assert saltus("run", tmp_path / "study.toml", "-o", tmp_path / "out").exit_code == 0
     with xarray.open_dataset(tmp_path / "out" / "motion.nc") as data:
@@ -83,12 +91,16 @@ def test_a_file_without_a_checksum_is_drawn_and_said_to_be_unchecked(saltus, tmp
         drawn, verified = saltus("plot", path), saltus("status", "--verify", path)
         assert (drawn.exit_code, verified.exit_code) == (0, 0)
         for said in (drawn.stderr, verified.stdout):
-            assert ("has no checksum" in said and "damage to its numbers cannot be excluded" in said) == unchecked
+            assert (
+                "has no checksum" in said and "damage to its numbers cannot be excluded" in said
+            ) == unchecked
     assert (tmp_path / "mine.png").read_bytes() == (tmp_path / "out" / "motion.png").read_bytes()
 
 
 def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_path, monkeypatch):
-    """As h5netcdf leaves a file that it could not open to the end: an object that fails when it is deleted."""
+    """As h5netcdf leaves a file that it could not open to the end: an object that fails when it is
+    deleted.
+    """
 
     class HalfOpen:
         def __del__(self) -> None:
@@ -111,7 +123,9 @@ def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_pa
 @pytest.mark.parametrize("kind", ASKS)
 def test_a_result_that_lacks_what_its_kind_has_is_told(kind, refused, tmp_path):
     netcdf(tmp_path / "broken.nc", {"kind": kind}, x=("day", [1.0]))
-    assert f"of the kind '{kind}', but it cannot be drawn (" in refused("plot", tmp_path / "broken.nc")
+    assert f"of the kind '{kind}', but it cannot be drawn (" in refused(
+        "plot", tmp_path / "broken.nc"
+    )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["broken.nc"]
 
 
@@ -131,7 +145,9 @@ def test_a_picture_s_name_in_the_place_of_a_folder_is_refused(refused, tmp_path)
 
 def test_a_folder_that_cannot_be_written_to_is_told(refused, tmp_path):
     netcdf(tmp_path / "a.nc", {"kind": "motion"}, x=("day", [1.0]))
-    assert "a.nc is a file; name another with --output" in refused("plot", tmp_path / "a.nc", "-o", tmp_path / "a.nc")
+    assert "a.nc is a file; name another with --output" in refused(
+        "plot", tmp_path / "a.nc", "-o", tmp_path / "a.nc"
+    )
 
 
 def squares(arguments, block):
@@ -141,14 +157,20 @@ def squares(arguments, block):
 def plan(kind):
     variables = {"c": Variable()}
     return Plan(
-        function=f"{__name__}:squares", axes={"a": np.arange(4.0)}, chunk={"a": 2}, variables=variables, attrs={"kind": kind}
+        function=f"{__name__}:squares",
+        axes={"a": np.arange(4.0)},
+        chunk={"a": 2},
+        variables=variables,
+        attrs={"kind": kind},
     )
 
 
 def test_sweeps_that_have_no_picture_are_told(refused, tmp_path):
     run(plan("stability_chart"), tmp_path / "half.zarr")
     files.chunk_file(tmp_path / "half.zarr", "c", (1,), 0).unlink()
-    assert "half.zarr has 1 of 2 chunks; run the sweep again to complete it" in refused("plot", tmp_path / "half.zarr")
+    assert "half.zarr has 1 of 2 chunks; run the sweep again to complete it" in refused(
+        "plot", tmp_path / "half.zarr"
+    )
     run(plan("basin_cells"), tmp_path / "basins.zarr")
     assert "read basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
     run(plan("squares"), tmp_path / "mine.zarr")

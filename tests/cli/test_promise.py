@@ -1,4 +1,6 @@
-"""The promise: whatever kills a run, and whenever, the same command again ends with the same bytes in every file."""
+"""The promise: whatever kills a run, and whenever, the same command again ends with the same bytes
+in every file.
+"""
 
 import contextlib
 import math
@@ -30,7 +32,9 @@ frequency = 1.5
 force = { amplitude = 1.0 }
 """
 FILES = {
-    "shaking.csv": "time,force\n" + "\n".join(f"{0.1 * i},{math.sin(0.13 * i * i):.6f}" for i in range(200)) + "\n",
+    "shaking.csv": "time,force\n"
+    + "\n".join(f"{0.1 * i},{math.sin(0.13 * i * i):.6f}" for i in range(200))
+    + "\n",
     "hinged.py": """
 from dataclasses import dataclass
 from saltus import OneContactModel
@@ -62,11 +66,15 @@ STUDIES = {
     "own basins": "[basins]\nx = { from = -1, to = 1, count = 16 }\nvelocity = { from = -1, to = 1, count = 16 }\nrows = 2\n",
 }
 INTERRUPTS = 8  # of each kind of study
-NO_LOAD = SYSTEM.replace("frequency = 1.0\nhorizontal = { amplitude = 0.5 }\n", "")  # a phase portrait is of a constant load
+# a phase portrait is of a constant load
+NO_LOAD = SYSTEM.replace("frequency = 1.0\nhorizontal = { amplitude = 0.5 }\n", "")
 
 
 def command(folder, kind):
-    study, system = folder / "study.toml", {"portrait": NO_LOAD, "record": RECORDED}.get(kind, OWN if "own" in kind else SYSTEM)
+    study, system = (
+        folder / "study.toml",
+        {"portrait": NO_LOAD, "record": RECORDED}.get(kind, OWN if "own" in kind else SYSTEM),
+    )
     study.write_text(system + STUDIES[kind])
     for name, text in FILES.items():
         (folder / name).write_text(text)
@@ -75,7 +83,11 @@ def command(folder, kind):
 
 def files(folder):
     """The bytes of every file below a folder, those of pictures too."""
-    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file()
+    }
 
 
 def finished(folder, kind):
@@ -89,7 +101,9 @@ def finished(folder, kind):
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", STUDIES)
 def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_path):
-    """11 kills of each of ten kinds of study; of some of them several hit one after the other, before it may end."""
+    """11 kills of each of ten kinds of study; of some of them several hit one after the other,
+    before it may end.
+    """
     rng, kills = random.Random(kind), int(os.environ.get("SALTUS_KILLS", "11"))
     (tmp_path / "first").mkdir()
     finished(tmp_path / "first", kind)  # compiles what is not there yet
@@ -103,7 +117,9 @@ def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_pat
         folder = tmp_path / f"{tried}"
         folder.mkdir()
         for _ in range(rng.choice((1, 1, 2, 3))):
-            process = subprocess.Popen(command(folder, kind), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(
+                command(folder, kind), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
             time.sleep(rng.uniform(0.2, 1.0) * seconds)
             process.send_signal(signal.SIGKILL)
             struck += process.wait() == -signal.SIGKILL
@@ -113,7 +129,9 @@ def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_pat
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["motion", "spectrum", "chart", "basins"])
 def test_interrupted_at_random_moments_a_study_says_so_and_ends_with_the_same_bytes(kind, tmp_path):
-    """Ctrl-C reaches every process of a terminal: one sentence, status 130, no half file; or it came too late."""
+    """Ctrl-C reaches every process of a terminal: one sentence, status 130, no half file; or it
+    came too late.
+    """
     rng, struck = random.Random(kind), 0
     for name in ("first", "whole"):
         (tmp_path / name).mkdir()
@@ -121,14 +139,21 @@ def test_interrupted_at_random_moments_a_study_says_so_and_ends_with_the_same_by
     for case in range(INTERRUPTS):
         folder = tmp_path / f"{case}"
         folder.mkdir()
-        process = subprocess.Popen(command(folder, kind), stderr=subprocess.PIPE, text=True, start_new_session=True)
-        time.sleep(0.15 + rng.uniform(0.0, 1.0) * seconds)  # before, Python itself may not have begun
+        process = subprocess.Popen(
+            command(folder, kind), stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        # before, Python itself may not have begun
+        time.sleep(0.15 + rng.uniform(0.0, 1.0) * seconds)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGINT)
         said = process.communicate(timeout=60)[1]
-        assert process.returncode in (0, 130, -signal.SIGINT), said  # the last while Python itself ends, when all is written
+        # the last while Python itself ends, when all is written
+        assert process.returncode in (0, 130, -signal.SIGINT), said
         assert "Traceback" not in said
-        assert process.returncode != 130 or len([line for line in said.splitlines() if line.startswith("saltus: ")]) == 1, said
+        assert (
+            process.returncode != 130
+            or len([line for line in said.splitlines() if line.startswith("saltus: ")]) == 1
+        ), said
         struck += process.returncode == 130
         assert finished(folder, kind)[1] == whole
     assert struck
@@ -139,7 +164,10 @@ def test_two_runs_at_once_leave_the_same_bytes(tmp_path):
     (tmp_path / "whole").mkdir()
     _, whole = finished(tmp_path / "whole", "chart")
     (tmp_path / "both").mkdir()
-    both = [subprocess.Popen(command(tmp_path / "both", "chart"), stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    both = [
+        subprocess.Popen(command(tmp_path / "both", "chart"), stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
     said = [process.communicate()[1] for process in both]
     codes = sorted(process.returncode for process in both)
     assert codes in ([0, 0], [0, 2])
@@ -149,7 +177,9 @@ def test_two_runs_at_once_leave_the_same_bytes(tmp_path):
 
 @pytest.mark.thorough
 def test_a_process_that_compiles_computes_the_same_bytes_as_one_that_loads(tmp_path, monkeypatch):
-    """Chaotic motions show the last digit of everything; the lanes are compiled in a cache of their own, then loaded from it."""
+    """Chaotic motions show the last digit of everything; the lanes are compiled in a cache of their
+    own, then loaded from it.
+    """
     script = (
         "import hashlib, numpy as np, saltus\n"
         "model = saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1)\n"
@@ -160,5 +190,10 @@ def test_a_process_that_compiles_computes_the_same_bytes_as_one_that_loads(tmp_p
         "print(hashlib.sha256(many['theta'].values.tobytes() + np.float64(one.theta).tobytes()).hexdigest())\n"
     )
     monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
-    runs = [subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout for _ in range(3)]
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, check=True
+        ).stdout
+        for _ in range(3)
+    ]
     assert len(set(runs)) == 1

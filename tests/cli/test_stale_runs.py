@@ -1,4 +1,6 @@
-"""A study whose model was edited: its old chart is not given back, what differs is said, and --fresh begins anew."""
+"""A study whose model was edited: its old chart is not given back, what differs is said, and
+--fresh begins anew.
+"""
 
 import numpy as np
 import pytest
@@ -74,5 +76,7 @@ def test_fresh_removes_nothing_but_stores(saltus, refused, tmp_path):
     mine = tmp_path / "out" / "stability_chart.zarr"
     mine.mkdir(parents=True)
     (mine / "letter").write_text("mine")
-    assert "is no store, so it is not removed" in refused("run", tmp_path / "study.toml", "-o", tmp_path / "out", "--fresh")
+    assert "is no store, so it is not removed" in refused(
+        "run", tmp_path / "study.toml", "-o", tmp_path / "out", "--fresh"
+    )
     assert (mine / "letter").read_text() == "mine"

@@ -1,4 +1,6 @@
-"""`saltus status`: how far a sweep is, while it runs, when it was stopped, when it is over, and when it is none."""
+"""`saltus status`: how far a sweep is, while it runs, when it was stopped, when it is over, and
+when it is none.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,13 @@ def plan():
     axes = {"a": np.linspace(0.0, 3.0, 6), "b": np.linspace(0.0, 4.0, 4)}
     function = f"{__name__}:hypotenuse"
     chunk = {"a": 2, "b": 2}
-    return Plan(function=function, axes=axes, chunk=chunk, variables={"c": Variable()}, attrs={"kind": "stability chart"})
+    return Plan(
+        function=function,
+        axes=axes,
+        chunk=chunk,
+        variables={"c": Variable()},
+        attrs={"kind": "stability chart"},
+    )
 
 
 def hypotenuse(arguments, block):
@@ -56,7 +64,10 @@ def test_the_command_is_there(plan, saltus, refused, tmp_path):
     result = saltus("status", tmp_path / "store")
     assert result.exit_code == 0
     assert "6 of 6 done" in result.stdout
-    assert refused("status", tmp_path / "no store") == f"saltus: there is no store at {tmp_path / 'no store'}"
+    assert (
+        refused("status", tmp_path / "no store")
+        == f"saltus: there is no store at {tmp_path / 'no store'}"
+    )
 
 
 def test_a_sweep_that_was_stopped(plan, told, tmp_path):
@@ -76,7 +87,9 @@ def test_a_sweep_that_runs(plan, told, tmp_path):
 
 
 def test_failed_chunks_are_named(plan, told, tmp_path):
-    plan = Plan(function=f"{__name__}:limited", axes=plan.axes, chunk=plan.chunk, variables=plan.variables)
+    plan = Plan(
+        function=f"{__name__}:limited", axes=plan.axes, chunk=plan.chunk, variables=plan.variables
+    )
     with pytest.raises(SweepError):
         run(plan, tmp_path / "store", retries=0)
     lines = told(tmp_path / "store")
@@ -88,7 +101,11 @@ def test_failed_chunks_are_named(plan, told, tmp_path):
 def test_what_is_no_store_is_told(tmp_path, capsys):
     (tmp_path / "file").write_text("x")
     (tmp_path / "folder").mkdir()
-    for name, text in (("broken", "{"), ("other", '{"zarr_format": 3, "node_type": "group", "attributes": {}}'), ("list", "[]")):
+    for name, text in (
+        ("broken", "{"),
+        ("other", '{"zarr_format": 3, "node_type": "group", "attributes": {}}'),
+        ("list", "[]"),
+    ):
         (tmp_path / name).mkdir()
         (tmp_path / name / "zarr.json").write_text(text)
     for name, sentence in (
@@ -106,7 +123,8 @@ def test_what_is_no_store_is_told(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("count", "text"), [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (23_456, "23.5 kB"), (5_000_000_000, "5 GB")]
+    ("count", "text"),
+    [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (23_456, "23.5 kB"), (5_000_000_000, "5 GB")],
 )
 def test_sizes_are_given_in_the_unit_that_fits(count, text):
     assert size(count) == text
@@ -115,7 +133,10 @@ def test_sizes_are_given_in_the_unit_that_fits(count, text):
 def test_what_a_store_says_of_itself_is_never_obeyed_by_the_terminal(told, tmp_path):
     axes = {"a": np.linspace(0.0, 1.0, 2)}
     hostile = Plan(
-        function=f"{__name__}:hypotenuse", axes=axes, variables={"c": Variable()}, attrs={"kind": "\x1b[2J\u202e" * 40}
+        function=f"{__name__}:hypotenuse",
+        axes=axes,
+        variables={"c": Variable()},
+        attrs={"kind": "\x1b[2J\u202e" * 40},
     )
     with opened(hostile, tmp_path / "store"):
         pass

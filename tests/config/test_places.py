@@ -1,4 +1,6 @@
-"""Every refusal carries the dotted path of the parameter, by which its place in a file is found without reading its sentence."""
+"""Every refusal carries the dotted path of the parameter, by which its place in a file is found
+without reading its sentence.
+"""
 
 import math
 
@@ -8,10 +10,20 @@ from saltus import phase_portrait, response_spectrum, stability_chart
 from saltus.checks import check_bounds, check_count, check_number, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
-from saltus.systems import Harmonic, Load, Metainterface, RockingBlock, System, VelocityReduction, check_along, check_path
+from saltus.systems import (
+    Harmonic,
+    Load,
+    Metainterface,
+    RockingBlock,
+    System,
+    VelocityReduction,
+    check_along,
+    check_path,
+)
 
 SYSTEM = System(
-    model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.5), vertical=-0.5)
+    model=Metainterface(beta0=1.4, damping=0.1),
+    load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.5), vertical=-0.5),
 )
 
 REFUSED = {
@@ -27,7 +39,10 @@ REFUSED = {
     "model.dampng": lambda: SYSTEM.with_({"model.dampng": 1.0}),
     "load.horizontal.amplitude": lambda: SYSTEM.with_({"load.horizontal.amplitude": math.nan}),
     "load.horizontal.order": lambda: System.from_dict(
-        {"model": {"type": "Metainterface", "beta0": 1.4}, "load": {"frequency": 1.0, "horizontal": {"amplitude": 1, "order": 0}}}
+        {
+            "model": {"type": "Metainterface", "beta0": 1.4},
+            "load": {"frequency": 1.0, "horizontal": {"amplitude": 1, "order": 0}},
+        }
     ),
     "model.type": lambda: System.from_dict({"model": {"type": "Metainterfase"}}),
     "tol": lambda: simulate(SYSTEM, theta=0.1, periods=1, tol=1.0),
@@ -54,7 +69,10 @@ def test_an_owner_puts_its_name_before_that_of_the_part():
     refusal = ParameterError("beta0 must lie in (0, pi)", "beta0").inside("model")
     assert (str(refusal), refusal.parameter) == ("model.beta0 must lie in (0, pi)", "model.beta0")
     refusal = ParameterError("this load has no frequency", "frequency").inside("load")
-    assert (str(refusal), refusal.parameter) == ("load.frequency: this load has no frequency", "load.frequency")
+    assert (str(refusal), refusal.parameter) == (
+        "load.frequency: this load has no frequency",
+        "load.frequency",
+    )
     refusal = ParameterError("no such thing").inside("basins")
     assert (str(refusal), refusal.parameter) == ("basins: no such thing", "basins")
 
@@ -67,7 +85,10 @@ def test_an_owner_puts_its_name_before_that_of_the_part():
         (lambda: check_count("n", 2.5, 1), "n must be a whole number, got 2.5"),
         (lambda: check_bounds((1.0, 1.0)), "bounds must be two numbers, the smaller one first"),
         (lambda: check_path(SYSTEM, "model"), "model is not a number"),
-        (lambda: check_along(SYSTEM, "model.beta0", (1.0, 9.0), "bounds"), "bounds reach beyond what the system allows"),
+        (
+            lambda: check_along(SYSTEM, "model.beta0", (1.0, 9.0), "bounds"),
+            "bounds reach beyond what the system allows",
+        ),
     ],
 )
 def test_what_a_check_says(check, problem):

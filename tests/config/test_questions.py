@@ -1,4 +1,6 @@
-"""The questions of a study file: every key is an argument of its function, and every argument a file can give is a key."""
+"""The questions of a study file: every key is an argument of its function, and every argument a
+file can give is a key.
+"""
 
 import inspect
 import re
@@ -16,15 +18,32 @@ from saltus.config.study import QUESTIONS, Ask, functions_of, keys_of
 from saltus.errors import ParameterError
 
 KEYS = {kind: set(keys_of(kind)) for kind in QUESTIONS}
-FOR_PYTHON_ALONE = {"system", "progress", "store", "workers", "scheduler", "compute", "found", "known", "also", "functions"}
+FOR_PYTHON_ALONE = {
+    "system",
+    "progress",
+    "store",
+    "workers",
+    "scheduler",
+    "compute",
+    "found",
+    "known",
+    "also",
+    "functions",
+}
 
 
 @pytest.mark.parametrize("kind", QUESTIONS)
 def test_the_keys_of_a_question_are_the_arguments_of_its_functions_of(kind):
-    arguments = [argument for function in functions_of(kind) for argument in inspect.signature(function).parameters.values()]
+    arguments = [
+        argument
+        for function in functions_of(kind)
+        for argument in inspect.signature(function).parameters.values()
+    ]
     named = {argument.name for argument in arguments if argument.kind is not argument.VAR_KEYWORD}
     assert KEYS[kind] == named - FOR_PYTHON_ALONE
-    assert set(keys_of(kind, ("theta",))) - KEYS[kind] == ({"theta"} if kind in ("basins", "frequency_sweep") else set())
+    assert set(keys_of(kind, ("theta",))) - KEYS[kind] == (
+        {"theta"} if kind in ("basins", "frequency_sweep") else set()
+    )
 
 
 @pytest.mark.parametrize("kind", QUESTIONS)
@@ -35,16 +54,29 @@ def test_every_function_that_answers_can_be_checked_alone(kind):
 def test_the_first_function_that_takes_all_keys_answers():
     for kind in QUESTIONS:
         assert Ask(kind=kind, options={}).function is functions_of(kind)[0]
-    assert Ask(kind="stability_chart", options={"curves": 2, "rows": 3}).function.__name__ == "bordered_chart"
-    assert Ask(kind="response_spectrum", options={"bands": 2}).function.__name__ == "response_spectrum"
+    assert (
+        Ask(kind="stability_chart", options={"curves": 2, "rows": 3}).function.__name__
+        == "bordered_chart"
+    )
+    assert (
+        Ask(kind="response_spectrum", options={"bands": 2}).function.__name__ == "response_spectrum"
+    )
 
 
 def test_a_grid_is_evenly_spaced_or_a_list():
-    np.testing.assert_array_equal(read_values({"from": 0, "to": 0.5, "count": 101}), np.linspace(0, 0.5, 101))
+    np.testing.assert_array_equal(
+        read_values({"from": 0, "to": 0.5, "count": 101}), np.linspace(0, 0.5, 101)
+    )
     np.testing.assert_allclose(read_values(["-10 deg", 0, "10 deg"]), np.deg2rad([-10, 0, 10]))
     np.testing.assert_array_equal(read_values([3, 1, 2]), [3, 1, 2])
     assert read_pairs([[1, "90 deg"]]) == ((1.0, np.pi / 2),)
-    with pytest.raises(ValueError, match=r"^must be pairs of numbers, such as \[\[-2, 2\], \[-2, 2\]\], of which each .* got 1$"):
+    with pytest.raises(
+        ValueError,
+        match=(
+            r"^must be pairs of numbers, such as \[\[-2, 2\], \[-2, 2\]\], of which each .* "
+            r"got 1$"
+        ),
+    ):
         read_pairs([1, 2])
 
 
@@ -58,7 +90,10 @@ def test_a_grid_is_evenly_spaced_or_a_list():
         ({"from": 0, "to": 1, "count": 10**9}, "needs a count from 2 to 100000"),
         ({"from": 0, "to": float("inf"), "count": 3}, "has a to that must be a finite number"),
         ({"from": "a", "to": 1, "count": 3}, "has a from that must be an angle"),
-        ({"from": 1, "to": 1, "count": 3}, "must go from the smaller number to the larger one, got from = 1, to = 1"),
+        (
+            {"from": 1, "to": 1, "count": 3},
+            "must go from the smaller number to the larger one, got from = 1, to = 1",
+        ),
         ({"from": 0, "to": 1, "step": 0.1}, "has the unknown key 'step'"),
         ([], "got an empty list"),
         (1.0, "must be a list of numbers or a table such as"),
@@ -103,11 +138,13 @@ def test_junk_in_a_question_is_read_or_refused_in_one_sentence(folder, kind, dat
     assert told
 
 
-# --- the page and the examples -----------------------------------------------------------------------------------------------
+# --- the page and the examples -----------------------------------------------
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
-HEADS = re.compile(r"^((?:`\[\w+\]`(?: and )?)+)\n\n\| key \| default \| \|\n\|[-|]*\n((?:\|.*\n)+)", re.MULTILINE)
+HEADS = re.compile(
+    r"^((?:`\[\w+\]`(?: and )?)+)\n\n\| key \| default \| \|\n\|[-|]*\n((?:\|.*\n)+)", re.MULTILINE
+)
 
 
 def tables():
@@ -130,7 +167,11 @@ def test_the_page_names_every_key_of_every_question():
 def test_the_numbers_on_the_page_are_the_defaults():
     compared = 0
     for kind, rows in tables():
-        signature = {k: v for function in functions_of(kind) for k, v in inspect.signature(function).parameters.items()}
+        signature = {
+            k: v
+            for function in functions_of(kind)
+            for k, v in inspect.signature(function).parameters.items()
+        }
         for keys, default in rows:
             if len(keys) == 1 and keys[0] in signature and re.fullmatch(r"[\d.e-]+", default):
                 assert signature[keys[0]].default == pytest.approx(float(default))
@@ -139,8 +180,15 @@ def test_the_numbers_on_the_page_are_the_defaults():
 
 
 def test_the_questions_shown_on_the_page_can_be_asked(tmp_path):
-    block = next(text for text in re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL) if "[phase_portrait]" in text)
-    system = '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nfrequency = 1\nhorizontal = { amplitude = 0.1 }\n'
+    block = next(
+        text
+        for text in re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+        if "[phase_portrait]" in text
+    )
+    system = (
+        '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nfrequency = 1\nhorizontal = '
+        "{ amplitude = 0.1 }\n"
+    )
     (tmp_path / "study.toml").write_text(system + block)
     asked = load_study(tmp_path / "study.toml").asks
     assert {ask.kind for ask in asked} == set(QUESTIONS) - {"response_spectrum"}

@@ -1,4 +1,6 @@
-"""Bad studies: one sentence with the file and the dotted key, what was wrong and what would be right."""
+"""Bad studies: one sentence with the file and the dotted key, what was wrong and what would be
+right.
+"""
 
 import os
 
@@ -8,7 +10,10 @@ from saltus.config import load_study
 from saltus.errors import ParameterError
 
 MODEL = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\n'
-QUAKE = '[model]\ntype = "RockingBlock"\nalpha = 0.2\n[load]\nground_horizontal = { file = "q.csv", quantity = "acceleration" }\n'
+QUAKE = (
+    '[model]\ntype = "RockingBlock"\nalpha = 0.2\n[load]\nground_horizontal = { file = '
+    '"q.csv", quantity = "acceleration" }\n'
+)
 
 
 def refusal(tmp_path, text):
@@ -38,7 +43,10 @@ CASES = {
     "type_number": ("[model]\ntype = 3\n", "model.type must be text in quotes"),
     "model_no_table": ("model = 3\n", "model must be a table of keys and values, got 3"),
     "key_near": (MODEL + "dampning = 0.1\n", "unknown key model.dampning; did you mean 'damping'?"),
-    "key_missing": ('[model]\ntype = "Metainterface"\n', "model.beta0 is missing; Metainterface needs it"),
+    "key_missing": (
+        '[model]\ntype = "Metainterface"\n',
+        "model.beta0 is missing; Metainterface needs it",
+    ),
     "misspelt_required": (beta0(1).replace("beta0", "beta_0"), "did you mean 'beta0'?"),
     "degrees": (beta0(80), "model.beta0 must lie in (0, pi) rad, got 80.0 (degrees?)"),
     "beta0_zero": (beta0(0), "model.beta0 must lie in (0, pi) rad, got 0.0"),
@@ -52,34 +60,64 @@ CASES = {
         MODEL + 'damping = "0.1"\n',
         'model.damping must be a number, got the text "0.1"; write it without quotes: 0.1',
     ),
-    "angle_for_number": (MODEL + 'damping = "1 deg"\n', 'model.damping must be a number, got the text "1 deg"'),
+    "angle_for_number": (
+        MODEL + 'damping = "1 deg"\n',
+        'model.damping must be a number, got the text "1 deg"',
+    ),
     "switch": (MODEL + "damping = true\n", "model.damping must be a number, got true"),
-    "date": (MODEL + "damping = 2022-01-01\n", "model.damping must be a number, got a date or a time"),
+    "date": (
+        MODEL + "damping = 2022-01-01\n",
+        "model.damping must be a number, got a date or a time",
+    ),
     "list": (MODEL + "damping = [1]\n", "model.damping must be a number, got a list"),
-    "huge": (MODEL + f"damping = {10**400}\n", "model.damping must be a finite number, got a very large number"),
-    "large": (MODEL + "damping = 1e308\n", "model.damping must be at most 1e+100 in size, got 1e+308"),
+    "huge": (
+        MODEL + f"damping = {10**400}\n",
+        "model.damping must be a finite number, got a very large number",
+    ),
+    "large": (
+        MODEL + "damping = 1e308\n",
+        "model.damping must be at most 1e+100 in size, got 1e+308",
+    ),
     "large_load": (
         MODEL + "[load]\nfrequency = 1\nvertical = { amplitude = -1e101 }\n",
         "load.vertical.amplitude must be at most 1e+100 in size, got -1e+101",
     ),
-    "no_module": ('[model]\ntype = "../x:Y"\n', 'model.type: the text "../x" is no Python file, such as my_model.py'),
+    "no_module": (
+        '[model]\ntype = "../x:Y"\n',
+        'model.type: the text "../x" is no Python file, such as my_model.py',
+    ),
     "one_contact": (
         MODEL + '[impact]\ntype = "NewtonImpact"\ne = 0.5\n',
-        "a Metainterface passes its contact and does not bounce there, so that impact.e must be 0, got 0.5",
+        (
+            "a Metainterface passes its contact and does not bounce there, so that impact.e must be "
+            "0, got 0.5"
+        ),
     ),
-    "smoothing": (MODEL + "smoothing = 100\nmass_ratio = 1\n", "model.smoothing is for symmetric layers only"),
-    "e": (MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n', "impact.e must lie in [0, 1], got 1.2"),
+    "smoothing": (
+        MODEL + "smoothing = 100\nmass_ratio = 1\n",
+        "model.smoothing is for symmetric layers only",
+    ),
+    "e": (
+        MODEL + '[impact]\ntype = "VelocityReduction"\ne = 1.2\n',
+        "impact.e must lie in [0, 1], got 1.2",
+    ),
     "impact_type": (
         MODEL + '[impact]\ntype = "Hertz"\n',
         "EnergyRestitution, InelasticImpact, NewtonImpact, PoissonImpact, VelocityReduction",
     ),
-    "channel": (MODEL + "[load]\nvertcal = 1\n", "Metainterface does not read load.vertcal; did you mean 'vertical'"),
+    "channel": (
+        MODEL + "[load]\nvertcal = 1\n",
+        "Metainterface does not read load.vertcal; did you mean 'vertical'",
+    ),
     "channel_dunder": (MODEL + "[load]\n__class__ = 1\n", 'load has no channel "__class__"'),
     "channel_dotted": (
         MODEL + "[load]\nvertical.amplitud = 1\n",
         "unknown key load.vertical.amplitud; did you mean 'amplitude'?",
     ),
-    "no_frequency": (MODEL + "[load]\nvertical = { amplitude = 1 }\n", "so load.frequency must be given"),
+    "no_frequency": (
+        MODEL + "[load]\nvertical = { amplitude = 1 }\n",
+        "so load.frequency must be given",
+    ),
     "frequency": (MODEL + "[load]\nfrequency = 0\n", "load.frequency must lie in (0, inf), got 0"),
     "frequency_text": (MODEL + '[load]\nfrequency = "1"\n', "write it without quotes: 1"),
     "order": (
@@ -91,16 +129,31 @@ CASES = {
         "load.vertical.1.amplitude must be a finite",
     ),
     "empty_list": (MODEL + "[load]\nvertical = []\n", "load.vertical is an empty list"),
-    "both": (simulate("periods = 1", "duration = 2") + "[load]\nfrequency = 1\n", "both periods and duration"),
+    "both": (
+        simulate("periods = 1", "duration = 2") + "[load]\nfrequency = 1\n",
+        "both periods and duration",
+    ),
     "neither": (simulate("theta = 1"), "simulate needs periods (of the load) or duration"),
     "periods_constant": (simulate("periods = 3"), "simulate.periods needs load.frequency"),
-    "periods_negative": (simulate("periods = -3"), "simulate.periods must lie in (0, 1e+12], got -3"),
-    "duration_nan": (simulate("duration = nan"), "simulate.duration must be a finite number, got nan"),
+    "periods_negative": (
+        simulate("periods = -3"),
+        "simulate.periods must lie in (0, 1e+12], got -3",
+    ),
+    "duration_nan": (
+        simulate("duration = nan"),
+        "simulate.duration must be a finite number, got nan",
+    ),
     "coordinate": (simulate("x = 3", "duration = 1"), "unknown key simulate.x"),
-    "tol": (simulate("duration = 1", "tol = 0.1"), "simulate.tol must lie in [1e-15, 1e-06], got 0.1"),
+    "tol": (
+        simulate("duration = 1", "tol = 0.1"),
+        "simulate.tol must lie in [1e-15, 1e-06], got 0.1",
+    ),
     "side": (simulate("duration = 1", "side = 2"), "simulate.side must be 1 (theta > 0) or -1"),
     "samples": (simulate("duration = 1", "samples = 1"), "simulate.samples must lie in [2, "),
-    "samples_half": (simulate("duration = 1", "samples = 2.5"), "simulate.samples must be a whole number, got 2.5"),
+    "samples_half": (
+        simulate("duration = 1", "samples = 2.5"),
+        "simulate.samples must be a whole number, got 2.5",
+    ),
     "margin": (simulate("duration = 1", 'stop_at = "line_limits"'), "did you mean 'line_limit'"),
     "control": (
         '[model]\n"a\\r\\nb\\u2028" = 1\ntype = "Metainterface"\n',
@@ -180,9 +233,15 @@ def test_records_that_cannot_be_read(tmp_path):
     [
         (
             'quantity = "acceleration"',
-            "load.ground_horizontal takes a record of displacement, velocity or acceleration, got quantity='force'",
+            (
+                "load.ground_horizontal takes a record of displacement, velocity or acceleration, "
+                "got quantity='force'"
+            ),
         ),
-        ('quantity = "accelleration"', "load.ground_horizontal.quantity must be one of force, displacement"),
+        (
+            'quantity = "accelleration"',
+            "load.ground_horizontal.quantity must be one of force, displacement",
+        ),
         ("quantity = 3", "load.ground_horizontal.quantity must be text in quotes"),
         ('quantity = "acceleration", time = [1]', "has both file and time; keep one of them"),
         ('quantity = "acceleration", scal = 1', "did you mean 'scale'"),
@@ -205,18 +264,57 @@ def test_files_that_are_no_study(tmp_path):
 
 
 OWN = {
-    "no_file": ("other.py:A", "", "there is no file other.py; paths are relative to the study file"),
-    "no_class": ("own.py:Dufing", "class Model: pass\n", 'own.py has no class "Dufing"; known here: none'),
-    "near": ("own.py:Dufing", "import saltus.systems as s\nclass Duffing(s.Model): pass\n", "did you mean 'Duffing'?"),
-    "syntax": ("own.py:A", "x = 1\ndef (:\n", "own.py cannot be imported (its line 2): SyntaxError"),
-    "raises": ("own.py:A", "\n\nraise KeyError('a\\nb')\n", "own.py cannot be imported (its line 3): KeyError"),
-    "exits": ("own.py:A", "import sys\nsys.exit(5)\n", "own.py cannot be imported (its line 2): SystemExit: 5"),
-    "stops": ("own.py:A", "raise GeneratorExit\n", "own.py cannot be imported (its line 1): GeneratorExit"),
-    "no_model": ("own.py:A", "class A: pass\n", "A in own.py must be a dataclass that inherits saltus.systems.Model"),
-    "module": ("no_such_module_of_ours:A", "", "module 'no_such_module_of_ours' cannot be imported: ModuleNotFoundError"),
+    "no_file": (
+        "other.py:A",
+        "",
+        "there is no file other.py; paths are relative to the study file",
+    ),
+    "no_class": (
+        "own.py:Dufing",
+        "class Model: pass\n",
+        'own.py has no class "Dufing"; known here: none',
+    ),
+    "near": (
+        "own.py:Dufing",
+        "import saltus.systems as s\nclass Duffing(s.Model): pass\n",
+        "did you mean 'Duffing'?",
+    ),
+    "syntax": (
+        "own.py:A",
+        "x = 1\ndef (:\n",
+        "own.py cannot be imported (its line 2): SyntaxError",
+    ),
+    "raises": (
+        "own.py:A",
+        "\n\nraise KeyError('a\\nb')\n",
+        "own.py cannot be imported (its line 3): KeyError",
+    ),
+    "exits": (
+        "own.py:A",
+        "import sys\nsys.exit(5)\n",
+        "own.py cannot be imported (its line 2): SystemExit: 5",
+    ),
+    "stops": (
+        "own.py:A",
+        "raise GeneratorExit\n",
+        "own.py cannot be imported (its line 1): GeneratorExit",
+    ),
+    "no_model": (
+        "own.py:A",
+        "class A: pass\n",
+        "A in own.py must be a dataclass that inherits saltus.systems.Model",
+    ),
+    "module": (
+        "no_such_module_of_ours:A",
+        "",
+        "module 'no_such_module_of_ours' cannot be imported: ModuleNotFoundError",
+    ),
     "taken": (
         "own.py:Metainterface",
-        "import dataclasses, saltus.systems as s\n@dataclasses.dataclass\nclass Metainterface(s.Model): pass\n",
+        (
+            "import dataclasses, saltus.systems as s\n@dataclasses.dataclass\nclass "
+            "Metainterface(s.Model): pass\n"
+        ),
         "which saltus has already; give it another name",
     ),
 }

@@ -1,4 +1,6 @@
-"""`saltus.load` knows what a file is, `to_mat` writes what SciPy reads back, and a notebook shows results with texts escaped."""
+"""`saltus.load` knows what a file is, `to_mat` writes what SciPy reads back, and a notebook shows
+results with texts escaped.
+"""
 
 import numpy as np
 import pytest
@@ -33,19 +35,30 @@ def test_each_kind_of_file_is_read_as_what_it_is(tmp_path, motion):
     write_dataset(tmp_path / "motion.nc", motion.to_xarray())
     assert saltus.load(tmp_path / "motion.nc").identical(motion.to_xarray())
     store = tmp_path / "chart.zarr"
-    chart = saltus.stability_chart(SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60, store=store)
+    chart = saltus.stability_chart(
+        SYSTEM, horizontal=[0.1, 0.2], vertical=[-0.5, -0.4], starts=2, periods=60, store=store
+    )
     assert saltus.load(store)["amplitude"].equals(chart["amplitude"])
 
 
 def test_orbits_come_back_from_a_file_that_is_loaded(tmp_path):
-    branch = saltus.continue_orbit(saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.95, 1.05))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(SYSTEM, theta=0.1), "load.frequency", (0.95, 1.05)
+    )
     write_dataset(tmp_path / "branch.nc", branch.to_xarray())
     again = orbits_of(saltus.load(tmp_path / "branch.nc"))
     assert [orbit.amplitude for orbit in again] == [orbit.amplitude for orbit in branch.orbits]
 
 
 @pytest.mark.parametrize(
-    ("name", "content"), [("nothing.nc", None), ("text.nc", b"text"), ("bad.json", b"\xff"), ("bad.toml", b"="), ("x", b"")]
+    ("name", "content"),
+    [
+        ("nothing.nc", None),
+        ("text.nc", b"text"),
+        ("bad.json", b"\xff"),
+        ("bad.toml", b"="),
+        ("x", b""),
+    ],
 )
 def test_what_is_no_file_of_saltus_is_told_in_one_sentence(tmp_path, name, content):
     if content is not None:
@@ -66,9 +79,17 @@ def test_a_motion_in_a_mat_file_has_its_arrays_and_attributes(tmp_path, motion):
 
 
 def test_texts_dots_and_groups_have_matlab_names(tmp_path):
-    child = xarray.Dataset({"load.frequency": ("x", [1.0, 2.0]), "kind": ("x", ["LP", "PD"]), "yes": ("x", [True, False])})
+    child = xarray.Dataset(
+        {
+            "load.frequency": ("x", [1.0, 2.0]),
+            "kind": ("x", ["LP", "PD"]),
+            "yes": ("x", [True, False]),
+        }
+    )
     tree = xarray.DataTree.from_dict({"/": xarray.Dataset(attrs={"a b": 3}), "/1st": child})
-    found = loadmat(saltus.to_mat(tmp_path / "tree.mat", tree), squeeze_me=True, struct_as_record=False)
+    found = loadmat(
+        saltus.to_mat(tmp_path / "tree.mat", tree), squeeze_me=True, struct_as_record=False
+    )
     group = found["x1st"]
     assert group.load_frequency.tolist() == [1.0, 2.0]
     assert group.kind.tolist() == ["LP", "PD"]
@@ -95,7 +116,9 @@ def test_a_notebook_shows_results_and_escapes_every_text(motion):
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.95, 1.05))
     verdict = saltus.classify(SYSTEM, theta=0.3)
     shown = [each._repr_html_() for each in (SYSTEM, motion, orbit, branch, verdict)]
-    for text, known in zip(shown, ("load.frequency", "theta", "multipliers", "points", "periodic"), strict=True):
+    for text, known in zip(
+        shown, ("load.frequency", "theta", "multipliers", "points", "periodic"), strict=True
+    ):
         assert known in text
         assert text.startswith("<div>")
         assert text.count("<table>") == text.count("</table>") == 1
@@ -129,12 +152,18 @@ def test_what_is_saved_is_loaded_again_and_an_own_dataset_gets_the_version(tmp_p
         assert not data.attrs
 
 
-@pytest.mark.parametrize(("name", "begins"), [("p", b"\x89PNG"), ("p.png", b"\x89PNG"), ("p.pdf", b"%PDF"), ("p.svg", b"<?xml")])
+@pytest.mark.parametrize(
+    ("name", "begins"),
+    [("p", b"\x89PNG"), ("p.png", b"\x89PNG"), ("p.pdf", b"%PDF"), ("p.svg", b"<?xml")],
+)
 def test_a_picture_is_saved_in_the_format_of_its_suffix(tmp_path, motion, name, begins):
     first = saltus.save(tmp_path / name, saltus.plot(motion), title="a motion").read_bytes()
     assert first.startswith(begins)
     if name.endswith((".png", ".pdf")):
-        assert saltus.save(tmp_path / name, saltus.plot(motion), title="a motion").read_bytes() == first
+        assert (
+            saltus.save(tmp_path / name, saltus.plot(motion), title="a motion").read_bytes()
+            == first
+        )
 
 
 def test_texts_are_saved_as_they_are(tmp_path):

@@ -71,7 +71,9 @@ def test_ten_lines_are_the_system_of_the_python_interface(study):
     ],
 )
 def test_angles_are_degrees_or_radians(study, written, radians):
-    assert study(f'[model]\ntype = "Metainterface"\nbeta0 = {written}\n').system.model.beta0 == radians
+    assert (
+        study(f'[model]\ntype = "Metainterface"\nbeta0 = {written}\n').system.model.beta0 == radians
+    )
 
 
 def test_every_angle_may_be_in_degrees(study):
@@ -81,14 +83,18 @@ def test_every_angle_may_be_in_degrees(study):
     )
     assert read.system.model == RockingBlock(alpha=math.radians(15))
     assert read.system.get("load.ground_horizontal.phase") == math.pi / 2
-    assert read.settings().arguments | {"duration": 3.0} == {"duration": 3.0} | {"theta": math.radians(-5)}
+    assert read.settings().arguments | {"duration": 3.0} == {"duration": 3.0} | {
+        "theta": math.radians(-5)
+    }
 
 
 def test_a_list_is_the_sum_of_its_signals(study):
     read = study(
         '[model]\ntype = "Metainterface"\nbeta0 = 1\n[load]\nfrequency = 1\nhorizontal = [0.2, { amplitude = 0.5, order = 3 }]\n'
     )
-    assert read.system.load == Load(frequency=1.0, horizontal=Harmonic(amplitude=0.5, order=3).__radd__(0.2))
+    assert read.system.load == Load(
+        frequency=1.0, horizontal=Harmonic(amplitude=0.5, order=3).__radd__(0.2)
+    )
 
 
 @pytest.mark.parametrize(
@@ -100,11 +106,16 @@ def test_a_list_is_the_sum_of_its_signals(study):
     ],
 )
 def test_impact_laws(study, table, law):
-    assert study(f'[model]\ntype = "Metainterface"\nbeta0 = 1\n[impact]\n{table}\n').system.impact == law
+    assert (
+        study(f'[model]\ntype = "Metainterface"\nbeta0 = 1\n[impact]\n{table}\n').system.impact
+        == law
+    )
 
 
 def test_the_wall_oscillator_starts_at_x(study):
-    read = study('[model]\ntype = "WallOscillator"\nwall = 0.5\n[load]\nforce = 0.1\n[simulate]\nx = -0.2\nduration = 4\n')
+    read = study(
+        '[model]\ntype = "WallOscillator"\nwall = 0.5\n[load]\nforce = 0.1\n[simulate]\nx = -0.2\nduration = 4\n'
+    )
     assert read.system.model == WallOscillator(wall=0.5)
     assert read.settings().arguments["x"] == -0.2
 
@@ -127,7 +138,9 @@ def test_all_settings(study):
 
 
 def test_what_a_run_is_given_takes_the_place_of_the_file_s_own(study):
-    read = study('[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = 0.1\nduration = 3\ntol = 1e-8\n')
+    read = study(
+        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = 0.1\nduration = 3\ntol = 1e-8\n'
+    )
     motion = read.run(duration=0.5, tol=1e-10)
     assert (motion.time, motion.tol) == (0.5, 1e-10)
 
@@ -167,10 +180,14 @@ class Duffing(Model):
 
 
 def test_a_model_of_ones_own_is_a_class_in_a_file_beside_the_study(study):
-    read = study('[model]\ntype = "own.py:Duffing"\ncubic = 0.5\ntilt = "90 deg"\n[load]\nforce = 1\n', own_py=OWN)
+    read = study(
+        '[model]\ntype = "own.py:Duffing"\ncubic = 0.5\ntilt = "90 deg"\n[load]\nforce = 1\n',
+        own_py=OWN,
+    )
     assert (read.system.model.cubic, read.system.model.tilt) == (0.5, math.pi / 2)
     assert read.system.model.acceleration(0.0, 2.0, 0.0, 1, read.system.load) == 1 - 2 - 4
-    assert System.from_json(read.system.to_json()) == read.system  # so that motion.nc can be read back
+    # so that motion.nc can be read back
+    assert System.from_json(read.system.to_json()) == read.system
 
 
 def test_a_model_may_come_from_an_installed_module(study):

@@ -21,7 +21,9 @@ from saltus.continuation import (
     located,
     newton,
 )
-from saltus.continuation import TestFunction as Function  # whose name pytest would take for that of a test
+
+# whose name pytest would take for that of a test
+from saltus.continuation import TestFunction as Function
 
 FOLD = Function("fold", lambda point: float(point.tangent[-1]))
 
@@ -77,7 +79,9 @@ def circle():
 
 def cubic():
     """p = y - y^3, with folds at y = +-1 / sqrt(3)."""
-    return Explicit(lambda z: z[1] - z[0] + z[0] ** 3, lambda z: np.array([3.0 * z[0] ** 2 - 1.0, 1.0]))
+    return Explicit(
+        lambda z: z[1] - z[0] + z[0] ** 3, lambda z: np.array([3.0 * z[0] ** 2 - 1.0, 1.0])
+    )
 
 
 WIDE = {"p": (-9.0, 9.0)}
@@ -87,7 +91,9 @@ def test_a_loop_closes_in_its_first_point_with_both_folds():
     found = both_ways(circle().start(0.6, 0.8), Folds, WIDE)
     assert found.ends == (End(CurveEnd.CLOSED), End(CurveEnd.CLOSED))
     assert found.points[0] is found.points[-1]
-    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx([-1.0, 1.0], abs=1e-13)
+    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx(
+        [-1.0, 1.0], abs=1e-13
+    )
     assert not found.missed
     places = np.array([point.place for point in found.points])
     assert np.abs(np.hypot(*places.T) - 1.0).max() < 1e-13
@@ -97,9 +103,13 @@ def test_a_loop_closes_in_its_first_point_with_both_folds():
 
 @pytest.mark.parametrize("longest", [0.02, 0.1, 0.5])
 def test_folds_do_not_depend_on_the_step(longest):
-    found = both_ways(cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)}, steps=replace(STEPS, longest=longest))
+    found = both_ways(
+        cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)}, steps=replace(STEPS, longest=longest)
+    )
     size = 2.0 / 3.0**1.5
-    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx([-size, size], abs=1e-14)
+    assert sorted(zero.point.parameter for zero in found.special) == pytest.approx(
+        [-size, size], abs=1e-14
+    )
     for zero in found.special:
         assert zero.evidence.before * zero.evidence.after < 0.0
         assert zero.evidence.bracket < 1e-10
@@ -110,15 +120,22 @@ def test_folds_do_not_depend_on_the_step(longest):
 def test_all_solutions_at_a_value():
     found = both_ways(cubic().start(0.0, 0.0), Folds, {"p": (-1.0, 1.0)})
     roots = np.sort(np.roots([1.0, 0.0, -1.0, 0.2]).real)
-    assert sorted(point.place[0] for point in found.solved_at(0.2)) == pytest.approx(roots, abs=1e-13)
-    assert [point.parameter for point in found.solved_at(found.points[-1].parameter)] == [found.points[-1].parameter]
+    assert sorted(point.place[0] for point in found.solved_at(0.2)) == pytest.approx(
+        roots, abs=1e-13
+    )
+    assert [point.parameter for point in found.solved_at(found.points[-1].parameter)] == [
+        found.points[-1].parameter
+    ]
     assert found.solved_at(1.5) == []
 
 
 def test_two_parameters_and_which_bound_is_met():
     """The line where a plane cuts a sphere, from bound to bound."""
     sphere = Explicit(
-        lambda z: np.array([z @ z - 1.0, z[0] - 0.1 * z[1]]), lambda z: np.array([2.0 * z, [1.0, -0.1, 0.0]]), size=3, count=2
+        lambda z: np.array([z @ z - 1.0, z[0] - 0.1 * z[1]]),
+        lambda z: np.array([2.0 * z, [1.0, -0.1, 0.0]]),
+        size=3,
+        count=2,
     )
     bounds = {"one": (-2.0, 0.5), "other": (-2.0, 2.0)}
     found = both_ways(sphere.start(0.0, 0.0, 1.0), Events, bounds)
@@ -137,7 +154,9 @@ def test_a_start_on_a_bound_is_followed_inwards_only():
 def test_progress_is_the_share_of_the_range_that_was_seen():
     heard = []
     line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
-    both_ways(line.start(0.5, 0.5), Events, {"p": (0.0, 1.0)}, progress=lambda *told: heard.append(told))
+    both_ways(
+        line.start(0.5, 0.5), Events, {"p": (0.0, 1.0)}, progress=lambda *told: heard.append(told)
+    )
     shares = [share for share, _ in heard]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -179,14 +198,17 @@ class Wall(Events):
 
 def test_what_lies_outside_the_bounds_is_no_event():
     line = Explicit(lambda z: z[0] - z[1], lambda z: np.array([1.0, -1.0]))
-    inside, outside = (both_ways(line.start(0.0, 0.0), Wall, {"p": (-1.0, high)}) for high in (1.0, 2.0))
+    inside, outside = (
+        both_ways(line.start(0.0, 0.0), Wall, {"p": (-1.0, high)}) for high in (1.0, 2.0)
+    )
     assert inside.ends == (End(CurveEnd.BOUND, -1.0), End(CurveEnd.BOUND, 1.0))
     assert outside.ends[1].reason is CurveEnd.NOT_LOCATED
 
 
 def test_where_no_step_is_short_enough_the_end_says_so():
     spike = Explicit(
-        lambda z: z[1] - abs(z[0]) ** 0.5, lambda z: np.array([-0.5 * np.sign(z[0]) / max(abs(z[0]), 1e-300) ** 0.5, 1.0])
+        lambda z: z[1] - abs(z[0]) ** 0.5,
+        lambda z: np.array([-0.5 * np.sign(z[0]) / max(abs(z[0]), 1e-300) ** 0.5, 1.0]),
     )
     found = both_ways(spike.start(1.0, 1.0), Events, WIDE, steps=replace(STEPS, most_points=2000))
     assert {end.reason for end in found.ends} == {CurveEnd.NO_STEP, CurveEnd.BOUND}
@@ -230,13 +252,16 @@ def test_a_zero_is_located_from_the_side_on_which_the_function_is_a_power(power)
     line = Explicit(lambda place: place[1], lambda place: np.array([0.0, 1.0]))
     begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
     found = located(Function("border", value, 1e-12, one_sided=True), begin, end)
-    assert 0.0 <= zero - found.point.place[0] < 1e-12  # and never beyond, where other equations hold
+    # and never beyond, where other equations hold
+    assert 0.0 <= zero - found.point.place[0] < 1e-12
     assert found.evidence.bracket < 2e-12
     assert len(asked) < 26  # bisection to this width takes 40
 
 
 def test_a_zero_is_located_to_rounding_where_rounding_moves_the_points_beside_it():
-    """The last brackets are narrower than what rounding leaves of the unknowns: a point that lies off by this is on the curve."""
+    """The last brackets are narrower than what rounding leaves of the unknowns: a point that lies
+    off by this is on the curve.
+    """
 
     def rounded(place: np.ndarray) -> float:
         return float(place[1] + 6e-14 * (int(place[0] * 2.0**53) // 2 % 2))
@@ -245,14 +270,20 @@ def test_a_zero_is_located_to_rounding_where_rounding_moves_the_points_beside_it
     begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
     for zero in np.linspace(0.1, 0.9, 57).tolist():
         found = located(
-            Function("zero", lambda point, at=zero: math.expm1(2.0 * (float(point.place[0]) - at)), 1e-15), begin, end
+            Function(
+                "zero", lambda point, at=zero: math.expm1(2.0 * (float(point.place[0]) - at)), 1e-15
+            ),
+            begin,
+            end,
         )
         assert found is not None
         assert abs(found.point.place[0] - zero) < 1e-14
 
 
 def test_a_zero_beside_which_rounding_leaves_no_more_points_is_in_the_bracket_of_the_last_two():
-    """As beside a grazing of an orbit with an excursion of hardly any duration; a wider gap in a curve may hide another curve."""
+    """As beside a grazing of an orbit with an excursion of hardly any duration; a wider gap in a
+    curve may hide another curve.
+    """
     zero = 0.3
     for width, narrow in ((1e-9, True), (1e-4, False)):
         asked = list[float]()
@@ -264,13 +295,19 @@ def test_a_zero_beside_which_rounding_leaves_no_more_points_is_in_the_bracket_of
 
         line = Explicit(broken, lambda place: np.array([0.0, 1.0]))
         begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (0.0, 1.0))
-        found = located(Function("zero", lambda point: math.expm1(2.0 * (float(point.place[0]) - zero)), 1e-15), begin, end)
+        found = located(
+            Function("zero", lambda point: math.expm1(2.0 * (float(point.place[0]) - zero)), 1e-15),
+            begin,
+            end,
+        )
         assert found is None or abs(found.point.place[0] - zero) < 2e-9
         assert (found is not None) == narrow
 
 
 def test_a_corrector_that_goes_round_at_a_kink_is_given_up():
-    """Newton's method jumps to and fro between both branches of 1 + abs(x), which has no zero, until it is told not to."""
+    """Newton's method jumps to and fro between both branches of 1 + abs(x), which has no zero,
+    until it is told not to.
+    """
     asked = []
 
     def kinked(place: np.ndarray) -> float:

@@ -1,7 +1,8 @@
-"""Both layers event by event with SciPy's DOP853, for comparison: modes as in the paper's Table 1, impacts case by case.
+"""Both layers event by event with SciPy's DOP853, for comparison: modes as in the paper's Table 1,
+impacts case by case.
 
-Openings x1 = theta_1, x2 = -theta_2; the equations are those of `eomnl` in the openings, written out, with a layer held by
-dropping its row; an impact is solved case by case, without any search.
+Openings x1 = theta_1, x2 = -theta_2; the equations are those of `eomnl` in the openings, written
+out, with a layer held by dropping its row; an impact is solved case by case, without any search.
 """
 
 import math
@@ -13,7 +14,9 @@ LOWER, UPPER = 0, 1
 
 
 class Layers:
-    """The system of a `TwoLayer` under vertical and horizontal loads, with Newton's law and a transfer."""
+    """The system of a `TwoLayer` under vertical and horizontal loads, with Newton's law and a
+    transfer.
+    """
 
     def __init__(self, system):
         self.model, self.load = system.model, system.load
@@ -29,7 +32,12 @@ class Layers:
         zeta = load.ground_horizontal.acceleration(t)
         a2, v2 = load.horizontal(t) - zeta, load.vertical(t)
         a1 = a2 - m.mass_ratio * zeta
-        r1 = a1 * math.sin(b1) + v2 * math.cos(b1) - m.dissipation_ratio * m.damping * v[0] - m.stiffness_ratio * x[0]
+        r1 = (
+            a1 * math.sin(b1)
+            + v2 * math.cos(b1)
+            - m.dissipation_ratio * m.damping * v[0]
+            - m.stiffness_ratio * x[0]
+        )
         r2 = -a2 * math.sin(b2) + v2 * math.cos(b2) - m.damping * v[1] - x[1]
         return np.array([r1 + math.sin(angle) * v[1] ** 2, r2 + math.sin(angle) * v[0] ** 2])
 
@@ -49,7 +57,8 @@ class Layers:
         """v+ after layer `hit` has closed with v[hit] < 0; the other one, if closed, is at rest."""
         mass, other, after = self.mass(x), 1 - hit, v.copy()
         after[hit] = -self.e[hit] * v[hit]
-        after[other] = v[other] - mass[hit, other] * (after[hit] - v[hit]) / mass[other, other]  # no impulse on the other
+        # no impulse on the other
+        after[other] = v[other] - mass[hit, other] * (after[hit] - v[hit]) / mass[other, other]
         if closed[other]:
             after[other] = max(after[other], -self.transfer * v[hit])
         return after
@@ -83,7 +92,9 @@ def follow(system, x, v, end, tol=1e-12):
 
 
 def choose(layers, t, x, v):
-    """Which layers are open: those away from contact or leaving it; one at rest there opens if it is pulled away."""
+    """Which layers are open: those away from contact or leaving it; one at rest there opens if it
+    is pulled away.
+    """
     opened = [bool(x[i] > 0.0 or v[i] > 0.0) for i in (LOWER, UPPER)]
     for i in (LOWER, UPPER):
         if not opened[i] and layers.reaction(t, x, v, opened, i) < 0.0:
@@ -92,7 +103,9 @@ def choose(layers, t, x, v):
 
 
 def arc(layers, t, x, v, opened, end, tol):
-    """A smooth motion to the first closing of an open layer or the first zero of a closed one's reaction."""
+    """A smooth motion to the first closing of an open layer or the first zero of a closed one's
+    reaction.
+    """
 
     def rate(s, y):
         return np.concatenate([y[2:], layers.acceleration(s, y[:2], y[2:], opened)])
@@ -108,4 +121,6 @@ def arc(layers, t, x, v, opened, end, tol):
         guard.terminal, guard.direction = True, -1
     held = np.array(opened, dtype=float)
     start = np.concatenate([x * held, v * held])
-    return solve_ivp(rate, (t, end), start, method="DOP853", rtol=tol, atol=1e-14, events=guards, max_step=0.02)
+    return solve_ivp(
+        rate, (t, end), start, method="DOP853", rtol=tol, atol=1e-14, events=guards, max_step=0.02
+    )

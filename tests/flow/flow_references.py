@@ -1,4 +1,6 @@
-"""References for the flow: systems that share one structure, a 30-digit integrator, and heyoka.py restarted at impacts."""
+"""References for the flow: systems that share one structure, a 30-digit integrator, and heyoka.py
+restarted at impacts.
+"""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +8,8 @@ import mpmath as mp
 import numpy as np
 from shared_systems import BETA80
 
-# Every set of paths compiles a tangent of its own, some seconds each: tests of `forced` that need some of these take all.
+# Every set of paths compiles a tangent of its own, some seconds each: tests of `forced` that need
+# some of these take all.
 SHARED_PATHS = (
     *("load.horizontal.amplitude", "load.horizontal.phase", "load.frequency", "load.vertical"),
     *("model.beta0", "model.damping"),
@@ -14,7 +17,9 @@ SHARED_PATHS = (
 
 
 def evaluate_steps(dense, samples=9):
-    """Coordinate (degree of freedom 0) at fractions of every step of a dense output: shape (steps, samples)."""
+    """Coordinate (degree of freedom 0) at fractions of every step of a dense output: shape (steps,
+    samples).
+    """
     tau = dense.length[:, None] * np.linspace(0.0, 1.0, samples)
     value = np.zeros_like(tau)
     for power in range(dense.series.shape[2] - 1, -1, -1):
@@ -24,7 +29,9 @@ def evaluate_steps(dense, samples=9):
 
 @dataclass
 class PreciseMotion:
-    """Impacts, as (time, side before, velocity before, velocity after), and the end state, in mpmath's numbers."""
+    """Impacts, as (time, side before, velocity before, velocity after), and the end state, in
+    mpmath's numbers.
+    """
 
     impacts: list = field(default_factory=list)
     time: object = None
@@ -32,20 +39,36 @@ class PreciseMotion:
 
 
 class PreciseSystem:
-    """`gov_eqn_theta_long` under H(t) = mean + H sin(W t + phase), a constant V; every number the double it is.
+    """`gov_eqn_theta_long` under H(t) = mean + H sin(W t + phase), a constant V; every number the
+    double it is.
 
-    Taylor series written out by hand for this equation, event by event; the root of each impact by bisection on every
-    sixteenth of a step, then secants.
+    Taylor series written out by hand for this equation, event by event; the root of each impact by
+    bisection on every sixteenth of a step, then secants.
     """
 
     def __init__(
-        self, *, beta0=BETA80, C=0.1, m=0.0, k=1.0, c=1.0, V=-0.5, H=0.0, mean=0.0, phase=0.0, W=1.0, factors=(1.0, 1.0)
+        self,
+        *,
+        beta0=BETA80,
+        C=0.1,
+        m=0.0,
+        k=1.0,
+        c=1.0,
+        V=-0.5,
+        H=0.0,
+        mean=0.0,
+        phase=0.0,
+        W=1.0,
+        factors=(1.0, 1.0),
     ):
-        self.b, self.V, self.H, self.mean, self.phase, self.W = map(mp.mpf, (beta0, V, H, mean, phase, W))
+        self.b, self.V, self.H, self.mean, self.phase, self.W = map(
+            mp.mpf, (beta0, V, H, mean, phase, W)
+        )
         self.mass = {1: 1 + mp.mpf(m), -1: mp.mpf(1)}
         self.damping = {1: mp.mpf(c) * mp.mpf(C), -1: mp.mpf(C)}
         self.stiffness = {1: mp.mpf(k), -1: mp.mpf(1)}
-        self.factor = {1: mp.mpf(factors[0]), -1: mp.mpf(factors[1])}  # by the side before the impact
+        # by the side before the impact
+        self.factor = {1: mp.mpf(factors[0]), -1: mp.mpf(factors[1])}
 
     def series(self, t, x0, v0, side, order):
         """Taylor coefficients of theta (order + 1) and theta'."""
@@ -55,7 +78,11 @@ class PreciseSystem:
         push = [self.mean + self.H * mp.sin(angle)]
         for n in range(order):
             force = mp.fdot(sine, reversed(push)) + side * self.V * cosine[n]
-            v.append((force - self.damping[side] * v[n] - self.stiffness[side] * x[n]) / self.mass[side] / (n + 1))
+            v.append(
+                (force - self.damping[side] * v[n] - self.stiffness[side] * x[n])
+                / self.mass[side]
+                / (n + 1)
+            )
             x.append(v[n] / (n + 1))
             slopes = [j * x[j] for j in range(1, n + 2)]
             s_next = side * mp.fdot(slopes, reversed(cosine)) / (n + 1)
@@ -72,7 +99,9 @@ class PreciseSystem:
         while t < until and len(out.impacts) < impacts:
             xs, vs = self.series(t, x, v, side, order)
             h = min(
-                (tol / abs(vs[order])) ** (mp.mpf(1) / order), (tol / abs(vs[order - 1])) ** (mp.mpf(1) / (order - 1)), until - t
+                (tol / abs(vs[order])) ** (mp.mpf(1) / order),
+                (tol / abs(vs[order - 1])) ** (mp.mpf(1) / (order - 1)),
+                until - t,
             )
             gap = [side * a for a in (xs[1:] if x == 0 else xs)]
             root = _first_root(gap, h)
@@ -107,15 +136,18 @@ def _first_root(coefficients, h, pieces=16):
 
 
 def limit_of_impacts(impacts, side):
-    """Where the impacts that leave `side` accumulate: their times extrapolated to speed 0 (Neville's scheme).
+    """Where the impacts that leave `side` accumulate: their times extrapolated to speed 0
+    (Neville's scheme).
 
-    Under constant loads the time left is an analytic function of the speed, by Koenigs' theorem on the map of two impacts.
+    Under constant loads the time left is an analytic function of the speed, by Koenigs' theorem on
+    the map of two impacts.
     """
     nodes = [(abs(v), t) for t, s, v, _ in impacts if s == side]
     speeds, table = [v for v, _ in nodes], [t for _, t in nodes]
     for level in range(1, len(table)):
         table = [
-            (speeds[i + level] * table[i] - speeds[i] * table[i + 1]) / (speeds[i + level] - speeds[i])
+            (speeds[i + level] * table[i] - speeds[i] * table[i + 1])
+            / (speeds[i + level] - speeds[i])
             for i in range(len(table) - 1)
         ]
     return table[0]

@@ -1,4 +1,6 @@
-"""Models with coordinates of first order, for several test files, and their motions by SciPy's DOP853."""
+"""Models with coordinates of first order, for several test files, and their motions by SciPy's
+DOP853.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ import saltus
 
 @dataclass(frozen=True, kw_only=True)
 class Piezo(saltus.ContactModel):
-    """x'' + c x' + x + k u = -zeta'' before a stop, u' = k x' - u / R with the voltage u over a load resistance."""
+    """x'' + c x' + x + k u = -zeta'' before a stop, u' = k x' - u / R with the voltage u over a
+    load resistance.
+    """
 
     coordinates = ("x", "voltage")
     first_order = ("voltage",)
@@ -29,7 +33,9 @@ class Piezo(saltus.ContactModel):
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
         (x, u), v = theta, velocity[0]
-        return -x - self.damping * v - self.coupling * u - load.ground.acceleration(t), self.coupling * v - u / self.resistance
+        return -x - self.damping * v - self.coupling * u - load.ground.acceleration(
+            t
+        ), self.coupling * v - u / self.resistance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +69,9 @@ def shaken(model: Piezo, amplitude: float = 0.2) -> saltus.System:
     return saltus.System(model=model, load=load, impact=saltus.NewtonImpact(0.7))
 
 
-def by_dop853(system: saltus.System, state: tuple[float, float, float], end: float) -> tuple[np.ndarray, list[float]]:
+def by_dop853(
+    system: saltus.System, state: tuple[float, float, float], end: float
+) -> tuple[np.ndarray, list[float]]:
     """(x, u, x') at the end, and the times of the impacts."""
     model: Any = system.model
     ground = replace(system.load.channels["ground"])
@@ -82,7 +90,9 @@ def by_dop853(system: saltus.System, state: tuple[float, float, float], end: flo
     gap.terminal, gap.direction = True, -1  # type: ignore[attr-defined]
     t, y, times = 0.0, np.array(state), list[float]()
     while True:
-        found = solve_ivp(rates, (t, end), y, method="DOP853", rtol=3e-14, atol=1e-15, events=gap, max_step=0.2)
+        found = solve_ivp(
+            rates, (t, end), y, method="DOP853", rtol=3e-14, atol=1e-15, events=gap, max_step=0.2
+        )
         y = found.y[:, -1]
         if found.status != 1:
             return y, times

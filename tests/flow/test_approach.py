@@ -1,4 +1,6 @@
-"""Where motions are going: exact for linear maps, quadratic in the distance for others, nothing where no orbit is stable."""
+"""Where motions are going: exact for linear maps, quadratic in the distance for others, nothing
+where no orbit is stable.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,21 @@ def iterated(step, start, count):
 def spiral(radius, angle):
     """The matrix of a rotation that shrinks, in skew axes."""
     axes = np.array([[1.0, 0.4], [0.0, 0.8]])
-    turn = radius * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    turn = radius * np.array(
+        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    )
     return axes @ turn @ np.linalg.inv(axes)
 
 
 @pytest.mark.parametrize(
     "matrix",
-    [spiral(0.93, 2.1), spiral(0.2, 0.3), np.diag([0.9, -0.4]), np.diag([0.9, 0.0]), np.array([[0.5, 1.0], [0.0, 0.5]])],
+    [
+        spiral(0.93, 2.1),
+        spiral(0.2, 0.3),
+        np.diag([0.9, -0.4]),
+        np.diag([0.9, 0.0]),
+        np.array([[0.5, 1.0], [0.0, 0.5]]),
+    ],
     ids=["slow spiral", "fast spiral", "node", "singular", "Jordan block"],
 )
 def test_the_fixed_point_of_a_linear_map_is_found_from_five_states(matrix):
@@ -63,7 +73,9 @@ def test_of_a_map_that_bends_the_error_falls_with_the_square_of_the_distance():
     assert errors[2] / errors[1] == pytest.approx(1e-2, rel=0.3)
 
 
-@pytest.mark.parametrize("matrix", [np.diag([0.5, 1.001]), np.diag([0.3, -1.2]), spiral(0.99, 1.0), spiral(1.1, 0.4)])
+@pytest.mark.parametrize(
+    "matrix", [np.diag([0.5, 1.001]), np.diag([0.3, -1.2]), spiral(0.99, 1.0), spiral(1.1, 0.4)]
+)
 def test_what_is_not_surely_stable_is_left_where_it_is(matrix):
     states = iterated(lambda s: POINT + matrix @ (s - POINT), POINT + np.array([0.01, 0.01]), 9)
     limit, period = approached(states, 2)
@@ -72,8 +84,12 @@ def test_what_is_not_surely_stable_is_left_where_it_is(matrix):
 
 
 def test_a_long_way_and_too_few_states_are_left_alone():
-    far = iterated(lambda s: POINT + spiral(0.9, 0.2) @ (s - POINT), POINT + np.array([3.0, 4.0]), 5)
-    few = iterated(lambda s: POINT + spiral(0.5, 0.2) @ (s - POINT), POINT + np.array([0.02, 0.01]), 4)
+    far = iterated(
+        lambda s: POINT + spiral(0.9, 0.2) @ (s - POINT), POINT + np.array([3.0, 4.0]), 5
+    )
+    few = iterated(
+        lambda s: POINT + spiral(0.5, 0.2) @ (s - POINT), POINT + np.array([0.02, 0.01]), 4
+    )
     for states in (far, few, np.full((1, 9, 2), np.nan)):
         limit, period = approached(states, 2)
         assert period[0] == 0
@@ -81,7 +97,9 @@ def test_a_long_way_and_too_few_states_are_left_alone():
 
 
 def test_chaos_is_hardly_ever_taken_for_an_approach():
-    states = iterated(lambda s: [1.0 - 1.4 * s[0] ** 2 + s[1], 0.3 * s[0]], [0.1, 0.1], 20_000)[0, 100:]
+    states = iterated(lambda s: [1.0 - 1.4 * s[0] ** 2 + s[1], 0.3 * s[0]], [0.1, 0.1], 20_000)[
+        0, 100:
+    ]
     windows = np.lib.stride_tricks.sliding_window_view(states, 9, axis=0).transpose(0, 2, 1)
     _, period = approached(windows, 2)
     assert (period > 0).mean() < 1e-3  # Hénon's map has no stable orbit here
@@ -100,6 +118,6 @@ def test_the_orbit_of_a_cell_is_where_its_motion_is_going():
     assert late.period[0] == period[0] == 1
     before, after = (np.abs(state - late.last).max() for state in (early.last, limit))
     assert after < 0.02 * before
-    assert simulate_many(system, theta=limit[:, 0], velocity=limit[:, 1], periods=1)["theta"].values == pytest.approx(
-        late.last[:, 0], abs=0.02 * before
-    )
+    assert simulate_many(system, theta=limit[:, 0], velocity=limit[:, 1], periods=1)[
+        "theta"
+    ].values == pytest.approx(late.last[:, 0], abs=0.02 * before)

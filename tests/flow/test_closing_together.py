@@ -1,4 +1,6 @@
-"""Derivatives through contacts that close at one instant without acting on one another: cells that move alike."""
+"""Derivatives through contacts that close at one instant without acting on one another: cells that
+move alike.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -27,7 +29,10 @@ class Row(ContactModel):
 
     @property
     def contacts(self):
-        return tuple(Contact(name=f"wall{name[1:]}", coordinate=name, position=self.wall) for name in self.coordinates)
+        return tuple(
+            Contact(name=f"wall{name[1:]}", coordinate=name, position=self.wall)
+            for name in self.coordinates
+        )
 
     def force(self, t, x, v, load):
         forces = []
@@ -55,7 +60,9 @@ PATHS = ("model.spring", "load.frequency", "impact.e.0", "impact.e.1", "model.wa
 
 def row(e=0.6, kind=Row, force=-0.7, **numbers):
     load = Load(frequency=1.3, force=force + Harmonic(amplitude=0.5))
-    return System(model=kind(**numbers), load=load, impact=NewtonImpact(e=(e,) * len(kind.coordinates)))
+    return System(
+        model=kind(**numbers), load=load, impact=NewtonImpact(e=(e,) * len(kind.coordinates))
+    )
 
 
 def end_of(system, start, duration, tol=1e-15):
@@ -92,12 +99,15 @@ def moved(system, start, k, by, paths):
 
 
 def differences(system, start, duration, paths, step):
-    """From both sides, (2, state, numbers); each of an error of first order, as the order of the impacts has one of second."""
+    """From both sides, (2, state, numbers); each of an error of first order, as the order of the
+    impacts has one of second.
+    """
     base = end_of(system, start, duration)
     return np.array(
         [
             [
-                (end_of(*moved(system, start, k, sign * step, paths), duration) - base) * (sign / step)
+                (end_of(*moved(system, start, k, sign * step, paths), duration) - base)
+                * (sign / step)
                 for k in range(len(start) + len(paths))
             ]
             for sign in (1, -1)
@@ -106,10 +116,13 @@ def differences(system, start, duration, paths, step):
 
 
 def closed_together(result):
-    return {event.contact for event in result.motion.events.of(EventKind.IMPACT) if "+" in event.contact}
+    return {
+        event.contact for event in result.motion.events.of(EventKind.IMPACT) if "+" in event.contact
+    }
 
 
-# What couples the masses, how they start, their restitution: all three alike, or the outer two about another one
+# What couples the masses, how they start, their restitution: all three alike, or the outer two
+# about another one
 CASES = {
     "apart": ({}, (0.5, 0.5, 0.5), (0.2, 0.2, 0.2), 0.6, 4.0),
     "all three with springs": ({"spring": 0.7}, (0.5, 0.5, 0.5), (0.2, 0.2, 0.2), 0.6, 4.0),
@@ -120,7 +133,11 @@ CASES = {
 for seed in range(
     4
 ):  # springs, starts and restitutions at random, and every second time with another start of the mass in the middle
-    numbers = np.random.default_rng(seed).uniform((0.0, 0.2, -0.5, 0.1, -0.5, 0.05), (2.0, 1.0, 0.5, 1.0, 0.5, 0.9)).tolist()
+    numbers = (
+        np.random.default_rng(seed)
+        .uniform((0.0, 0.2, -0.5, 0.1, -0.5, 0.05), (2.0, 1.0, 0.5, 1.0, 0.5, 0.9))
+        .tolist()
+    )
     outer, middle = numbers[1:3], numbers[3:5] if seed % 2 else numbers[1:3]
     x, v = zip(outer, middle, outer, strict=True)
     CASES[f"random {seed}"] = ({"spring": numbers[0]}, x, v, numbers[5], 4.0)
@@ -138,14 +155,18 @@ def test_derivatives_are_the_limit_of_differences_from_either_side(name):
     coarse, fine = (differences(system, start, duration, paths, step) for step in (2e-5, 1e-5))
     size = np.abs(found).max()
     for side in range(2):
-        np.testing.assert_allclose((2 * fine - coarse)[side] / size, found / size, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(
+            (2 * fine - coarse)[side] / size, found / size, rtol=0, atol=1e-7
+        )
 
 
 def test_rows_without_springs_have_the_derivatives_of_one_mass():
     one = derivatives(row(kind=Single), (0.5, 0.2), 4.0, ("load.frequency", "model.wall"))
     three = derivatives(row(), (0.5,) * 3 + (0.2,) * 3, 4.0, ("load.frequency", "model.wall"))
     np.testing.assert_allclose(three.state, np.kron(one.state, np.eye(3)), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(three.parameters, np.repeat(one.parameters, 3, axis=0), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        three.parameters, np.repeat(one.parameters, 3, axis=0), rtol=0, atol=1e-13
+    )
     together = [event.contact == "wall_1+wall_2+wall_3" for event in three.motion.events]
     assert all(together)
     np.testing.assert_allclose(three.event_times[:, 6:], one.event_times[:, 2:], rtol=1e-11)
@@ -153,14 +174,18 @@ def test_rows_without_springs_have_the_derivatives_of_one_mass():
 
 
 def test_dampers_between_masses_leave_derivatives_from_one_side_only():
-    """Between two impacts t apart a damper of constant b gives each of the two masses b (1 + e) v t.
+    """Between two impacts t apart a damper of constant b gives each of the two masses b (1 + e) v
+    t.
 
-    One has it before its own impact, which turns it round to -e of it, the other one after it; they change places where the other
-    mass is the first. So derivatives from both sides differ by b (1 + e)^2 v abs(t) for each neighbour.
+    One has it before its own impact, which turns it round to -e of it, the other one after it; they
+    change places where the other mass is the first. So derivatives from both sides differ by b (1 +
+    e)^2 v abs(t) for each neighbour.
     """
     e, between, step = 0.6, 0.4, 1e-6
     system, start = row(e, between=between), (0.5,) * 3 + (0.2,) * 3
-    impact = saltus.simulate(system, x_1=0.5, x_2=0.5, x_3=0.5, velocity=start[3:], duration=3.0).events[0]
+    impact = saltus.simulate(
+        system, x_1=0.5, x_2=0.5, x_3=0.5, velocity=start[3:], duration=3.0
+    ).events[0]
     early = derivatives(system, start, impact.time - 1e-4)
     result = derivatives(system, start, impact.time + 1e-4, ("load.frequency",))
     assert "only one-sided derivatives" in result.undefined
@@ -186,24 +211,37 @@ class Pushed(Row):
 
 
 def test_a_release_of_several_has_a_derivative_only_to_what_keeps_them_together():
-    """Masses at their walls leave where F(t) = k x_wall: dt = x_wall dk / F'(t), while a push on one moves its instant alone."""
+    """Masses at their walls leave where F(t) = k x_wall: dt = x_wall dk / F'(t), while a push on
+    one moves its instant alone.
+    """
     W, wall = 1.3, 0.2
     load = Load(frequency=W, force=-0.2 + Harmonic(amplitude=0.5))
     system = System(model=Pushed(wall=wall), load=load, impact=NewtonImpact(e=(0.0,) * 3))
     start = dict.fromkeys(system.model.coordinates, wall)
     paths = ("model.stiffness", "model.push")
-    result = saltus.sensitivities(system, velocity=(0.0,) * 3, duration=2.0, parameters=paths, tol=1e-14, **start)
+    result = saltus.sensitivities(
+        system, velocity=(0.0,) * 3, duration=2.0, parameters=paths, tol=1e-14, **start
+    )
     *_, release = result.motion.events
     assert (release.kind, release.contact) == (EventKind.RELEASE, "wall_1+wall_2+wall_3")
     instant = np.arcsin((0.2 + 0.4 * wall) / 0.5) / W
     assert release.time == pytest.approx(instant, abs=1e-14)
-    assert result.event_times[-1, 6] == pytest.approx(wall / (0.5 * W * np.cos(W * instant)), rel=1e-12)
+    assert result.event_times[-1, 6] == pytest.approx(
+        wall / (0.5 * W * np.cos(W * instant)), rel=1e-12
+    )
     assert np.isnan(result.event_times[-1, 7])
     alone = saltus.sensitivities(
-        system.with_({"model.push": -0.01}), velocity=(0.0,) * 3, duration=2.0, parameters=paths, **start
+        system.with_({"model.push": -0.01}),
+        velocity=(0.0,) * 3,
+        duration=2.0,
+        parameters=paths,
+        **start,
     )
     slope = -1.0 / (0.5 * W * np.cos(W * alone.motion.events[-1].time))
-    assert [event.contact for event in alone.motion.events.of(EventKind.RELEASE)] == ["wall_2+wall_3", "wall_1"]
+    assert [event.contact for event in alone.motion.events.of(EventKind.RELEASE)] == [
+        "wall_2+wall_3",
+        "wall_1",
+    ]
     np.testing.assert_allclose(alone.event_times[-2:, 7], [0.0, slope], rtol=1e-12)
     assert np.isfinite(result.state).all()
     assert np.isfinite(result.parameters).all()

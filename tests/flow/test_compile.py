@@ -1,4 +1,6 @@
-"""Compiled code on disk: made once, shared, safe when two processes make it at once, and never in the way."""
+"""Compiled code on disk: made once, shared, safe when two processes make it at once, and never in
+the way.
+"""
 
 import json
 import os
@@ -34,7 +36,11 @@ def fresh(tmp_path):
     load_kernel()
     source, target = cache_directory(), tmp_path / "cache" / "kernels"
     (target / "__pycache__").mkdir(parents=True)
-    kernel = Path(sys.modules[next(name for name in sys.modules if name.startswith("saltus_kernel_"))].__file__).stem
+    kernel = Path(
+        sys.modules[
+            next(name for name in sys.modules if name.startswith("saltus_kernel_"))
+        ].__file__
+    ).stem
     for path in [*source.glob(f"{kernel}*"), *source.glob(f"__pycache__/{kernel}*")]:
         shutil.copy2(path, target / path.relative_to(source))
     return tmp_path / "cache"
@@ -53,7 +59,11 @@ def finish(process):
 
 
 def contents(folder):
-    return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in Path(folder).rglob("*") if path.is_file()}
+    return {
+        path: (path.stat().st_mtime_ns, path.read_bytes())
+        for path in Path(folder).rglob("*")
+        if path.is_file()
+    }
 
 
 def test_two_processes_that_compile_at_once_succeed_and_a_third_compiles_nothing(fresh):
@@ -88,7 +98,11 @@ def test_read_only_cache_directory_falls_back_to_a_temporary_one(tmp_path, monke
     (wanted / "kernels").mkdir(parents=True)
     writable = os.access
     # As for any user but root, whom no permission stops.
-    monkeypatch.setattr(os, "access", lambda path, mode: not Path(path).is_relative_to(wanted) and writable(path, mode))
+    monkeypatch.setattr(
+        os,
+        "access",
+        lambda path, mode: not Path(path).is_relative_to(wanted) and writable(path, mode),
+    )
     monkeypatch.setenv("SALTUS_CACHE_DIR", str(wanted))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     assert not cache_directory().is_relative_to(wanted)
@@ -131,11 +145,15 @@ def test_structures_with_different_expressions_are_different_files(sources):
 
 
 def test_structures_with_equal_expressions_are_one_file(sources):
-    assert sources(SYSTEM) == sources(SYSTEM.with_({"load.force": 3.0, "model.wall": -2.0, "impact.e": 0.1}))
+    assert sources(SYSTEM) == sources(
+        SYSTEM.with_({"load.force": 3.0, "model.wall": -2.0, "impact.e": 0.1})
+    )
 
 
 def test_two_threads_that_load_the_same_code_at_once_both_get_all_of_it():
-    """A module is known by its name before it has been executed; a second thread must wait for the first one."""
+    """A module is known by its name before it has been executed; a second thread must wait for the
+    first one.
+    """
     script = (
         "from concurrent.futures import ThreadPoolExecutor\n"
         "from saltus.flow import simulate\n"
@@ -145,5 +163,7 @@ def test_two_threads_that_load_the_same_code_at_once_both_get_all_of_it():
         "    ends = list(pool.map(lambda _: simulate(system, x=0.5, duration=5.0).x, range(4)))\n"
         "assert len(set(ends)) == 1\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=False
+    )
     assert done.returncode == 0, done.stderr

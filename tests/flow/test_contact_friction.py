@@ -1,4 +1,6 @@
-"""Friction pressed by a contact's own reaction: closed forms, impacts case by case, balances, derivatives, refusals."""
+"""Friction pressed by a contact's own reaction: closed forms, impacts case by case, balances,
+derivatives, refusals.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ class Slider(saltus.ContactModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Rod(saltus.ContactModel):
-    """A body whose normal and tangential motions are coupled by its inertia, as those of a rod's tip."""
+    """A body whose normal and tangential motions are coupled by its inertia, as those of a rod's
+    tip.
+    """
 
     mu: float = 0.3
     more: float = 0.0  # mu_s - mu_k
@@ -83,7 +87,9 @@ def test_a_block_slides_down_and_stops():
 
 @pytest.mark.parametrize("law", [saltus.NewtonImpact, saltus.PoissonImpact])
 def test_a_block_falls_and_bounces_while_it_slides(law):
-    """Whatever its impacts, x + mu y = mu h + v t + a t^2 / 2 while it slides forwards, as the forces along x are mu times R."""
+    """Whatever its impacts, x + mu y = mu h + v t + a t^2 / 2 while it slides forwards, as the
+    forces along x are mu times R.
+    """
     motion = saltus.simulate(slider(law=law), x=0.0, y=1.0, velocity=(1.0, 0.0), duration=20.0)
     slows, t = 0.3 * cos(0.2) - sin(0.2), np.linspace(0.0, 1.0 / (0.3 * cos(0.2) - sin(0.2)), 300)
     x, y = motion.at(t)[0]
@@ -95,22 +101,29 @@ def test_a_block_falls_and_bounces_while_it_slides(law):
 
 
 def test_a_block_hits_a_wall_and_slides_back():
-    """v1^2 = v0^2 - 2 mu d before the wall, e v1 after it, and it stops e^2 v1^2 / (2 mu) before it."""
-    motion = saltus.simulate(slider(angle=0.0, wall=1.0), x=0.0, y=0.0, velocity=(1.0, 0.0), duration=20.0)
+    """v1^2 = v0^2 - 2 mu d before the wall, e v1 after it, and it stops e^2 v1^2 / (2 mu) before
+    it.
+    """
+    motion = saltus.simulate(
+        slider(angle=0.0, wall=1.0), x=0.0, y=0.0, velocity=(1.0, 0.0), duration=20.0
+    )
     assert kinds(motion) == ["impact", "reversal", "stick", "rest"]
     assert abs(motion.x - (1.0 - 0.25 * (1.0 - 0.6) / 0.6)) < 1e-12
     assert abs(motion.events[0].velocity_before[0] - sqrt(0.4)) < 1e-13
 
 
 def test_a_block_is_pushed_loose_lifted_and_put_down():
-    """Slip where the push reaches mu_s R, take-off where the lift takes the weight, and slip backwards after it lands."""
+    """Slip where the push reaches mu_s R, take-off where the lift takes the weight, and slip
+    backwards after it lands.
+    """
     load = saltus.Load(frequency=1.0, push=saltus.Harmonic(0.5), lift=saltus.Harmonic(1.5))
     motion = saltus.simulate(slider(angle=0.0, e=0.0, load=load), x=0.0, y=0.0, periods=3)
     assert kinds(motion)[:4] == ["rest", "slip", "release", "impact"]
     slip, release = motion.events[1].time, motion.events[2].time
     assert abs(slip - asin(0.4 / 1.1)) < 1e-12  # 0.5 sin t = 0.4 (1 - 1.5 sin t)
     assert abs(release - asin(1.0 / 1.5)) < 1e-12
-    speed = 0.95 * (cos(slip) - cos(release)) - 0.3 * (release - slip)  # of 0.5 sin t - 0.3 (1 - 1.5 sin t)
+    # of 0.5 sin t - 0.3 (1 - 1.5 sin t)
+    speed = 0.95 * (cos(slip) - cos(release)) - 0.3 * (release - slip)
     assert abs(motion.events[2].velocity_before[0] - speed) < 1e-12
     t = np.linspace(0.0, motion.time, 4001)
     (_, y), _ = motion.at(t)
@@ -120,11 +133,13 @@ def test_a_block_is_pushed_loose_lifted_and_put_down():
     assert ((data.sliding_rub.values == 2) == (data.closed_contacts.values & 1 == 0)).all()
 
 
-# --- impacts case by case --------------------------------------------------------------------------------------------------
+# --- impacts case by case ----------------------------------------------------
 
 
 def moreau(inverse, v, e, mu, w=0.0):
-    """v+ by Moreau's law, for a contact on coordinate 1 with friction along coordinate 0: it sticks if the cone allows it."""
+    """v+ by Moreau's law, for a contact on coordinate 1 with friction along coordinate 0: it sticks
+    if the cone allows it.
+    """
     return v + inverse @ impulses(inverse, v - [w, 0.0], -e * v[1], mu)
 
 
@@ -164,27 +179,44 @@ def test_impacts_with_friction_stick_or_slide(speed, coupling):
         motion = saltus.simulate(system, x=0.0, y=1e-9, velocity=tuple(v), duration=1e-6, tol=1e-14)
         (event,) = motion.events
         assert np.abs(event.velocity_after - expected).max() < 1e-7
-        energy = [u @ np.linalg.solve(inverse, u) for u in (event.velocity_before, event.velocity_after)]
+        energy = [
+            u @ np.linalg.solve(inverse, u) for u in (event.velocity_before, event.velocity_after)
+        ]
         assert energy[1] <= energy[0] + 1e-12
 
 
 def test_a_moving_ground_drags_along_what_hits_it():
-    system = saltus.System(model=Rod(mu=0.4, coupling=0.0, speed=2.0), impact=saltus.NewtonImpact(e=0.5))
+    system = saltus.System(
+        model=Rod(mu=0.4, coupling=0.0, speed=2.0), impact=saltus.NewtonImpact(e=0.5)
+    )
     motion = saltus.simulate(system, x=0.0, y=0.5, velocity=(0.0, 0.0), duration=1.05, tol=1e-14)
-    assert abs(motion.velocity[0] - 0.4 * 1.5 / 1.5) < 5e-2  # mu (1 + e) of the impulse, over the mass
+    # mu (1 + e) of the impulse, over the mass
+    assert abs(motion.velocity[0] - 0.4 * 1.5 / 1.5) < 5e-2
     event = motion.events[0]
     assert abs(event.velocity_after[0] - event.velocity_before[0] - 0.4) < 1e-12
 
 
-# --- balances and derivatives ----------------------------------------------------------------------------------------------
+# --- balances and derivatives ------------------------------------------------
 
 
 def test_the_energy_balance_closes_on_random_models():
     random = np.random.default_rng(4)
     for _ in range(6):
-        model = Rod(mu=random.uniform(0.1, 0.6), coupling=random.uniform(-0.5, 0.5), push=random.uniform(-1.0, 1.0))
-        system = saltus.System(model=replace(model, speed=random.uniform(-0.5, 0.5)), impact=saltus.NewtonImpact(e=0.6))
-        motion = saltus.simulate(system, x=0.0, y=random.uniform(0.0, 0.5), velocity=(random.normal(), 0.0), duration=12.0)
+        model = Rod(
+            mu=random.uniform(0.1, 0.6),
+            coupling=random.uniform(-0.5, 0.5),
+            push=random.uniform(-1.0, 1.0),
+        )
+        system = saltus.System(
+            model=replace(model, speed=random.uniform(-0.5, 0.5)), impact=saltus.NewtonImpact(e=0.6)
+        )
+        motion = saltus.simulate(
+            system,
+            x=0.0,
+            y=random.uniform(0.0, 0.5),
+            velocity=(random.normal(), 0.0),
+            duration=12.0,
+        )
         found = saltus.energies(motion)
         assert abs(found.attrs["defect"]) < 1e-11
         assert abs(float(found.energy.sel(part="friction.rub"))) > 1e-3
@@ -193,7 +225,12 @@ def test_the_energy_balance_closes_on_random_models():
 CASES = {
     "slides and stops": (slider(), (0.0, 0.0, 1.0, 0.0), 20.0, ("model.mu", "model.angle")),
     "slides": (slider(), (0.0, 0.0, 1.0, 0.0), 5.0, ("model.mu", "model.angle")),
-    "hits a wall": (slider(angle=0.0, wall=1.0), (0.0, 0.0, 1.0, 0.0), 2.5, ("model.mu", "model.wall", "impact.e")),
+    "hits a wall": (
+        slider(angle=0.0, wall=1.0),
+        (0.0, 0.0, 1.0, 0.0),
+        2.5,
+        ("model.mu", "model.wall", "impact.e"),
+    ),
     "impact that slides": (
         saltus.System(model=Rod(), impact=saltus.NewtonImpact(e=0.5)),
         (0.0, 0.5, 2.0, 0.0),
@@ -232,35 +269,51 @@ def test_derivatives_agree_with_differences(name):
     system, state, duration, paths = CASES[name]
 
     def end(given, start):
-        motion = saltus.simulate(given, x=start[0], y=start[1], velocity=tuple(start[2:]), duration=duration, tol=1e-14)
+        motion = saltus.simulate(
+            given, x=start[0], y=start[1], velocity=tuple(start[2:]), duration=duration, tol=1e-14
+        )
         return np.array([*motion.position, *motion.velocity]), kinds(motion)
 
     found = saltus.sensitivities(
-        system, x=state[0], y=state[1], velocity=state[2:], duration=duration, parameters=paths, tol=1e-14
+        system,
+        x=state[0],
+        y=state[1],
+        velocity=state[2:],
+        duration=duration,
+        parameters=paths,
+        tol=1e-14,
     )
     h = 1e-5
     assert kinds(found.motion) == end(system, state)[1]
     for column, path in enumerate(paths):
         ends = [end(system.with_({path: system.get(path) + s * h}), state)[0] for s in (-1.0, 1.0)]
-        np.testing.assert_allclose(found.parameters[:, column], (ends[1] - ends[0]) / (2 * h), rtol=0, atol=2e-6)
+        np.testing.assert_allclose(
+            found.parameters[:, column], (ends[1] - ends[0]) / (2 * h), rtol=0, atol=2e-6
+        )
     inside = state[1] > 0.0  # else y and its rate have one-sided derivatives
     for place in range(4) if inside else (0, 2):
         ends = [end(system, np.array(state) + s * h * np.eye(4)[place])[0] for s in (-1.0, 1.0)]
-        np.testing.assert_allclose(found.state[:, place], (ends[1] - ends[0]) / (2 * h), rtol=0, atol=5e-5)
+        np.testing.assert_allclose(
+            found.state[:, place], (ends[1] - ends[0]) / (2 * h), rtol=0, atol=5e-5
+        )
     assert not inside or abs(found.state).max() > 0.5
 
 
-# --- refusals --------------------------------------------------------------------------------------------------------------
+# --- refusals ----------------------------------------------------------------
 
 
 def test_painleves_paradox_is_refused_by_name_with_its_number():
-    with pytest.raises(saltus.ParameterError, match=r"Painleve's paradox.*1 \+ s mu m_nt / m_tt .* is -0\.2"):
+    with pytest.raises(
+        saltus.ParameterError, match=r"Painleve's paradox.*1 \+ s mu m_nt / m_tt .* is -0\.2"
+    ):
         saltus.System(model=Rod(mu=3.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class UniformRod(saltus.ContactModel):
-    """A rod of half length and mass 1, and of inertia 1/3, at an angle to the floor, by the coordinates of its lower end."""
+    """A rod of half length and mass 1, and of inertia 1/3, at an angle to the floor, by the
+    coordinates of its lower end.
+    """
 
     mu: float = 1.5
 
@@ -281,20 +334,34 @@ class UniformRod(saltus.ContactModel):
 
 
 def painleve(mu: float, angle: float, s: float) -> float:
-    """1 - s mu A_nt / A_nn with A_nn = 1 + 3 cos^2 and A_nt = -3 sin cos (Painleve 1895; Genot and Brogliato 1999)."""
+    """1 - s mu A_nt / A_nn with A_nn = 1 + 3 cos^2 and A_nt = -3 sin cos (Painleve 1895; Genot and
+    Brogliato 1999).
+    """
     return 1.0 + s * mu * 3.0 * sin(angle) * cos(angle) / (1.0 + 3.0 * cos(angle) ** 2)
 
 
-@pytest.mark.parametrize("mu", [1.32, 1.35, 1.5])  # the paradox begins at 4/3, where the tangent of the angle is 2
+# the paradox begins at 4/3, where the tangent of the angle is 2
+@pytest.mark.parametrize("mu", [1.32, 1.35, 1.5])
 def test_a_rod_that_slides_is_refused_where_painleves_paradox_begins(mu):
     system, refused = saltus.System(model=UniformRod(mu=mu), impact=saltus.NewtonImpact(e=0.5)), []
     for angle in np.arctan([0.3, 0.8, 1.2, 1.6, 1.9, 2.0, 2.1, 3.0, 3.5, -1.0, -2.0]):
         for way in (1.0, -1.0):
-            number, least = painleve(mu, angle, way), min(painleve(mu, angle, 1.0), painleve(mu, angle, -1.0))
-            for height, speed in ((0.0, 0.0), (1e-9, -1.0)):  # it slides, or hits the floor while it does
-                start = {"x": 0.0, "y": height, "angle": float(angle), "velocity": (way, speed, 0.0)}
+            number, least = (
+                painleve(mu, angle, way),
+                min(painleve(mu, angle, 1.0), painleve(mu, angle, -1.0)),
+            )
+            # it slides, or hits the floor while it does
+            for height, speed in ((0.0, 0.0), (1e-9, -1.0)):
+                start = {
+                    "x": 0.0,
+                    "y": height,
+                    "angle": float(angle),
+                    "velocity": (way, speed, 0.0),
+                }
                 try:
-                    assert saltus.simulate(system, **start, duration=1e-6).time == pytest.approx(1e-6, abs=1e-18)
+                    assert saltus.simulate(system, **start, duration=1e-6).time == pytest.approx(
+                        1e-6, abs=1e-18
+                    )
                     taken = True
                 except saltus.MotionError as error:
                     taken, told = False, str(error)
@@ -309,20 +376,32 @@ def test_a_rod_that_slides_is_refused_where_painleves_paradox_begins(mu):
 def test_the_motion_of_a_rod_ends_by_name_at_the_angle_where_the_paradox_begins(tangent, way):
     """tan^2 - 3 mu tan + 4 = 0, in whichever direction its end would slide if it did not stick."""
     system = saltus.System(model=UniformRod(), impact=saltus.NewtonImpact(e=0.5))
-    motion = saltus.simulate(system, x=0.0, y=0.0, angle=float(np.arctan(tangent)), velocity=(way, 0.0, 0.0), duration=5.0)
+    motion = saltus.simulate(
+        system,
+        x=0.0,
+        y=0.0,
+        angle=float(np.arctan(tangent)),
+        velocity=(way, 0.0, 0.0),
+        duration=5.0,
+    )
     assert (str(motion.stop), motion.limit) == ("limit", "Painleve's paradox at floor")
     edges = np.arctan((4.5 + np.array([1.0, -1.0]) * sqrt(4.5**2 - 16.0)) / 2.0)
     assert np.abs(np.concatenate([edges, np.pi - edges, -edges]) - motion.angle).min() < 1e-11
 
 
-# --- an independent time stepping ----------------------------------------------------------------------------------------------
+# --- an independent time stepping --------------------------------------------
 
 
 def stepped(system, law, state, duration, steps):
-    """The state at the end by Moreau's midpoint scheme with so many steps: velocities at the ends, forces and gaps in the middle,
-    and in a step in which the gap is closed an impact."""
+    """The state at the end by Moreau's midpoint scheme with so many steps: velocities at the ends,
+    forces and gaps in the middle, and in a step in which the gap is closed an impact."""
     model, mass = system.model, np.array(system.model.mass_matrix(None))
-    h, inverse, q, v = duration / steps, np.linalg.inv(mass), np.array(state[:2]), np.array(state[2:])
+    h, inverse, q, v = (
+        duration / steps,
+        np.linalg.inv(mass),
+        np.array(state[:2]),
+        np.array(state[2:]),
+    )
     for _ in range(steps):
         q = q + 0.5 * h * v
         free = v + h * (inverse @ [model.push - 0.2 * q[0], -1.0])
@@ -333,7 +412,9 @@ def stepped(system, law, state, duration, steps):
 
 
 def by_moreau(inverse, free, v, e, mu):
-    """The speed of the gap becomes -e times that before the step, unless it is larger without an impulse."""
+    """The speed of the gap becomes -e times that before the step, unless it is larger without an
+    impulse.
+    """
     target = max(-e * v[1], 0.0)
     return free if free[1] >= target else free + inverse @ impulses(inverse, free, target, mu)
 
@@ -343,12 +424,18 @@ def by_poisson(inverse, free, v, e, mu):
 
 
 @pytest.mark.parametrize("duration", [1.3, 4.0])  # while it bounces, and after it has come to rest
-@pytest.mark.parametrize(("law", "impact"), [(by_moreau, saltus.NewtonImpact), (by_poisson, saltus.PoissonImpact)])
-def test_a_time_stepping_comes_to_impacts_and_sliding_with_friction_at_first_order(law, impact, duration):
+@pytest.mark.parametrize(
+    ("law", "impact"), [(by_moreau, saltus.NewtonImpact), (by_poisson, saltus.PoissonImpact)]
+)
+def test_a_time_stepping_comes_to_impacts_and_sliding_with_friction_at_first_order(
+    law, impact, duration
+):
     steps, errors, seen = 200 * 2 ** np.arange(5), np.zeros(5), set()
     system = saltus.System(model=Rod(mu=0.4, coupling=0.6, push=0.3), impact=impact(e=0.5))
     for speed in (2.0, 0.8, 0.3, -0.4, -1.0):
-        motion = saltus.simulate(system, x=0.0, y=0.3, velocity=(speed, 0.0), duration=duration, tol=1e-14)
+        motion = saltus.simulate(
+            system, x=0.0, y=0.3, velocity=(speed, 0.0), duration=duration, tol=1e-14
+        )
         seen |= set(kinds(motion))
         ends = [stepped(system, law, (0.0, 0.3, speed, 0.0), duration, int(n)) for n in steps]
         errors += [np.abs(end - motion.final_state).max() for end in ends]
@@ -358,7 +445,7 @@ def test_a_time_stepping_comes_to_impacts_and_sliding_with_friction_at_first_ord
     assert errors[-1] < 0.02
 
 
-# --- friction along the coordinate of a contact, and along a sum -----------------------------------------------------------
+# --- friction along the coordinate of a contact, and along a sum -------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -382,14 +469,20 @@ class Slot(saltus.ContactModel):
 
 
 def test_a_mass_that_rubs_bounces_off_a_wall_until_it_is_held():
-    """It falls with c = 1 - mu and rises with b = 1 + mu: u becomes e u sqrt(c / b) in u (1 / b + 1 / sqrt(b c))."""
-    motion = saltus.simulate(saltus.System(model=Slot(), impact=saltus.NewtonImpact(e=0.6)), x=0.35, duration=10.0)
+    """It falls with c = 1 - mu and rises with b = 1 + mu: u becomes e u sqrt(c / b) in u (1 / b + 1
+    / sqrt(b c)).
+    """
+    motion = saltus.simulate(
+        saltus.System(model=Slot(), impact=saltus.NewtonImpact(e=0.6)), x=0.35, duration=10.0
+    )
     speeds = np.abs(motion.impacts.velocity_after[:, 0])
     share = 0.6 * sqrt(0.7 / 1.3)
     assert np.abs(speeds[1:6] / speeds[:5] - share).max() < 1e-11
     assert abs(speeds[0] - 0.6 * 0.7) < 1e-13
     ends = 1.0 + 0.42 * (1.0 / 1.3 + 1.0 / sqrt(1.3 * 0.7)) / (1.0 - share)
-    assert abs(next(event.time for event in motion.events if str(event.kind) == "held") - ends) < 1e-10
+    assert (
+        abs(next(event.time for event in motion.events if str(event.kind) == "held") - ends) < 1e-10
+    )
     assert (str(motion.stop), motion.closed) == ("rest", ("wall",))
 
 
@@ -419,7 +512,9 @@ def test_two_bodies_that_rub_each_other_stop_together():
         def force(self, t, q, velocity, load):
             return 0.0 * q[0], 0.0 * q[1]
 
-    motion = saltus.simulate(saltus.System(model=Pair()), x=0.0, y=0.0, velocity=(0.0, 1.2), duration=5.0)
+    motion = saltus.simulate(
+        saltus.System(model=Pair()), x=0.0, y=0.0, velocity=(0.0, 1.2), duration=5.0
+    )
     assert kinds(motion) == ["stick"]
     assert abs(motion.events[0].time - 1.2 / 0.6) < 1e-12
     assert np.abs(np.subtract(motion.velocity, 0.4)).max() < 1e-14
@@ -427,7 +522,9 @@ def test_two_bodies_that_rub_each_other_stop_together():
 
 
 def test_friction_that_falls_with_the_speed_holds_its_equation():
-    """On the belt, x'' + x = (mu_k + (mu_s - mu_k) exp(-u / v_s)) sign u with u = w - x', from its dense output."""
+    """On the belt, x'' + x = (mu_k + (mu_s - mu_k) exp(-u / v_s)) sign u with u = w - x', from its
+    dense output.
+    """
 
     @dataclass(frozen=True, kw_only=True)
     class Belt(saltus.ContactModel):
@@ -436,7 +533,12 @@ def test_friction_that_falls_with_the_speed_holds_its_equation():
 
         @property
         def frictions(self):
-            given = {"kinetic": 0.15, "static": 0.3, "ground_speed": 0.3, "stribeck_speed": self.fall}
+            given = {
+                "kinetic": 0.15,
+                "static": 0.3,
+                "ground_speed": 0.3,
+                "stribeck_speed": self.fall,
+            }
             return (saltus.Friction(name="belt", coordinate="x", **given),)
 
         def force(self, t, x, velocity, load):
@@ -455,12 +557,16 @@ def test_friction_that_falls_with_the_speed_holds_its_equation():
 
 def test_ensembles_and_orbits_take_friction_in_contacts():
     starts = np.array([0.5, 1.0, 2.0])
-    many = saltus.simulate_many(slider(), x=0.0, y=1.0, velocity=(starts, np.zeros(3)), duration=6.0)
+    many = saltus.simulate_many(
+        slider(), x=0.0, y=1.0, velocity=(starts, np.zeros(3)), duration=6.0
+    )
     for place, start in enumerate(starts):
         one = saltus.simulate(slider(), x=0.0, y=1.0, velocity=(float(start), 0.0), duration=6.0)
         assert abs(float(many["x"].values.ravel()[place]) - one.x) < 1e-11
     load = saltus.Load(frequency=1.0, push=saltus.Harmonic(0.6), lift=saltus.Harmonic(1.5))
-    orbit = saltus.find_orbit(slider(angle=0.0, e=0.3, load=load).with_({"model.wall": 0.8}), x=0.0, y=0.0)
+    orbit = saltus.find_orbit(
+        slider(angle=0.0, e=0.3, load=load).with_({"model.wall": 0.8}), x=0.0, y=0.0
+    )
     motion = orbit.motion()
     assert np.abs(motion.position[1] - motion.at(motion.start)[0][1]) < 1e-11
     assert {"release", "impact"} <= set(kinds(motion))

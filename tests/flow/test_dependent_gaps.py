@@ -1,4 +1,6 @@
-"""More gaps than coordinates: rows of balls between two walls, a table that shakes under a ceiling; against exact results."""
+"""More gaps than coordinates: rows of balls between two walls, a table that shakes under a ceiling;
+against exact results.
+"""
 
 import dataclasses
 import itertools
@@ -22,7 +24,10 @@ def row_between_walls(count):
     names = tuple(f"x{i}" for i in range(count))
 
     def contacts(self):
-        pairs = [Contact(name=f"{a}{b}", coordinate={b: 1.0, a: -1.0}) for a, b in itertools.pairwise(names)]
+        pairs = [
+            Contact(name=f"{a}{b}", coordinate={b: 1.0, a: -1.0})
+            for a, b in itertools.pairwise(names)
+        ]
         left, right = (
             Contact(name="left", coordinate="x0"),
             Contact(name="right", coordinate=names[-1], sign=-1, position=self.length),
@@ -32,10 +37,15 @@ def row_between_walls(count):
     def mass_matrix(self, q):
         return [[getattr(self, f"m{i}") * (i == j) for j in range(count)] for i in range(count)]
 
-    numbers = [(name, float, dataclasses.field(default=1.0)) for name in (*(f"m{i}" for i in range(count)), "length")]
+    numbers = [
+        (name, float, dataclasses.field(default=1.0))
+        for name in (*(f"m{i}" for i in range(count)), "length")
+    ]
     space = {"coordinates": names, "contacts": property(contacts), "mass_matrix": mass_matrix}
     space["force"] = lambda self, t, q, velocity, load: [0.0 * x for x in q]
-    return dataclasses.make_dataclass("Row", numbers, bases=(ContactModel,), namespace=space, frozen=True, kw_only=True)
+    return dataclasses.make_dataclass(
+        "Row", numbers, bases=(ContactModel,), namespace=space, frozen=True, kw_only=True
+    )
 
 
 TEN = row_between_walls(10)
@@ -46,7 +56,12 @@ def test_ten_balls_between_two_walls_are_lines_that_are_reflected():
     random, time = np.random.default_rng(1), 60.0
     system = System(model=TEN(length=10.0), impact=NewtonImpact(e=1.0))
     begin, speeds = np.sort(random.uniform(0.0, 10.0, 10)), random.normal(size=10)
-    motion = simulate(system, **dict(zip(TEN.coordinates, begin, strict=True)), velocity=tuple(speeds), duration=time)
+    motion = simulate(
+        system,
+        **dict(zip(TEN.coordinates, begin, strict=True)),
+        velocity=tuple(speeds),
+        duration=time,
+    )
     unfolded = (begin + time * speeds) % 20.0
     lines, rates = np.where(unfolded <= 10.0, [unfolded, speeds], [20.0 - unfolded, -speeds])
     order = np.argsort(lines)
@@ -55,18 +70,29 @@ def test_ten_balls_between_two_walls_are_lines_that_are_reflected():
     np.testing.assert_allclose(motion.velocity, rates[order], rtol=0, atol=1e-13)
     hits = [event.time for event in motion.events if event.contact in ("left", "right")]
     met = [(k * 10.0 - x) / v for x, v in zip(begin, speeds, strict=True) for k in range(-60, 61)]
-    np.testing.assert_allclose(hits, np.sort([t for t in met if 0.0 < t < time]), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(
+        hits, np.sort([t for t in met if 0.0 < t < time]), rtol=0, atol=1e-11
+    )
 
 
 def check_balances(row, random):
-    """Momentum with the impulses of the walls, and energy with half the sum of J (1 - e) abs(v-); returns the number of
-    impacts."""
+    """Momentum with the impulses of the walls, and energy with half the sum of J (1 - e) abs(v-);
+    returns the number of impacts."""
     count = len(row.coordinates)
-    masses, e, length = random.uniform(0.2, 3.0, count), random.uniform(0.5, 1.0), random.uniform(1.0, 5.0)
+    masses, e, length = (
+        random.uniform(0.2, 3.0, count),
+        random.uniform(0.5, 1.0),
+        random.uniform(1.0, 5.0),
+    )
     model = row(**{f"m{i}": float(m) for i, m in enumerate(masses)}, length=float(length))
     begin, velocity = np.sort(random.uniform(0.0, length, count)), random.normal(size=count)
     system = System(model=model, impact=NewtonImpact(e=float(e)))
-    motion = simulate(system, **dict(zip(row.coordinates, begin, strict=True)), velocity=tuple(velocity), duration=20.0)
+    motion = simulate(
+        system,
+        **dict(zip(row.coordinates, begin, strict=True)),
+        velocity=tuple(velocity),
+        duration=20.0,
+    )
     times = np.linspace(0.0, 20.0, 100)
     position, rates = motion.at(times)
     assert (np.diff(position, axis=0, prepend=0.0, append=length) > -1e-12).all()
@@ -75,7 +101,8 @@ def check_balances(row, random):
         closing = np.minimum(np.diff(event.velocity_before, prepend=0.0, append=0.0), 0.0)
         given += np.where(times >= event.time, event.impulse[0] - event.impulse[-1], 0.0)
         lost += np.where(times >= event.time, (1.0 - e) * np.dot(event.impulse, -closing) / 2, 0.0)
-    if any(event.kind == "held" for event in motion.events):  # those lose more, in impacts that are not resolved
+    # those lose more, in impacts that are not resolved
+    if any(event.kind == "held" for event in motion.events):
         return 0
     np.testing.assert_allclose(masses @ rates, masses @ velocity + given, rtol=0, atol=1e-12)
     stored = masses @ rates**2 / 2
@@ -90,8 +117,14 @@ def test_rows_of_unequal_masses_between_walls_keep_the_balances(seed):
 
 @pytest.mark.thorough
 def test_ten_thousand_rows_between_walls_keep_the_balances():
-    """About one in three hundred is refused, with its contacts: balls that collapse beside others that still move."""
-    impacts, refused = checked([row_between_walls(count) for count in range(2, 9)], check_balances, np.random.default_rng(11))
+    """About one in three hundred is refused, with its contacts: balls that collapse beside others
+    that still move.
+    """
+    impacts, refused = checked(
+        [row_between_walls(count) for count in range(2, 9)],
+        check_balances,
+        np.random.default_rng(11),
+    )
     assert impacts > 100_000
     assert refused <= 60
 
@@ -116,7 +149,11 @@ class Ball(ContactModel):
 
 
 def under_a_ceiling(amplitude, e, **numbers):
-    return System(model=Ball(**numbers), load=Load(frequency=1.0, ground=Harmonic(amplitude)), impact=NewtonImpact(e=e))
+    return System(
+        model=Ball(**numbers),
+        load=Load(frequency=1.0, ground=Harmonic(amplitude)),
+        impact=NewtonImpact(e=e),
+    )
 
 
 def by_dop853(system, x, v, end):
@@ -132,7 +169,13 @@ def by_dop853(system, x, v, end):
     for event in (table, ceiling):
         event.terminal, event.direction = True, -1
     while True:
-        given = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14, "max_step": 0.5, "events": (table, ceiling)}
+        given = {
+            "method": "DOP853",
+            "rtol": 1e-13,
+            "atol": 1e-14,
+            "max_step": 0.5,
+            "events": (table, ceiling),
+        }
         found = solve_ivp(lambda t, state: [state[1], -model.gravity], (t, end), (x, v), **given)
         if found.status == 0:
             return np.array(times)
@@ -144,18 +187,27 @@ def by_dop853(system, x, v, end):
 
 def test_a_table_that_shakes_under_a_ceiling_is_followed_as_by_dop853():
     system = under_a_ceiling(1.3, 0.9)
-    motion, times = simulate(system, x=1.0, velocity=0.5, duration=14.0), by_dop853(system, 1.0, 0.5, 14.0)
+    motion, times = (
+        simulate(system, x=1.0, velocity=0.5, duration=14.0),
+        by_dop853(system, 1.0, 0.5, 14.0),
+    )
     assert {event.contact for event in motion.events} == {"table", "ceiling"}
     assert len(times) == len(motion.impacts) >= 8
     np.testing.assert_allclose(motion.impacts.time, times, rtol=0, atol=1e-11)
 
 
 def test_a_ball_that_rests_on_a_table_under_a_ceiling_is_thrown_when_its_closed_form_says():
-    """It is pressed while a sin(t) < g, flies up with v = a cos(t), and hits a ceiling that it reaches on its way."""
+    """It is pressed while a sin(t) < g, flies up with v = a cos(t), and hits a ceiling that it
+    reaches on its way.
+    """
     system = under_a_ceiling(1.6, 0.6, gravity=1.0, height=1.75)
     motion = simulate(system, x=0.0, velocity=1.6, duration=2.0)
     rest, release, impact = motion.events
-    assert [(e.kind, e.contact) for e in motion.events] == [("rest", "table"), ("release", "table"), ("impact", "ceiling")]
+    assert [(e.kind, e.contact) for e in motion.events] == [
+        ("rest", "table"),
+        ("release", "table"),
+        ("impact", "ceiling"),
+    ]
     left, speed = math.asin(1.0 / 1.6), math.sqrt(1.6**2 - 1.0)
     assert rest.time == 0.0
     assert release.time == pytest.approx(left, abs=1e-12)
@@ -168,8 +220,8 @@ def test_a_ball_that_rests_on_a_table_under_a_ceiling_is_thrown_when_its_closed_
 
 @dataclass(frozen=True, kw_only=True)
 class Pressed(ContactModel):
-    """Two masses between two walls, one pushed by cos(t) and the other by -1/2: the gap between them depends on those at the
-    walls."""
+    """Two masses between two walls, one pushed by cos(t) and the other by -1/2: the gap between
+    them depends on those at the walls."""
 
     length: float = 10.0
     mass: float = 2.0
@@ -179,7 +231,11 @@ class Pressed(ContactModel):
     @property
     def contacts(self):
         right = Contact(name="right", coordinate="y", sign=-1, position=self.length)
-        return Contact(name="left", coordinate="x"), right, Contact(name="between", coordinate={"y": 1.0, "x": -1.0})
+        return (
+            Contact(name="left", coordinate="x"),
+            right,
+            Contact(name="between", coordinate={"y": 1.0, "x": -1.0}),
+        )
 
     def mass_matrix(self, q):
         return [[1.0, 0.0], [0.0, self.mass]]
@@ -190,7 +246,11 @@ class Pressed(ContactModel):
         return load.force(t), -0.5 + 0.0 * q[1]
 
 
-PUSHED = System(model=Pressed(), load=Load(frequency=1.0, force=Harmonic(1.0, phase=math.pi / 2)), impact=NewtonImpact(e=0.0))
+PUSHED = System(
+    model=Pressed(),
+    load=Load(frequency=1.0, force=Harmonic(1.0, phase=math.pi / 2)),
+    impact=NewtonImpact(e=0.0),
+)
 PARTED = math.acos(-0.25)  # the reaction (2 cos(t) + 1/2) / 3 vanishes
 
 
@@ -215,18 +275,31 @@ def test_masses_that_are_pressed_together_move_as_one_until_their_reaction_vanis
 
 
 def stack(ceiling):
-    """Three balls of size 1 that fall on a floor and on one another; with a ceiling that none of them reaches, or without."""
+    """Three balls of size 1 that fall on a floor and on one another; with a ceiling that none of
+    them reaches, or without.
+    """
     names = ("x0", "x1", "x2")
-    above = [Contact(name=f"{a}{b}", coordinate={b: 1.0, a: -1.0}, position=1.0) for a, b in itertools.pairwise(names)]
+    above = [
+        Contact(name=f"{a}{b}", coordinate={b: 1.0, a: -1.0}, position=1.0)
+        for a, b in itertools.pairwise(names)
+    ]
     given = [Contact(name="floor", coordinate="x0"), *above]
     given += [Contact(name="ceiling", coordinate="x2", sign=-1, position=50.0)] if ceiling else []
-    space = {"coordinates": names, "contacts": tuple(given), "force": lambda self, t, q, velocity, load: [-1.0] * 3}
-    return dataclasses.make_dataclass("Stack", [], bases=(ContactModel,), namespace=space, frozen=True)()
+    space = {
+        "coordinates": names,
+        "contacts": tuple(given),
+        "force": lambda self, t, q, velocity, load: [-1.0] * 3,
+    }
+    return dataclasses.make_dataclass(
+        "Stack", [], bases=(ContactModel,), namespace=space, frozen=True
+    )()
 
 
 @pytest.mark.parametrize("e", [0.0, 0.3])
 def test_balls_come_to_rest_under_a_ceiling_as_they_do_without_it(e):
-    one, other = (System(model=stack(ceiling), impact=NewtonImpact(e=e)) for ceiling in (True, False))
+    one, other = (
+        System(model=stack(ceiling), impact=NewtonImpact(e=e)) for ceiling in (True, False)
+    )
     assert one.in_gap_coordinates.model.dependent == 1
     start = {"x0": 1.0, "x1": 2.3, "x2": 3.6, "velocity": 0.0, "duration": 6.0}
     under, free = simulate(one, **start), simulate(other, **start)
@@ -239,27 +312,48 @@ def test_balls_come_to_rest_under_a_ceiling_as_they_do_without_it(e):
 
 
 def test_what_has_no_motion_is_refused_by_name():
-    with pytest.raises(saltus.ParameterError, match=r"'between' closes where .* do, and only there: they leave no room"):
+    with pytest.raises(
+        saltus.ParameterError,
+        match=r"'between' closes where .* do, and only there: they leave no room",
+    ):
         System(model=Pressed(length=0.0), impact=NewtonImpact(e=0.0))
     corner = (Contact(name="a", coordinate="x"), Contact(name="b", coordinate="y"))
-    space = {"coordinates": ("x", "y"), "contacts": (*corner, Contact(name="c", coordinate={"x": 1.0, "y": 1.0}))}
+    space = {
+        "coordinates": ("x", "y"),
+        "contacts": (*corner, Contact(name="c", coordinate={"x": 1.0, "y": 1.0})),
+    }
     space["force"] = lambda self, t, q, velocity, load: [-1.0, -1.0]
-    with pytest.raises(saltus.ParameterError, match="'c' closes where a and b do, and only there: leave it out"):
-        System(model=dataclasses.make_dataclass("Corner", [], bases=(ContactModel,), namespace=space, frozen=True)())
-    with pytest.raises(saltus.ParameterError, match="whose contacts can all be closed, and here gaps depend"):
+    with pytest.raises(
+        saltus.ParameterError, match="'c' closes where a and b do, and only there: leave it out"
+    ):
+        System(
+            model=dataclasses.make_dataclass(
+                "Corner", [], bases=(ContactModel,), namespace=space, frozen=True
+            )()
+        )
+    with pytest.raises(
+        saltus.ParameterError, match="whose contacts can all be closed, and here gaps depend"
+    ):
         saltus.flow.load_releases(under_a_ceiling(1.3, 0.9))
 
 
 @pytest.mark.parametrize("e", [0.6, 0.0])
 def test_a_ball_that_a_table_crushes_at_a_ceiling_is_refused_when_the_room_is_gone(e):
-    """The table reaches the ceiling at the height 1 where sin(t) = 1 / 1.3, however often the ball is hit before."""
-    with pytest.raises(saltus.MotionError, match=r"crushed between the contacts 'table' and 'ceiling' at time 0\.877636419,"):
+    """The table reaches the ceiling at the height 1 where sin(t) = 1 / 1.3, however often the ball
+    is hit before.
+    """
+    with pytest.raises(
+        saltus.MotionError,
+        match=r"crushed between the contacts 'table' and 'ceiling' at time 0\.877636419,",
+    ):
         simulate(under_a_ceiling(1.3, e, height=1.0), x=0.5, duration=3.0)
     assert math.asin(1.0 / 1.3) == pytest.approx(0.877636419, abs=5e-10)
 
 
 def test_a_row_that_collapses_at_a_wall_without_a_force_is_followed():
-    """Gaps of 1e-12 that its accumulation closes leave reactions of no certain sign, which decide nothing."""
+    """Gaps of 1e-12 that its accumulation closes leave reactions of no certain sign, which decide
+    nothing.
+    """
     random = np.random.default_rng(11)
     for i in range(247):
         count = 2 + i % 7
@@ -273,7 +367,11 @@ PATHS = ("model.gravity", "model.height", "load.ground.amplitude", "load.frequen
 
 
 def test_derivatives_beside_a_dependent_gap_are_those_of_differences():
-    system, given, step = under_a_ceiling(1.3, 0.9), {"x": 1.0, "velocity": 0.5, "duration": 8.0}, 1e-6
+    system, given, step = (
+        under_a_ceiling(1.3, 0.9),
+        {"x": 1.0, "velocity": 0.5, "duration": 8.0},
+        1e-6,
+    )
     found, columns = sensitivities(system, parameters=PATHS, **given), []
     assert {event.contact for event in found.motion.events} == {"table", "ceiling"}
     for j, path in enumerate(("x", "velocity", *PATHS)):
@@ -283,12 +381,18 @@ def test_derivatives_beside_a_dependent_gap_are_those_of_differences():
             twin = system if j < 2 else system.with_({path: system.get(path) + sign})
             ends.append(simulate(twin, **moved).final_state)
         columns.append((ends[0] - ends[1]) / (2.0 * step))
-    np.testing.assert_allclose(np.hstack([found.state, found.parameters]), np.array(columns).T, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(
+        np.hstack([found.state, found.parameters]), np.array(columns).T, rtol=0, atol=1e-7
+    )
 
 
 def test_derivatives_of_masses_that_are_pressed_together_are_those_of_their_closed_form():
-    """To the mass of the second one, by complex numbers in the closed form of a motion that is pressed all the time."""
-    found = sensitivities(PUSHED, parameters=("model.mass",), x=5.0, y=5.0, velocity=(0.0, 0.0), duration=1.0)
+    """To the mass of the second one, by complex numbers in the closed form of a motion that is
+    pressed all the time.
+    """
+    found = sensitivities(
+        PUSHED, parameters=("model.mass",), x=5.0, y=5.0, velocity=(0.0, 0.0), duration=1.0
+    )
     slope = -(1.0 - math.cos(1.0) - 0.25) / 9.0  # of (1 - cos(t) - t^2 / 4) / (1 + m)
     np.testing.assert_allclose(found.parameters[:2, 0], [slope, slope], rtol=0, atol=1e-13)
 
@@ -299,7 +403,9 @@ def test_lanes_with_a_dependent_gap_are_followed_as_one_by_one():
     for i in range(x.size):
         one = simulate(system, x=float(x[i]), velocity=0.2, duration=12.0)
         assert many.impact_count.values[i] == len(one.impacts)
-        np.testing.assert_allclose([many.x.values[i], many.velocity.values[i]], one.final_state, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            [many.x.values[i], many.velocity.values[i]], one.final_state, rtol=0, atol=1e-9
+        )
         sampled = [many.sampled_x.values[i, 0], many.sampled_velocity.values[i, 0]]
         np.testing.assert_allclose(sampled, one.at(2.0 * math.pi), rtol=0, atol=1e-9)
 
@@ -314,5 +420,13 @@ def test_a_class_that_is_no_dataclass_may_keep_sums():
         def force(self, t, q, velocity, load):
             return 0.0 * q[0], 0.0 * q[1]
 
-    motion = simulate(System(model=Pair(), impact=NewtonImpact(e=1.0)), a=0.0, b=1.0, velocity=(1.0, 0.0), duration=3.0)
-    np.testing.assert_allclose([motion.a, motion.b, *motion.velocity], [1.0, 3.0, 0.0, 1.0], rtol=0, atol=1e-14)
+    motion = simulate(
+        System(model=Pair(), impact=NewtonImpact(e=1.0)),
+        a=0.0,
+        b=1.0,
+        velocity=(1.0, 0.0),
+        duration=3.0,
+    )
+    np.testing.assert_allclose(
+        [motion.a, motion.b, *motion.velocity], [1.0, 3.0, 0.0, 1.0], rtol=0, atol=1e-14
+    )

@@ -1,4 +1,6 @@
-"""The flow contracts areas by (product of the impacts' e^2) exp(-C [c T_lower / (1+m) + T_upper]) (numerics.md, section 5)."""
+"""The flow contracts areas by (product of the impacts' e^2) exp(-C [c T_lower / (1+m) + T_upper])
+(numerics.md, section 5).
+"""
 
 import math
 
@@ -20,7 +22,9 @@ def end(system, state):
 
 
 def jacobian(system, state):
-    """d(theta, theta')(T) / d(theta, theta')(0), and whether all the motions it needs have as many crossings."""
+    """d(theta, theta')(T) / d(theta, theta')(0), and whether all the motions it needs have as many
+    crossings.
+    """
     columns, counts = [], set()
     for direction in np.eye(2):
         column = np.zeros(2)
@@ -64,13 +68,16 @@ def test_the_determinant_of_the_flow_is_the_product_of_its_impacts_and_of_its_da
         system = forced(**numbers)
         motion, _ = end(system, state)
         speeds = np.abs(motion.impacts.velocity_before)
-        if len(motion.impacts) < 1 or speeds.min() < 0.15:  # near a grazing the flow has no Taylor series of 8 STEP
+        # near a grazing the flow has no Taylor series of 8 STEP
+        if len(motion.impacts) < 1 or speeds.min() < 0.15:
             continue
         matrix, smooth = jacobian(system, state)
         if not smooth or np.abs(matrix).max() > 20:
             continue
         # rounding of the end states, 1e-14 or so, over STEP and times the other entries
-        assert np.linalg.det(matrix) == pytest.approx(predicted(numbers, motion), abs=1e-10 * (1 + np.abs(matrix).max() ** 2))
+        assert np.linalg.det(matrix) == pytest.approx(
+            predicted(numbers, motion), abs=1e-10 * (1 + np.abs(matrix).max() ** 2)
+        )
         used += 1
         kinds.add((numbers["e"] < 1, len(motion.impacts)))
     assert used >= 30
@@ -81,6 +88,8 @@ def test_after_rest_the_determinant_is_zero():
     system = forced(e=0.3, H=0.25, W=0.05, C=0.3)
     states = [np.array([0.05, 0.0]), np.array([0.05 + STEP, 0.0]), np.array([0.05, STEP])]
     motions = [end(system, s)[0] for s in states]
-    assert all(any(e.kind == "rest" for e in m.events) and m.side != 0 for m in motions)  # rest, then release before the end
+    # rest, then release before the end
+    assert all(any(e.kind == "rest" for e in m.events) and m.side != 0 for m in motions)
     ends = np.array([[m.theta, m.velocity] for m in motions])
-    np.testing.assert_allclose(ends, ends[[0, 0, 0]], rtol=0, atol=1e-15)  # over STEP, a derivative below 1e-12
+    # over STEP, a derivative below 1e-12
+    np.testing.assert_allclose(ends, ends[[0, 0, 0]], rtol=0, atol=1e-15)

@@ -1,4 +1,6 @@
-"""What an ensemble's derivative to the frequency holds fixed, by differences of motions that `simulate` follows on their own."""
+"""What an ensemble's derivative to the frequency holds fixed, by differences of motions that
+`simulate` follows on their own.
+"""
 
 import numpy as np
 import pytest
@@ -14,11 +16,15 @@ STATES = np.array([[0.3, 0.1], [-0.5, 0.2], [0.6, -0.1]])
 
 
 def by_differences(system, theta, velocity, time, span):
-    """d(theta, theta')/dW of the state after `span` = {"periods": n} or {"duration": t}, its error of the order STEP^4."""
+    """d(theta, theta')/dW of the state after `span` = {"periods": n} or {"duration": t}, its error
+    of the order STEP^4.
+    """
     ends = []
     for offset in (-2, -1, 1, 2):
         other = system.with_({"load.frequency": system.load.frequency + offset * STEP})
-        motion = saltus.simulate(other, theta=theta, velocity=velocity, time=time, **span, tol=1e-15, dense=False)
+        motion = saltus.simulate(
+            other, theta=theta, velocity=velocity, time=time, **span, tol=1e-15, dense=False
+        )
         ends.append([motion.theta, motion.velocity])
     a, b, c, d = np.array(ends)
     return (a - 8 * b + 8 * c - d) / (12 * STEP)
@@ -35,8 +41,12 @@ def by_differences(system, theta, velocity, time, span):
         (0.5, 0.3, 1.0, {"duration": 700.0}, "settled", "settled", "duration"),
     ],
 )
-def test_the_start_is_fixed_and_the_end_moves_only_with_the_periods_asked_for(C, H, e, span, until, stop, held, time):
-    """Asked for periods, the state after as many of them, settled or not; asked for a duration, at that time."""
+def test_the_start_is_fixed_and_the_end_moves_only_with_the_periods_asked_for(
+    C, H, e, span, until, stop, held, time
+):
+    """Asked for periods, the state after as many of them, settled or not; asked for a duration, at
+    that time.
+    """
     system = forced(H, C=C, e=e, beta0=1.4)
     ensemble = saltus.simulate_many(
         system,
@@ -51,10 +61,17 @@ def test_the_start_is_fixed_and_the_end_moves_only_with_the_periods_asked_for(C,
     found = ensemble.derivative.sel(column="load.frequency").values
     assert set(stop_names(ensemble).values) == {stop}
     for i, (theta, velocity) in enumerate(STATES):
-        length = {"periods": float(ensemble.periods[i]), "duration": float(ensemble.time[i]) - time}[held]
+        length = {
+            "periods": float(ensemble.periods[i]),
+            "duration": float(ensemble.time[i]) - time,
+        }[held]
         expected = by_differences(system, theta, velocity, time, {held: length})
         assert found[i] == pytest.approx(expected, rel=1e-5, abs=1e-6)
         other = "duration" if held == "periods" else "periods"
-        span_of_other = {"periods": float(ensemble.periods[i]), "duration": float(ensemble.time[i]) - time}[other]
+        span_of_other = {
+            "periods": float(ensemble.periods[i]),
+            "duration": float(ensemble.time[i]) - time,
+        }[other]
         different = by_differences(system, theta, velocity, time, {other: span_of_other})
-        assert found[i] != pytest.approx(different, rel=1e-3, abs=1e-4)  # the two conventions are not the same
+        # the two conventions are not the same
+        assert found[i] != pytest.approx(different, rel=1e-3, abs=1e-4)

@@ -1,4 +1,6 @@
-"""What simulate_many takes and what it refuses: shapes, named dimensions, no trajectories, columns; a sentence for a mistake."""
+"""What simulate_many takes and what it refuses: shapes, named dimensions, no trajectories, columns;
+a sentence for a mistake.
+"""
 
 from dataclasses import dataclass
 
@@ -16,9 +18,17 @@ from saltus.flow import share_cores, stop_names
 from saltus.flow.lanes.options import read_threads
 from saltus.systems import Harmonic, Load, Metainterface, Record, System, WallOscillator
 
-SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5))
-STEADY = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=0.1, vertical=-0.5))
-TIMELESS = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(horizontal=0.1, vertical=-0.5))
+SYSTEM = System(
+    model=Metainterface(beta0=1.4, damping=0.1),
+    load=Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5),
+)
+STEADY = System(
+    model=Metainterface(beta0=1.4, damping=0.1),
+    load=Load(frequency=1.0, horizontal=0.1, vertical=-0.5),
+)
+TIMELESS = System(
+    model=Metainterface(beta0=1.4, damping=0.1), load=Load(horizontal=0.1, vertical=-0.5)
+)
 ANGLES = np.linspace(-0.5, 0.5, 5)
 FEW = settings(max_examples=60, deadline=None)
 
@@ -28,20 +38,39 @@ def run(system=SYSTEM, **arguments):
 
 
 def one(theta, velocity=0.0, system=SYSTEM, **arguments):
-    return saltus.simulate(system, theta=float(theta), velocity=float(velocity), dense=False, **({"periods": 1} | arguments))
+    return saltus.simulate(
+        system,
+        theta=float(theta),
+        velocity=float(velocity),
+        dense=False,
+        **({"periods": 1} | arguments),
+    )
 
 
-# --- shapes ------------------------------------------------------------------------------------------------------------------
+# --- shapes ------------------------------------------------------------------
 
 
 @FEW
-@given(mutually_broadcastable_shapes(num_shapes=4, min_dims=0, max_dims=3, max_side=3), st.integers(0, 2**31))
+@given(
+    mutually_broadcastable_shapes(num_shapes=4, min_dims=0, max_dims=3, max_side=3),
+    st.integers(0, 2**31),
+)
 def test_arrays_broadcast_as_numpys(shapes, seed):
     rng = np.random.default_rng(seed)
-    theta, velocity, amplitude, time = (rng.uniform(0.1, 0.5, shape) for shape in shapes.input_shapes)
-    ensemble = run(theta=theta, velocity=velocity, parameters={"load.horizontal.amplitude": amplitude}, time=time, periods=0.2)
+    theta, velocity, amplitude, time = (
+        rng.uniform(0.1, 0.5, shape) for shape in shapes.input_shapes
+    )
+    ensemble = run(
+        theta=theta,
+        velocity=velocity,
+        parameters={"load.horizontal.amplitude": amplitude},
+        time=time,
+        periods=0.2,
+    )
     assert ensemble.theta.shape == shapes.result_shape
-    assert ensemble.theta.dims == (("trajectory",) if len(shapes.result_shape) == 1 else ensemble.theta.dims)
+    assert ensemble.theta.dims == (
+        ("trajectory",) if len(shapes.result_shape) == 1 else ensemble.theta.dims
+    )
     whole = np.broadcast_arrays(theta, velocity, amplitude, time)
     assert all(a.shape == shapes.result_shape for a in whole)
     if whole[0].size:
@@ -60,11 +89,19 @@ def test_numbers_alone_give_a_dataset_without_dimensions():
 
 
 @pytest.mark.parametrize("shape", [(0,), (0, 3), (2, 0)])
-@pytest.mark.parametrize("options", [{}, {"until": ("rest", "settled"), "sensitivities": ("load.frequency",), "last": "all"}])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"until": ("rest", "settled"), "sensitivities": ("load.frequency",), "last": "all"}],
+)
 def test_no_trajectories_are_an_ensemble_too(shape, options):
     everything = ("state", "extrema", "impact_count", "speed")
     fractions = []
-    ensemble = run(theta=np.zeros(shape), sample=everything, progress=lambda done, _: fractions.append(done), **options)
+    ensemble = run(
+        theta=np.zeros(shape),
+        sample=everything,
+        progress=lambda done, _: fractions.append(done),
+        **options,
+    )
     assert ensemble.theta.shape == shape
     assert ensemble.sampled_theta.shape[: len(shape)] == shape
     assert fractions == [0.0, 1.0]
@@ -72,7 +109,10 @@ def test_no_trajectories_are_an_ensemble_too(shape, options):
 
 def test_lists_and_whole_numbers_are_arrays():
     floats = run(theta=[0.0, 1.0], velocity=np.array([1.0, 0.0]))
-    for theta, velocity in (([0, 1], [1, 0]), (np.array([0, 1], dtype=np.int8), np.array([1, 0], dtype=np.float32))):
+    for theta, velocity in (
+        ([0, 1], [1, 0]),
+        (np.array([0, 1], dtype=np.int8), np.array([1, 0], dtype=np.float32)),
+    ):
         xarray.testing.assert_equal(run(theta=theta, velocity=velocity), floats)
 
 
@@ -81,7 +121,7 @@ def test_shapes_that_do_not_broadcast_are_named():
         run(theta=np.zeros(3), velocity=np.zeros(4))
 
 
-# --- named dimensions --------------------------------------------------------------------------------------------------------
+# --- named dimensions --------------------------------------------------------
 
 
 def test_named_dimensions_broadcast_by_name_and_keep_their_coordinates():
@@ -98,7 +138,10 @@ def test_named_dimensions_broadcast_by_name_and_keep_their_coordinates():
 
 def test_named_and_plain_arrays_give_the_same_numbers():
     theta, velocity = xarray.DataArray(ANGLES, dims="a"), xarray.DataArray(ANGLES[:3], dims="b")
-    named, plain = run(theta=theta, velocity=velocity), run(theta=ANGLES[:, None], velocity=ANGLES[None, :3])
+    named, plain = (
+        run(theta=theta, velocity=velocity),
+        run(theta=ANGLES[:, None], velocity=ANGLES[None, :3]),
+    )
     np.testing.assert_array_equal(named.transpose("a", "b", ...).theta.values, plain.theta.values)
     swapped = run(theta=theta.expand_dims({"b": 3}), velocity=velocity)
     np.testing.assert_array_equal(swapped.transpose("a", "b", ...).theta.values, plain.theta.values)
@@ -117,7 +160,9 @@ def test_dimensions_that_do_not_fit_are_refused(velocity):
         run(theta=xarray.DataArray(ANGLES, dims="a", coords={"a": ANGLES}), velocity=velocity)
 
 
-@pytest.mark.parametrize("dimension", ["period", "state", "column", "theta", "velocity", "stop", "time"])
+@pytest.mark.parametrize(
+    "dimension", ["period", "state", "column", "theta", "velocity", "stop", "time"]
+)
 def test_a_dimension_named_as_a_result_is_refused(dimension):
     theta = xarray.DataArray(ANGLES, dims=dimension)
     with pytest.raises(ParameterError, match=dimension):
@@ -127,10 +172,15 @@ def test_a_dimension_named_as_a_result_is_refused(dimension):
 ENDLESS = {"periods": 10**12}  # so that what is refused is refused before it runs
 
 
-@pytest.mark.parametrize("name", ["theta", "time", "stop", "start_theta", "overall_largest_theta", "sampled_velocity", "state"])
+@pytest.mark.parametrize(
+    "name",
+    ["theta", "time", "stop", "start_theta", "overall_largest_theta", "sampled_velocity", "state"],
+)
 @pytest.mark.parametrize("along", [True, False])
 def test_a_coordinate_named_as_a_result_is_refused_before_anything_runs(name, along):
-    theta = xarray.DataArray(ANGLES, dims="a").assign_coords({name: ("a", ANGLES) if along else 0.3})
+    theta = xarray.DataArray(ANGLES, dims="a").assign_coords(
+        {name: ("a", ANGLES) if along else 0.3}
+    )
     with pytest.raises(ParameterError, match=f"coordinate cannot be called '{name}'"):
         run(theta=theta, **ENDLESS)
 
@@ -143,18 +193,27 @@ def test_a_result_goes_on_from_where_it_ended():
     whole = run(theta=theta, velocity=velocity, time=0.7, periods=3.25, tol=1e-14)
     np.testing.assert_allclose(then.theta, whole.theta, atol=1e-11)
     np.testing.assert_allclose(then.time, whole.time, rtol=1e-14)
-    np.testing.assert_array_equal(then.initial_theta, ANGLES)  # the labels that the dimensions came with
+    # the labels that the dimensions came with
+    np.testing.assert_array_equal(then.initial_theta, ANGLES)
     for name in ("theta", "velocity", "time"):
-        xarray.testing.assert_equal(then[f"start_{name}"].drop_attrs(), first[name].drop_attrs().rename(f"start_{name}"))
+        xarray.testing.assert_equal(
+            then[f"start_{name}"].drop_attrs(), first[name].drop_attrs().rename(f"start_{name}")
+        )
     assert "start_theta" not in first  # its coordinate says it
-    again = run(theta=then.theta, velocity=then.velocity.sel(initial_velocity=ANGLES[0]), time=then.time.mean())
+    again = run(
+        theta=then.theta,
+        velocity=then.velocity.sel(initial_velocity=ANGLES[0]),
+        time=then.time.mean(),
+    )
     np.testing.assert_array_equal(again.start_theta, then.theta)
     assert again.start_velocity.dims == ("initial_theta", "initial_velocity")
 
 
 def test_coordinates_on_which_arguments_do_not_agree_are_left_out():
     theta = xarray.DataArray(ANGLES, dims="a").assign_coords(run=1, place=2)
-    ensemble = run(theta=theta, velocity=xarray.DataArray(ANGLES, dims="a").assign_coords(run=3, place=2))
+    ensemble = run(
+        theta=theta, velocity=xarray.DataArray(ANGLES, dims="a").assign_coords(run=3, place=2)
+    )
     assert set(ensemble.coords) == {"place"}
 
 
@@ -167,14 +226,29 @@ def test_a_coordinate_does_not_say_other_parameters_than_there_were():
         run(theta=sweep.theta, parameters={path: sweep[path].drop_vars(path) + 0.1}, **ENDLESS)
     with pytest.raises(ParameterError, match="other values than parameters give"):
         run(theta=sweep.theta, parameters={path: 0.2}, **ENDLESS)
-    np.testing.assert_array_equal(run(theta=sweep.theta, parameters={path: sweep[path]})[path], [0.1, 0.2])
+    np.testing.assert_array_equal(
+        run(theta=sweep.theta, parameters={path: sweep[path]})[path], [0.1, 0.2]
+    )
     one_of_them = run(SYSTEM.with_({path: 0.2}), theta=sweep.theta.sel({path: 0.2}))
-    assert float(one_of_them.start_theta if "start_theta" in one_of_them else one_of_them.attrs["start_theta"]) == sweep.theta[1]
+    assert (
+        float(
+            one_of_them.start_theta
+            if "start_theta" in one_of_them
+            else one_of_them.attrs["start_theta"]
+        )
+        == sweep.theta[1]
+    )
 
 
 def test_a_result_can_be_written_and_read(tmp_path):
     theta = xarray.DataArray(ANGLES, dims="start", coords={"start": np.arange(5)})
-    ensemble = run(theta=theta, sample=("state", "extrema", "impact_count", "speed"), last="all", periods=3, sensitivities=())
+    ensemble = run(
+        theta=theta,
+        sample=("state", "extrema", "impact_count", "speed"),
+        last="all",
+        periods=3,
+        sensitivities=(),
+    )
     ensemble.to_netcdf(tmp_path / "ensemble.nc", engine="h5netcdf")
     with xarray.open_dataset(tmp_path / "ensemble.nc", engine="h5netcdf") as read:
         np.testing.assert_array_equal(read.theta, ensemble.theta)
@@ -182,7 +256,7 @@ def test_a_result_can_be_written_and_read(tmp_path):
         assert System.from_json(read.attrs["system"]) == SYSTEM
 
 
-# --- columns -----------------------------------------------------------------------------------------------------------------
+# --- columns -----------------------------------------------------------------
 
 
 def test_orders_of_harmonics_may_be_a_column_of_whole_numbers():
@@ -204,22 +278,34 @@ def test_a_frequency_column_changes_the_forcing_period_even_of_constant_loads():
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ordered(Duffing):
-    """A Duffing oscillator of which no number may be 0.5, and whose damping is less than its cubic term."""
+    """A Duffing oscillator of which no number may be 0.5, and whose damping is less than its cubic
+    term.
+    """
 
     def __post_init__(self):
         if 0.5 in (self.damping, self.cubic) or self.damping >= self.cubic:
-            raise ParameterError(f"damping and cubic must not be 0.5, and damping must be less, got {self!r}")
+            raise ParameterError(
+                f"damping and cubic must not be 0.5, and damping must be less, got {self!r}"
+            )
 
 
 def test_every_row_of_columns_is_checked_and_as_a_whole():
-    system = System(model=Ordered(damping=0.1, cubic=1.0), load=Load(frequency=1.0, force=Harmonic(0.1)))
+    system = System(
+        model=Ordered(damping=0.1, cubic=1.0), load=Load(frequency=1.0, force=Harmonic(0.1))
+    )
 
     def columns(damping, cubic):
         return {"model.damping": np.asarray(damping), "model.cubic": np.asarray(cubic)}
 
-    taken = saltus.simulate_many(system, x=0.1, periods=0.1, parameters=columns([2.0, 0.4, 3.0], [3.0, 0.7, 4.0]))
+    taken = saltus.simulate_many(
+        system, x=0.1, periods=0.1, parameters=columns([2.0, 0.4, 3.0], [3.0, 0.7, 4.0])
+    )
     assert taken.sizes["trajectory"] == 3  # alone, the first damping would not do
-    for bad in (columns([0.1, 0.5, 0.9], [1.0, 1.0, 1.0]), columns([0.1, 0.7, 0.1], [1.0, 0.6, 0.2]), columns(0.3, [0.4, 0.2])):
+    for bad in (
+        columns([0.1, 0.5, 0.9], [1.0, 1.0, 1.0]),
+        columns([0.1, 0.7, 0.1], [1.0, 0.6, 0.2]),
+        columns(0.3, [0.4, 0.2]),
+    ):
         with pytest.raises(ParameterError, match="must be less"):
             saltus.simulate_many(system, x=0.1, parameters=bad, **ENDLESS)
 
@@ -227,7 +313,9 @@ def test_every_row_of_columns_is_checked_and_as_a_whole():
 def test_every_parameter_may_be_a_column():
     numbers = SYSTEM.parameters
     columns = {path: np.full(3, value) for path, value in numbers.items()}
-    np.testing.assert_array_equal(run(theta=0.3, parameters=columns).theta, np.full(3, run(theta=0.3).theta))
+    np.testing.assert_array_equal(
+        run(theta=0.3, parameters=columns).theta, np.full(3, run(theta=0.3).theta)
+    )
 
 
 def test_starts_beyond_the_wall_end_at_once_and_disturb_no_others():
@@ -238,7 +326,7 @@ def test_starts_beyond_the_wall_end_at_once_and_disturb_no_others():
     np.testing.assert_array_equal(ensemble.x.values[[0, 2, 3]], alone.x)
 
 
-# --- refusals ----------------------------------------------------------------------------------------------------------------
+# --- refusals ----------------------------------------------------------------
 
 BAD = {
     "nan": {"theta": np.array([0.1, np.nan])},
@@ -335,7 +423,19 @@ junk = st.one_of(
 @settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from(
-        ["theta", "velocity", "time", "parameters", "tol", "side", "sample", "last", "until", "sensitivities", "threads"]
+        [
+            "theta",
+            "velocity",
+            "time",
+            "parameters",
+            "tol",
+            "side",
+            "sample",
+            "last",
+            "until",
+            "sensitivities",
+            "threads",
+        ]
     ),
     junk,
 )
@@ -349,7 +449,9 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
     except SaltusError:
         pass
     else:
-        finite = np.isfinite(ensemble.theta.values) | ~np.isin(stop_names(ensemble).values, ["horizon", "rest"])
+        finite = np.isfinite(ensemble.theta.values) | ~np.isin(
+            stop_names(ensemble).values, ["horizon", "rest"]
+        )
         assert finite.all()
 
 
@@ -362,7 +464,11 @@ def test_junk_is_refused_or_taken_but_never_a_traceback_of_another_kind(argument
     frequency=st.floats(-5, 5).map(lambda x: 10.0**x),
 )
 def test_numbers_of_any_size_end_with_a_reason(theta, velocity, amplitude, damping, frequency):
-    columns = {"load.horizontal.amplitude": amplitude, "model.damping": np.array([damping]), "load.frequency": frequency}
+    columns = {
+        "load.horizontal.amplitude": amplitude,
+        "model.damping": np.array([damping]),
+        "load.frequency": frequency,
+    }
     ensemble = run(theta=theta, velocity=velocity, parameters=columns, periods=None, duration=1e-3)
     name = stop_names(ensemble).values[0]
     assert name in ("horizon", "rest", "not_finite", "stalled", "not_unique")
@@ -371,14 +477,21 @@ def test_numbers_of_any_size_end_with_a_reason(theta, velocity, amplitude, dampi
 
 
 def test_a_record_and_a_model_without_contact_take_columns_too():
-    load = Load(force=Record(np.arange(5.0), np.array([0.0, 1.0, -1.0, 0.5, 0.0]), quantity="force"))
+    load = Load(
+        force=Record(np.arange(5.0), np.array([0.0, 1.0, -1.0, 0.5, 0.0]), quantity="force")
+    )
     scale = np.array([-1.0, 0.0, 2.0])
     ensemble = saltus.simulate_many(
-        System(model=Duffing(), load=load), x=0.2, duration=4.5, parameters={"load.force.scale": scale}
+        System(model=Duffing(), load=load),
+        x=0.2,
+        duration=4.5,
+        parameters={"load.force.scale": scale},
     )
     for i, value in enumerate(scale):
         system = System(model=Duffing(), load=load).with_({"load.force.scale": value})
-        assert float(ensemble.x[i]) == pytest.approx(saltus.simulate(system, x=0.2, duration=4.5).x, abs=1e-11)
+        assert float(ensemble.x[i]) == pytest.approx(
+            saltus.simulate(system, x=0.2, duration=4.5).x, abs=1e-11
+        )
 
 
 def test_processes_that_compute_at_the_same_time_share_the_cores(monkeypatch):

@@ -1,4 +1,6 @@
-"""The threads of ensembles are kept: ensembles that run at the same time, within one another or in a forked process agree."""
+"""The threads of ensembles are kept: ensembles that run at the same time, within one another or in
+a forked process agree.
+"""
 
 import os
 import subprocess
@@ -11,7 +13,10 @@ import pytest
 import saltus
 from saltus.systems import Harmonic, Load, Metainterface, System
 
-SYSTEM = System(model=Metainterface(beta0=1.4, damping=0.1), load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5))
+SYSTEM = System(
+    model=Metainterface(beta0=1.4, damping=0.1),
+    load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5),
+)
 
 FORKED = """
 import os
@@ -30,7 +35,9 @@ else:
 
 
 def ends(**options):
-    return saltus.simulate_many(SYSTEM, theta=np.linspace(-1, 1, 300), periods=20, **options).theta.values
+    return saltus.simulate_many(
+        SYSTEM, theta=np.linspace(-1, 1, 300), periods=20, **options
+    ).theta.values
 
 
 def test_ensembles_at_the_same_time_are_those_of_one_after_the_other():
@@ -50,7 +57,9 @@ def test_ensembles_at_the_same_time_are_those_of_one_after_the_other():
 
 def test_an_ensemble_runs_while_another_one_reports_its_progress():
     expected, within = ends(), []
-    np.testing.assert_array_equal(ends(progress=lambda done, what: within or within.append(ends())), expected)
+    np.testing.assert_array_equal(
+        ends(progress=lambda done, what: within or within.append(ends())), expected
+    )
     np.testing.assert_array_equal(within[0], expected)
 
 
@@ -59,11 +68,14 @@ def test_threads_that_are_idle_are_used_again():
     before = threading.active_count()
     for _ in range(50):
         ends(threads=2)
-    assert threading.active_count() <= before + 2  # a thread may be asked for just before one is idle
+    # a thread may be asked for just before one is idle
+    assert threading.active_count() <= before + 2
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_a_forked_process_has_threads_of_its_own():
     program = FORKED.format(system=SYSTEM.to_json())
-    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
+    answer = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
+    )
     assert answer.stdout == "0\n"

@@ -1,4 +1,6 @@
-"""Motions through a grazing: the touch is reported or resolved, never missed, and the end state follows it like a square root."""
+"""Motions through a grazing: the touch is reported or resolved, never missed, and the end state
+follows it like a square root.
+"""
 
 import math
 
@@ -9,7 +11,8 @@ from shared_systems import forced
 from saltus.flow import EventKind, simulate
 from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
-# In this motion theta comes down to a minimum near contact on its own side, from above. V < 0: at contact both sides push back.
+# In this motion theta comes down to a minimum near contact on its own side, from above. V < 0: at
+# contact both sides push back.
 SYSTEM = forced(H=0.5, W=0.3)
 DURATION = 6.0
 
@@ -19,7 +22,9 @@ def count(theta, system=SYSTEM, velocity=0.0):
 
 
 def find_grazing(low, high, system=SYSTEM):
-    """Bisect the initial angle between numbers of crossings that differ by two; neighbouring doubles at the end."""
+    """Bisect the initial angle between numbers of crossings that differ by two; neighbouring
+    doubles at the end.
+    """
     at_low = count(low, system)
     assert count(high, system) != at_low
     while True:
@@ -43,13 +48,15 @@ def grazing():
 
 def test_bisection_reaches_a_touch_between_neighbouring_doubles(grazing):
     few, many = sorted(
-        (simulate(SYSTEM, theta=a, velocity=0.0, duration=DURATION) for a in grazing), key=lambda m: len(m.impacts)
+        (simulate(SYSTEM, theta=a, velocity=0.0, duration=DURATION) for a in grazing),
+        key=lambda m: len(m.impacts),
     )
     assert len(many.impacts) - len(few.impacts) == 2
     fresh = [i for i, v in enumerate(many.impacts.velocity_before) if abs(v) < 1e-6]
     assert len(fresh) == 2
     assert fresh[1] == fresh[0] + 1
-    assert np.diff(many.impacts.time[fresh])[0] < 1e-6  # at most the square root of the working precision, or so
+    # at most the square root of the working precision, or so
+    assert np.diff(many.impacts.time[fresh])[0] < 1e-6
     assert few.theta == pytest.approx(many.theta, abs=1e-6)
     assert few.velocity == pytest.approx(many.velocity, abs=1e-6)
 
@@ -63,15 +70,25 @@ def test_the_dense_output_near_the_touch_stays_on_its_side(grazing):
 
 
 def test_the_end_state_leaves_its_smooth_continuation_like_a_square_root(grazing):
-    """Beyond the touch by d the speed there is sqrt(2 a d): the time on the other side, and its effect, grow like sqrt(d)."""
+    """Beyond the touch by d the speed there is sqrt(2 a d): the time on the other side, and its
+    effect, grow like sqrt(d).
+    """
     without = min(grazing, key=count)
     outward = math.copysign(1.0, max(grazing, key=count) - without)
     before = [
-        simulate(SYSTEM, theta=without - outward * d, velocity=0.0, duration=DURATION, tol=1e-15).theta for d in (1e-7, 2e-7)
+        simulate(
+            SYSTEM, theta=without - outward * d, velocity=0.0, duration=DURATION, tol=1e-15
+        ).theta
+        for d in (1e-7, 2e-7)
     ]
     at_touch = 2 * before[0] - before[1]
     departures = [
-        abs(simulate(SYSTEM, theta=without + outward * d, velocity=0.0, duration=DURATION, tol=1e-15).theta - at_touch)
+        abs(
+            simulate(
+                SYSTEM, theta=without + outward * d, velocity=0.0, duration=DURATION, tol=1e-15
+            ).theta
+            - at_touch
+        )
         for d in (1e-8, 4e-8, 16e-8)
     ]
     assert departures[0] > 1e-6  # a smooth flow would move by 1e-8
@@ -80,9 +97,13 @@ def test_the_end_state_leaves_its_smooth_continuation_like_a_square_root(grazing
 
 
 def wall(distance):
-    """x'' = cos t from x(0) = -1, v = 0: x = -cos t, which touches the wall at 1 at t = pi, 3 pi, ..."""
+    """x'' = cos t from x(0) = -1, v = 0: x = -cos t, which touches the wall at 1 at t = pi, 3 pi,
+    ...
+    """
     load = Load(frequency=1.0, force=Harmonic(amplitude=1.0, phase=math.pi / 2))
-    return System(model=WallOscillator(stiffness=0.0, wall=distance), load=load, impact=VelocityReduction(0.8))
+    return System(
+        model=WallOscillator(stiffness=0.0, wall=distance), load=load, impact=VelocityReduction(0.8)
+    )
 
 
 def test_an_exact_touch_of_the_wall_is_reported_at_its_time_and_changes_nothing():
@@ -100,7 +121,9 @@ def test_just_through_the_touch_the_impact_speed_is_the_root_of_twice_the_depth(
     motion = simulate(wall(1.0 - depth), x=-1.0, velocity=0.0, duration=4.0, tol=1e-15)
     speed = math.sqrt(2 * depth - depth**2)  # sin t where -cos t = 1 - depth
     assert motion.impacts.velocity_before[0] == pytest.approx(speed, rel=1e-9 + 1e-15 / depth)
-    assert motion.impacts.time[0] == pytest.approx(math.pi - math.asin(speed), abs=1e-15 / speed + 1e-14)
+    assert motion.impacts.time[0] == pytest.approx(
+        math.pi - math.asin(speed), abs=1e-15 / speed + 1e-14
+    )
 
 
 @pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-9, 1e-12, 1e-14])
@@ -111,9 +134,18 @@ def test_just_short_of_the_touch_there_is_no_impact(depth):
 
 
 def test_touches_at_the_ends_of_periods_are_survived_for_any_phase():
-    """The wall is touched once a period; the start is shifted, so that the touch falls anywhere in a step, and on its end."""
+    """The wall is touched once a period; the start is shifted, so that the touch falls anywhere in
+    a step, and on its end.
+    """
     for shift in [0.0, math.pi, math.pi - 1e-9, math.pi + 1e-9, *np.linspace(0, 2 * math.pi, 23)]:
-        motion = simulate(wall(1.0), x=-math.cos(shift), velocity=math.sin(shift), time=shift, duration=4 * math.pi, tol=1e-14)
+        motion = simulate(
+            wall(1.0),
+            x=-math.cos(shift),
+            velocity=math.sin(shift),
+            time=shift,
+            duration=4 * math.pi,
+            tol=1e-14,
+        )
         assert np.isfinite([motion.x, motion.velocity]).all()
         assert motion.x == pytest.approx(-math.cos(shift), abs=1e-5)
 
@@ -122,7 +154,9 @@ def test_a_repelling_contact_tears_the_flow_at_its_grazing_and_neither_hangs_nor
     """V > 0 pushes away on both sides: beyond the touch the motion does not come back."""
     system = forced(V=0.3, C=0.05, H=0.3, W=1.1)
     angles = np.linspace(0.1, 2.0, 60)
-    finals = np.array([simulate(system, theta=a, velocity=-0.5, duration=6.0).theta for a in angles])
+    finals = np.array(
+        [simulate(system, theta=a, velocity=-0.5, duration=6.0).theta for a in angles]
+    )
     assert (finals > 0).any()
     assert (finals < 0).any()
     at = int(np.argmax(np.sign(finals[1:]) != np.sign(finals[:-1])))

@@ -1,5 +1,5 @@
-"""Motions in PyTorch: the derivatives are those of `sensitivities` in both modes, for one motion and for many; what has none is
-refused."""
+"""Motions in PyTorch: the derivatives are those of `sensitivities` in both modes, for one motion
+and for many; what has none is refused."""
 
 import subprocess
 import sys
@@ -27,7 +27,9 @@ def torch():
 
 
 def known_of(**length):
-    return saltus.sensitivities(SYSTEM, theta=0.3, velocity=0.1, parameters=sorted(VALUES), **length)
+    return saltus.sensitivities(
+        SYSTEM, theta=0.3, velocity=0.1, parameters=sorted(VALUES), **length
+    )
 
 
 def vector_function(function):
@@ -42,13 +44,19 @@ def test_the_state_at_the_end_has_the_derivatives_of_sensitivities(torch, length
     assert len(known.motion.impacts) >= 2
     assert np.array_equal(end(point), known.motion.final_state)
     expected = np.hstack([known.parameters, known.state])
-    for jacobian in (torch.func.jacfwd(end), torch.func.jacrev(end), lambda x: torch.autograd.functional.jacobian(end, x)):
+    for jacobian in (
+        torch.func.jacfwd(end),
+        torch.func.jacrev(end),
+        lambda x: torch.autograd.functional.jacobian(end, x),
+    ):
         assert np.allclose(jacobian(point), expected, rtol=1e-12, atol=1e-12)
 
 
 def test_the_gradient_of_states_at_times_is_the_quotient_of_differences(torch):
     states = vector_function(saltus.to_torch(SYSTEM, times=TIMES, tol=1e-15))
-    point = torch.tensor([VALUES[path] for path in sorted(VALUES)] + START, dtype=torch.float64, requires_grad=True)
+    point = torch.tensor(
+        [VALUES[path] for path in sorted(VALUES)] + START, dtype=torch.float64, requires_grad=True
+    )
     assert states(point).shape == (4, 2)
     (states(point) ** 2).sum().backward()
     for i, step in enumerate(1e-5 * torch.eye(5, dtype=torch.float64)):
@@ -60,8 +68,15 @@ def test_the_gradient_of_states_at_times_is_the_quotient_of_differences(torch):
 @pytest.mark.parametrize("asked", [{"periods": 2}, {"times": [2.0, 9.0]}])
 def test_many_motions_are_those_that_are_followed_alone(torch, asked, monkeypatch):
     together = []
-    monkeypatch.setattr(differentiable, "simulate_many", lambda *a, **b: together.append(b) or saltus.simulate_many(*a, **b))
-    function, starts = saltus.to_torch(SYSTEM, **asked), torch.tensor([[0.3, 0.0], [0.1, 0.2], [-0.2, 0.0]]).double()
+    monkeypatch.setattr(
+        differentiable,
+        "simulate_many",
+        lambda *a, **b: together.append(b) or saltus.simulate_many(*a, **b),
+    )
+    function, starts = (
+        saltus.to_torch(SYSTEM, **asked),
+        torch.tensor([[0.3, 0.0], [0.1, 0.2], [-0.2, 0.0]]).double(),
+    )
 
     def of(e, start):
         return function({"load.frequency": 1.0, "impact.e": e}, start)
@@ -69,24 +84,41 @@ def test_many_motions_are_those_that_are_followed_alone(torch, asked, monkeypatc
     for mode in (lambda f, **_: f, torch.func.jacfwd, torch.func.jacrev):
         one = mode(of, argnums=(0, 1)) if mode in (torch.func.jacfwd, torch.func.jacrev) else of
         losses = torch.tensor([0.95, 0.9, 0.85], dtype=torch.float64)
-        found, known = torch.vmap(one)(losses, starts), [one(*each) for each in zip(losses, starts, strict=True)]
-        pairs = zip(found, zip(*known, strict=True), strict=True) if one is not of else [(found, known)]
+        found, known = (
+            torch.vmap(one)(losses, starts),
+            [one(*each) for each in zip(losses, starts, strict=True)],
+        )
+        pairs = (
+            zip(found, zip(*known, strict=True), strict=True) if one is not of else [(found, known)]
+        )
         for leaf, leaves in pairs:
             assert torch.allclose(leaf, torch.stack(list(leaves)), rtol=1e-10, atol=1e-10)
     assert bool(together) == ("periods" in asked)
     assert torch.equal(of(0.9, starts), torch.vmap(of, in_dims=(None, 0))(0.9, starts))
     grid = function({"impact.e": losses[:, None]}, starts)  # each loss with each start
-    assert torch.allclose(grid[1, 2], function({"impact.e": 0.9}, starts[2]), rtol=1e-10, atol=1e-10)
+    assert torch.allclose(
+        grid[1, 2], function({"impact.e": 0.9}, starts[2]), rtol=1e-10, atol=1e-10
+    )
 
 
 def test_a_start_without_derivative_does_not_spoil_the_parameters(torch):
-    """A ball that lies on the floor stays there under any weight; from beside it, without loss, it would bounce for ever."""
-    ball = saltus.System(model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0))
-    end, weight, start = saltus.to_torch(ball, duration=3.0), torch.tensor(1.0, requires_grad=True), torch.zeros(2)
+    """A ball that lies on the floor stays there under any weight; from beside it, without loss, it
+    would bounce for ever.
+    """
+    ball = saltus.System(
+        model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0)
+    )
+    end, weight, start = (
+        saltus.to_torch(ball, duration=3.0),
+        torch.tensor(1.0, requires_grad=True),
+        torch.zeros(2),
+    )
     (by_weight,) = torch.autograd.grad(end({"load.force": weight}, start)[0], weight)
     assert by_weight == 0.0
     assert by_weight.dtype == torch.float32  # as its number was given
-    _, moved = torch.func.jvp(lambda force: end({"load.force": force}, start), (weight.detach(),), (torch.tensor(1.0),))
+    _, moved = torch.func.jvp(
+        lambda force: end({"load.force": force}, start), (weight.detach(),), (torch.tensor(1.0),)
+    )
     assert torch.equal(moved, torch.zeros(2).double())
     assert torch.isnan(torch.func.jacrev(lambda x: end({}, x))(start)).any()
 
@@ -112,7 +144,15 @@ def test_what_has_no_meaning_is_said_in_a_sentence(torch):
 
 
 def test_without_pytorch_the_function_says_what_to_install():
-    program = "import sys; sys.modules['torch'] = None; import saltus; s = saltus.System(model=saltus.WallOscillator());"
-    program += "f = saltus.to_torch(s, duration=1.0)\ntry: f({}, [-1.0, 0.0])\nexcept saltus.ParameterError as e: print(e)"
-    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    program = (
+        "import sys; sys.modules['torch'] = None; import saltus; s = "
+        "saltus.System(model=saltus.WallOscillator());"
+    )
+    program += (
+        "f = saltus.to_torch(s, duration=1.0)\ntry: f({}, [-1.0, 0.0])\nexcept "
+        "saltus.ParameterError as e: print(e)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout
     assert told.strip() == 'to_torch needs PyTorch: pip install "saltus[torch]"'

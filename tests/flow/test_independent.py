@@ -1,4 +1,6 @@
-"""100 random motions against an integrator of another make: heyoka.py, stopped at each impact and restarted beyond it."""
+"""100 random motions against an integrator of another make: heyoka.py, stopped at each impact and
+restarted beyond it.
+"""
 
 import math
 
@@ -17,14 +19,18 @@ COLUMNS = ("side", "beta0", "mean", "H", "W", "phase", "V", "C", "k", "m")
 
 @pytest.fixture(scope="module")
 def integrator():
-    """`gov_eqn_theta_long` with its numbers as runtime parameters, and the contact, from inside, as a terminal event."""
+    """`gov_eqn_theta_long` with its numbers as runtime parameters, and the contact, from inside, as
+    a terminal event.
+    """
     x, v = heyoka.make_vars("x", "v")
     side, beta0, mean, H, W, phase, V, damping, stiffness, mass = (heyoka.par[i] for i in range(10))
     push = mean + H * heyoka.sin(W * heyoka.time + phase)
     force = heyoka.sin(side * x + beta0) * push + side * heyoka.cos(side * x + beta0) * V
     contact = heyoka.t_event(side * x, direction=heyoka.event_direction.negative)
     equations = [(x, v), (v, (force - damping * v - stiffness * x) / mass)]
-    return heyoka.taylor_adaptive(equations, [0.3, 0.0], pars=[1.0] * 10, t_events=[contact], tol=1e-15)
+    return heyoka.taylor_adaptive(
+        equations, [0.3, 0.0], pars=[1.0] * 10, t_events=[contact], tol=1e-15
+    )
 
 
 def by_heyoka(integrator, n, theta, velocity, duration):
@@ -69,14 +75,21 @@ def random_case(rng):
 
 
 def passes_near_a_grazing(motion):
-    """Whether a local extremum of the gap, or the height of a flight between two impacts, is below NEAR_GRAZING."""
+    """Whether a local extremum of the gap, or the height of a flight between two impacts, is below
+    NEAR_GRAZING.
+    """
     times = np.linspace(motion.start, motion.time, 6001)
     position, velocity, side = motion.dense.states(times)
     gap, rate = side * position[0], side * velocity[0]
     turns = (rate[:-1] * rate[1:] <= 0) & (side[:-1] == side[1:])
     flights = np.diff(motion.impacts.time)
-    slow = np.abs(motion.impacts.velocity_after[:-1]) * flights / 4 < NEAR_GRAZING  # a parabola's height
-    return bool((np.minimum(gap[:-1], gap[1:])[turns] < NEAR_GRAZING).any() or slow.any() or (side == 0).any())
+    # a parabola's height
+    slow = np.abs(motion.impacts.velocity_after[:-1]) * flights / 4 < NEAR_GRAZING
+    return bool(
+        (np.minimum(gap[:-1], gap[1:])[turns] < NEAR_GRAZING).any()
+        or slow.any()
+        or (side == 0).any()
+    )
 
 
 def derivative(system, theta, velocity, duration):

@@ -1,4 +1,6 @@
-"""The roots of the lanes: exact to rounding from any first guess, with the velocity there; and the rough functions they use."""
+"""The roots of the lanes: exact to rounding from any first guess, with the velocity there; and the
+rough functions they use.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -34,8 +36,16 @@ COMPILED = {"np": np, "math": math, "SERIES_LENGTH": SERIES_LENGTH}
 COMPILED |= vars(lane_vectors) | vars(private_numba) | vars(lane_memory) | {"Gap": Gap}
 for part in (kernel_layout, memory, lane_steps):
     exec(compiled_part(part), COMPILED)
-motion_at, only_root, guess_from_end = COMPILED["motion_at"], COMPILED["only_root"], COMPILED["guess_from_end"]
-sweep, short_flight, guess_from_start = COMPILED["sweep"], COMPILED["short_flight"], COMPILED["guess_from_start"]
+motion_at, only_root, guess_from_end = (
+    COMPILED["motion_at"],
+    COMPILED["only_root"],
+    COMPILED["guess_from_end"],
+)
+sweep, short_flight, guess_from_start = (
+    COMPILED["sweep"],
+    COMPILED["short_flight"],
+    COMPILED["guess_from_start"],
+)
 
 
 class Order(NamedTuple):
@@ -60,7 +70,9 @@ POSITIONS, VELOCITIES, ACCELERATIONS = PLACES
 SIZE = len(SLOTS) + 3 * SERIES_LENGTH
 LANES = LanesType("lanes of the tests of roots", SLOTS, PARTS, SERIES, "rows", "flags")
 _ARRAYS = [types.Array(from_dtype(dtype), 1, "C") for dtype in (FLAGS, ROW)]
-FEW = named_tuple(Few, types.float64[::1], types.int64[::1], named_tuple(Order, types.int64), *_ARRAYS)
+FEW = named_tuple(
+    Few, types.float64[::1], types.int64[::1], named_tuple(Order, types.int64), *_ARRAYS
+)
 LanesType.tuples[LANES.name] = FEW
 shared = shared_as(LANES)
 
@@ -74,7 +86,12 @@ def find(few):
     lanes = shared(few)
     h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
     x, v, a, _ = motion_at(lanes, 0, series[0], h)
-    cubic = (sign * series[0], sign * series[1] * h, sign * series[2] * (h * h), sign * series[3] * (h * h * h))
+    cubic = (
+        sign * series[0],
+        sign * series[1] * h,
+        sign * series[2] * (h * h),
+        sign * series[3] * (h * h * h),
+    )
     guess = guess_from_end(cubic, (x, v, a), sign, h)
     time, speed = only_root(lanes, Gap(0, series[0], sign, 0), guess, h, ALL)
     lanes.time = time
@@ -87,9 +104,16 @@ def find_short(few):
     h, sign, series = lanes.step, lanes.sign, lanes.positions[0]
     _, _, _, bend = sweep(lanes, 0, h)
     square = h * h
-    cubic = sign * series[0], sign * series[1] * h, sign * series[2] * square, sign * series[3] * (square * h)
+    cubic = (
+        sign * series[0],
+        sign * series[1] * h,
+        sign * series[2] * square,
+        sign * series[3] * (square * h),
+    )
     certain, flight = short_flight(cubic, bend)
-    guess = guess_from_start(cubic, (sign * series[4] * square * square, sign * series[5] * square * square * h), flight)
+    guess = guess_from_start(
+        cubic, (sign * series[4] * square * square, sign * series[5] * square * square * h), flight
+    )
     time, speed = only_root(lanes, Gap(0, series[0], sign, 0), guess * h, 2.0 * flight * h, certain)
     lanes.time = time
     lanes.speed = speed
@@ -105,7 +129,9 @@ def rough(m):
 
 
 def positions_of(kind, order, rng):
-    """Coefficients of gaps that have one root in (0, H], their last terms from 1e-2, for guesses that are bad, to 1e-15."""
+    """Coefficients of gaps that have one root in (0, H], their last terms from 1e-2, for guesses
+    that are bad, to 1e-15.
+    """
     k, digits = np.arange(order + 1), rng.choice([2, 6, 15], (WIDTH, 1))
     c = rng.normal(size=(WIDTH, order + 1)) * (10.0 ** (-digits / order) / H) ** k
     if kind == "falling":
@@ -121,7 +147,9 @@ def positions_of(kind, order, rng):
 
 
 def root_of(c):
-    """The root in (0, H], and the derivative there, in long doubles: bisection, then Newton's method."""
+    """The root in (0, H], and the derivative there, in long doubles: bisection, then Newton's
+    method.
+    """
     p = np.polynomial.Polynomial(c.astype(np.longdouble))
     slope, low, high = p.deriv(), np.longdouble(0), np.longdouble(H)
     for _ in range(40):
@@ -141,22 +169,36 @@ def test_roots_and_velocities_are_exact_to_rounding(kind, order):
     for _ in range(-(-400 // WIDTH)):
         c, values = positions_of(kind, order, rng), np.zeros((SIZE, WIDTH))
         sign = rng.choice([-1.0, 1.0], WIDTH)
-        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (sign[:, None] * c).T, H, sign
-        values[VELOCITIES : VELOCITIES + order] = (sign[:, None] * c[:, 1:] * np.arange(1, order + 1)).T
+        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (
+            (sign[:, None] * c).T,
+            H,
+            sign,
+        )
+        values[VELOCITIES : VELOCITIES + order] = (
+            sign[:, None] * c[:, 1:] * np.arange(1, order + 1)
+        ).T
         find(group(values, order))
         for lane in range(WIDTH):
             root, slope = root_of(c[lane])
             size, bend = np.abs(c[lane] * H ** np.arange(order + 1)).sum(), 6.0 / H**2
-            late = 8 * EPS * max(size, 1.0) / abs(float(slope))  # what rounding of the gap does to its root
+            # what rounding of the gap does to its root
+            late = 8 * EPS * max(size, 1.0) / abs(float(slope))
             errors.append(abs(float(values[TIME, lane] - root)) / (late + EPS * H))
-            errors.append(abs(float(sign[lane] * values[SPEED, lane] - slope)) / (bend * late + 16 * EPS * size / H))
+            errors.append(
+                abs(float(sign[lane] * values[SPEED, lane] - slope))
+                / (bend * late + 16 * EPS * size / H)
+            )
     assert max(errors) <= 1.0
 
 
 def flights_of(order, rng):
-    """Coefficients of gaps that begin at 0, for flights from 1e-6 of the step on under a pull that may turn round later in it."""
+    """Coefficients of gaps that begin at 0, for flights from 1e-6 of the step on under a pull that
+    may turn round later in it.
+    """
     k, share = np.arange(order + 1), 10.0 ** rng.uniform(-6, 0, WIDTH)
-    c = rng.normal(size=(WIDTH, order + 1)) * 10.0 ** (rng.uniform(-2, 1, (WIDTH, 1)) - 6 * k / order)
+    c = rng.normal(size=(WIDTH, order + 1)) * 10.0 ** (
+        rng.uniform(-2, 1, (WIDTH, 1)) - 6 * k / order
+    )
     c[:, 0], c[:, 1], c[:, 2] = 0.0, share, -1.0
     return c / H**k, share * H
 
@@ -169,12 +211,21 @@ def test_short_flights_that_are_certain_have_one_root_to_relative_rounding(order
         (c, flight), values = flights_of(order, rng), np.zeros((SIZE, WIDTH))
         sign, k = rng.choice([-1.0, 1.0], WIDTH), np.arange(1, order + 1)
         velocity = c[:, 1:] * k
-        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (sign[:, None] * c).T, H, sign
+        values[POSITIONS : POSITIONS + order + 1], values[STEP], values[SIGN] = (
+            (sign[:, None] * c).T,
+            H,
+            sign,
+        )
         values[VELOCITIES : VELOCITIES + order] = (sign[:, None] * velocity).T
-        values[ACCELERATIONS : ACCELERATIONS + order - 1] = (sign[:, None] * velocity[:, 1:] * k[:-1]).T
+        values[ACCELERATIONS : ACCELERATIONS + order - 1] = (
+            sign[:, None] * velocity[:, 1:] * k[:-1]
+        ).T
         find_short(group(values, order))
         for lane in np.flatnonzero(values[CERTAIN]):
-            p, time = np.polynomial.Polynomial(c[lane, 1:].astype(np.longdouble)), np.longdouble(values[TIME, lane])
+            p, time = (
+                np.polynomial.Polynomial(c[lane, 1:].astype(np.longdouble)),
+                np.longdouble(values[TIME, lane]),
+            )
             along = p(2 * flight[lane] * np.linspace(0.0, 1.0, 200))
             assert (np.diff(along > 0) != 0).sum() == 1  # the gap over the time
             root = time - p(time) / p.deriv()(time)

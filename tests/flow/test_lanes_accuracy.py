@@ -1,4 +1,6 @@
-"""A step in lanes is as exact as one of the scalar kernel, also where the last coefficients vanish by symmetry."""
+"""A step in lanes is as exact as one of the scalar kernel, also where the last coefficients vanish
+by symmetry.
+"""
 
 import math
 from dataclasses import dataclass
@@ -31,7 +33,9 @@ class Odd(Model):
 
 @dataclass(frozen=True, kw_only=True)
 class Pair(Model):
-    """x'' = F - w^2 x beside y'' = -y^3: one coordinate has all coefficients, the other only every fourth."""
+    """x'' = F - w^2 x beside y'' = -y^3: one coordinate has all coefficients, the other only every
+    fourth.
+    """
 
     rate: float = 1.0
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
@@ -42,9 +46,12 @@ class Pair(Model):
 
 
 def lemniscate(time):
-    """X and X' of X'' = -X^3 from X = 0, X' = 1, by the lemniscate sine; X' by the energy, its sign by the derivative."""
+    """X and X' of X'' = -X^3 from X = 0, X' = 1, by the lemniscate sine; X' by the energy, its sign
+    by the derivative.
+    """
     with mp.workdps(40):
-        # X'^2 = 1 - X^4/2: X = a sl(t / a) with a = 2^(1/4) and sl(u) = sd(sqrt(2) u, 1/2) / sqrt(2)
+        # X'^2 = 1 - X^4/2: X = a sl(t / a) with a = 2^(1/4) and sl(u) = sd(sqrt(2) u, 1/2) /
+        # sqrt(2)
         a, half = mp.mpf(2) ** mp.mpf("0.25"), mp.mpf("0.5")
         u = mp.sqrt(2) * mp.mpf(time) / a
         x = a * mp.ellipfun("sd", u, m=half) / mp.sqrt(2)
@@ -60,8 +67,12 @@ def test_the_reference_keeps_its_energy():
 
 @pytest.mark.parametrize("digits", range(6, 16))
 @pytest.mark.parametrize("duration", [0.3, 0.8064, 0.882, 1.6, 3.0, 5.0])
-def test_a_cubic_oscillator_through_zero_follows_the_lemniscate_at_every_tolerance(digits, duration):
-    ends = saltus.simulate_many(System(model=Odd(cubic=1.0)), x=0.0, velocity=1.0, duration=duration, tol=10.0**-digits)
+def test_a_cubic_oscillator_through_zero_follows_the_lemniscate_at_every_tolerance(
+    digits, duration
+):
+    ends = saltus.simulate_many(
+        System(model=Odd(cubic=1.0)), x=0.0, velocity=1.0, duration=duration, tol=10.0**-digits
+    )
     x, rate = lemniscate(duration)
     assert abs(float(ends.x) - x) + abs(float(ends.velocity) - rate) < 20 * 10.0**-digits + 2e-14
 
@@ -69,16 +80,25 @@ def test_a_cubic_oscillator_through_zero_follows_the_lemniscate_at_every_toleran
 @pytest.mark.parametrize("digits", range(6, 16, 3))
 @pytest.mark.parametrize("power", ["cubic", "quintic", "septic"])
 def test_odd_oscillators_keep_their_energy_from_zero_at_every_tolerance(digits, power):
-    """Between, where the last coefficients do not quite vanish, neither rule sees the growth; the scalar kernel loses as much."""
+    """Between, where the last coefficients do not quite vanish, neither rule sees the growth; the
+    scalar kernel loses as much.
+    """
     linear = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
     system = System(model=Odd(**{power: 1.0}))
     ends = saltus.simulate_many(
-        system, x=0.0, velocity=1.0, parameters={"model.linear": linear}, duration=20.0, tol=10.0**-digits
+        system,
+        x=0.0,
+        velocity=1.0,
+        parameters={"model.linear": linear},
+        duration=20.0,
+        tol=10.0**-digits,
     )
     degree = {"cubic": 4, "quintic": 6, "septic": 8}[power]
     x, v = ends.x.values, ends.velocity.values
     error = np.abs(v**2 / 2 + linear * x**2 / 2 + x**degree / degree - 0.5)
-    assert (error <= np.where((linear == 0.0) | (linear == 1.0), 30.0, 400.0) * 10.0**-digits + 2e-14).all()
+    assert (
+        error <= np.where((linear == 0.0) | (linear == 1.0), 30.0, 400.0) * 10.0**-digits + 2e-14
+    ).all()
 
 
 @pytest.mark.parametrize("rate", [1.0, 3.0, 6.0])
@@ -92,25 +112,43 @@ def test_each_of_several_coordinates_is_looked_at(rate, lanes):
             x, y = float(ends.x), float(ends.y)
         else:
             x, y = saltus.simulate(system, duration=duration, **arguments).position
-        exact = 0.3 / rate**2 + (0.2 - 0.3 / rate**2) * math.cos(rate * duration) + 0.1 / rate * math.sin(rate * duration)
+        exact = (
+            0.3 / rate**2
+            + (0.2 - 0.3 / rate**2) * math.cos(rate * duration)
+            + 0.1 / rate * math.sin(rate * duration)
+        )
         assert y == pytest.approx(lemniscate(duration)[0], abs=2e-11)
         assert x == pytest.approx(exact, abs=2e-11)
 
 
 @pytest.mark.parametrize("tol", [1e-8, 1e-12, 1e-14])
 def test_tangents_whose_last_coefficients_vanish_follow_the_lemniscate(tol):
-    """x(t; v) = sqrt(v) X(sqrt(v) t), and a shift in time moves the start by X' = 1: the derivatives in closed form."""
+    """x(t; v) = sqrt(v) X(sqrt(v) t), and a shift in time moves the start by X' = 1: the
+    derivatives in closed form.
+    """
     for duration in (0.8064, 3.0, 5.0):
         ends = saltus.simulate_many(
-            System(model=Odd(cubic=1.0)), x=0.0, velocity=1.0, duration=duration, tol=tol, sensitivities=()
+            System(model=Odd(cubic=1.0)),
+            x=0.0,
+            velocity=1.0,
+            duration=duration,
+            tol=tol,
+            sensitivities=(),
         )
         x, rate = lemniscate(duration)
-        expected = [[rate, 0.5 * x + 0.5 * duration * rate], [-(x**3), rate - 0.5 * duration * x**3]]
-        np.testing.assert_allclose(ends.derivative.values, expected, rtol=0, atol=3000 * tol + 1e-12)
+        expected = [
+            [rate, 0.5 * x + 0.5 * duration * rate],
+            [-(x**3), rate - 0.5 * duration * x**3],
+        ]
+        np.testing.assert_allclose(
+            ends.derivative.values, expected, rtol=0, atol=3000 * tol + 1e-12
+        )
 
 
 def test_energy_drifts_no_more_than_in_the_scalar_kernel():
-    """Over 300 periods, root mean square of eight motions: below 10 tol, and in the mean within twice the scalar's."""
+    """Over 300 periods, root mean square of eight motions: below 10 tol, and in the mean within
+    twice the scalar's.
+    """
     system, starts, ratios = forced(H=0.0, C=0.0), np.linspace(0.1, 1.5, 8), []
 
     def energy(theta, velocity):
@@ -121,10 +159,15 @@ def test_energy_drifts_no_more_than_in_the_scalar_kernel():
 
     for tol in (1e-6, 1e-8, 1e-10, 1e-12, 1e-14):
         ends = saltus.simulate_many(system, theta=starts, periods=300, tol=tol)
-        motions = [saltus.simulate(system, theta=x, periods=300, tol=tol, dense=False) for x in starts]
+        motions = [
+            saltus.simulate(system, theta=x, periods=300, tol=tol, dense=False) for x in starts
+        ]
         in_lanes = drift(ends.theta.values, ends.velocity.values)
         assert in_lanes < 10 * tol
-        ratios.append(in_lanes / drift(np.array([m.theta for m in motions]), np.array([m.velocity for m in motions])))
+        ratios.append(
+            in_lanes
+            / drift(np.array([m.theta for m in motions]), np.array([m.velocity for m in motions]))
+        )
     assert np.exp(np.mean(np.log(ratios))) <= 2.0, ratios
 
 

@@ -2,12 +2,14 @@
 
 SALTUS_CASES=100000 runs so many cases in all (minutes); by default about 4000.
 
-What may differ, and why. A motion magnifies its rounding. How much is measured, not assumed: every number of a case is changed
-by 1e-7 of itself, and the end moves `amplification` times as far. Below `CALM` -- away from chaos and grazing -- ends must
-agree to 1e-12 at tol 1e-14 and 1e-15 (else to 300 tol), and all that is counted exactly. Above, they must agree to 1e-12 times
-the amplification. Where the change makes an impact appear or vanish, or where the motion touches the contact, rounding decides
-what comes; only such cases may differ in what is counted, and they are rare. Besides, every impact rounds speed and clock:
-10^5 slow impacts without loss add up to a shift of the phase by 10^5 eps of the time since.
+What may differ, and why. A motion magnifies its rounding. How much is measured, not assumed: every
+number of a case is changed by 1e-7 of itself, and the end moves `amplification` times as far. Below
+`CALM` -- away from chaos and grazing -- ends must agree to 1e-12 at tol 1e-14 and 1e-15 (else to
+300 tol), and all that is counted exactly. Above, they must agree to 1e-12 times the amplification.
+Where the change makes an impact appear or vanish, or where the motion touches the contact, rounding
+decides what comes; only such cases may differ in what is counted, and they are rare. Besides, every
+impact rounds speed and clock: 10^5 slow impacts without loss add up to a shift of the phase by 10^5
+eps of the time since.
 """
 
 import os
@@ -27,7 +29,15 @@ TOLERANCES = (1e-14, 1e-15, 1e-14, 1e-12, 1e-9)  # batch by batch, in turn
 
 def counted_in_lanes(ensemble):
     held = ensemble.chatter_speed.values > 0
-    return [*zip(stop_names(ensemble).values, ensemble.impact_count.values, ensemble.side.values, held, strict=True)]
+    return [
+        *zip(
+            stop_names(ensemble).values,
+            ensemble.impact_count.values,
+            ensemble.side.values,
+            held,
+            strict=True,
+        )
+    ]
 
 
 def counted(motion):
@@ -47,7 +57,13 @@ def compare(cases, tol, rng):
     """Differences in what is counted, and the numbers of calm and of doubtful cases."""
     ensemble = cases.in_lanes(tol=tol)
     magnified = amplification(cases, ensemble, tol, rng)
-    found, state, wrong, calm, doubtful = counted_in_lanes(ensemble), end_state(ensemble, cases.system), [], 0, 0
+    found, state, wrong, calm, doubtful = (
+        counted_in_lanes(ensemble),
+        end_state(ensemble, cases.system),
+        [],
+        0,
+        0,
+    )
     each, rounding = max(1e-12, 300 * tol), 4 * np.spacing(1.0) * elapsed(cases)
     for i in range(len(cases)):
         motion = cases.alone(i, tol=tol)
@@ -62,7 +78,10 @@ def compare(cases, tol, rng):
             here, there = state[i], motion_state(motion)
             error = np.abs(here - there).max() / max(1.0, np.abs(there).max())
             clock = abs(float(ensemble.time[i]) - motion.time) / max(1.0, abs(motion.time))
-            allowed = each * (1.0 if magnified[i] <= CALM else magnified[i]) + len(motion.impacts) * rounding[i]
+            allowed = (
+                each * (1.0 if magnified[i] <= CALM else magnified[i])
+                + len(motion.impacts) * rounding[i]
+            )
             if not max(error, clock) <= allowed:
                 wrong.append((i, error, clock, magnified[i]))
     return wrong, calm, doubtful
@@ -71,7 +90,9 @@ def compare(cases, tol, rng):
 USUAL = ("paper", "constant_loads", "rocking", "wall")  # the others compile for themselves
 
 
-@pytest.mark.parametrize("family", [pytest.param(f, marks=[pytest.mark.thorough] * (f not in USUAL)) for f in FAMILIES])
+@pytest.mark.parametrize(
+    "family", [pytest.param(f, marks=[pytest.mark.thorough] * (f not in USUAL)) for f in FAMILIES]
+)
 def test_lanes_end_where_the_scalar_kernel_does(family):
     wrong, calm, doubtful, total = [], 0, 0, 0
     for batch in range(max(1, round(CASES / BATCH))):
@@ -90,7 +111,9 @@ def test_lanes_end_where_the_scalar_kernel_does(family):
 @pytest.mark.thorough
 @pytest.mark.parametrize("family", FAMILIES)
 def test_lanes_agree_with_themselves_at_another_tolerance(family):
-    """Other steps, hence other roots and other polynomials: what goes wrong once in 10^5 impacts shows here."""
+    """Other steps, hence other roots and other polynomials: what goes wrong once in 10^5 impacts
+    shows here.
+    """
     rng = np.random.default_rng([99, *family.encode()])
     cases = FAMILIES[family](rng, 10_000 if "SALTUS_CASES" in os.environ else 2_000)
     one, other = cases.in_lanes(tol=1e-14), cases.in_lanes(tol=3e-15)
@@ -105,19 +128,27 @@ def test_lanes_agree_with_themselves_at_another_tolerance(family):
     counts = lossless & (one.impact_count.values != other.impact_count.values)
     wrong = np.flatnonzero(calm & (counts | ~(error <= allowed)))
     assert not wrong.size, [
-        (i, error[i], magnified[i], one.impact_count.values[i], other.impact_count.values[i]) for i in wrong[:5]
+        (i, error[i], magnified[i], one.impact_count.values[i], other.impact_count.values[i])
+        for i in wrong[:5]
     ]
     assert calm.mean() > 0.75
 
 
 def test_no_flight_of_thousands_of_slow_ones_is_wrong():
-    """Between slow impacts steps are much longer than flights: the guess of the root may go astray, the root may not."""
+    """Between slow impacts steps are much longer than flights: the guess of the root may go astray,
+    the root may not.
+    """
     n, rng = 50_000, np.random.default_rng(0)
     speed, begin = 10 ** rng.uniform(-4, -1, n), rng.uniform(0.0, 6.0, n)
     system = (
-        FAMILIES["paper"](rng, 1).one(0)[0].with_({"impact.e": 1.0, "load.horizontal.amplitude": 0.05, "load.vertical": -0.5})
+        FAMILIES["paper"](rng, 1)
+        .one(0)[0]
+        .with_({"impact.e": 1.0, "load.horizontal.amplitude": 0.05, "load.vertical": -0.5})
     )
-    ends = [saltus.simulate_many(system, theta=0.0, velocity=speed, time=begin, duration=0.3, tol=tol) for tol in (1e-14, 1e-15)]
+    ends = [
+        saltus.simulate_many(system, theta=0.0, velocity=speed, time=begin, duration=0.3, tol=tol)
+        for tol in (1e-14, 1e-15)
+    ]
     assert int(ends[0].impact_count.max()) > 50
     np.testing.assert_array_equal(ends[0].impact_count, ends[1].impact_count)
     np.testing.assert_allclose(ends[0].velocity, ends[1].velocity, rtol=0, atol=1e-12)

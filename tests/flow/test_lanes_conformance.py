@@ -1,4 +1,6 @@
-"""Every registered model runs through the scalar kernel, the lanes and the sensitivities, without being told to any test."""
+"""Every registered model runs through the scalar kernel, the lanes and the sensitivities, without
+being told to any test.
+"""
 
 import dataclasses
 import math
@@ -19,7 +21,9 @@ GUESSES = (0.4, 0.3, 0.9, 1.1)  # for a number without a default that a model ma
 
 
 def build(model):
-    """A model with its defaults, and for numbers without one the first of some guesses that it takes."""
+    """A model with its defaults, and for numbers without one the first of some guesses that it
+    takes.
+    """
     needed = [f.name for f in dataclasses.fields(model) if f.default is dataclasses.MISSING]
     return model(**dict.fromkeys(needed, GUESSES[0]))
 
@@ -27,7 +31,8 @@ def build(model):
 def system_of(model):
     """Every channel harmonic, with an impact law that loses something where there are impacts."""
     channels = {
-        name: Harmonic(amplitude=0.05 + 0.03 * i, mean=0.02 * i - 0.04, phase=0.5 * i) for i, name in enumerate(model.channels)
+        name: Harmonic(amplitude=0.05 + 0.03 * i, mean=0.02 * i - 0.04, phase=0.5 * i)
+        for i, name in enumerate(model.channels)
     }
     built = build(model)
     load = Load(frequency=1.3, **channels)
@@ -39,7 +44,9 @@ def system_of(model):
 
 
 def states_of(system, n=24):
-    """States on every side of the contact, or on the open side of several, by the gaps and by what stops the motion."""
+    """States on every side of the contact, or on the open side of several, by the gaps and by what
+    stops the motion.
+    """
     rng, model = np.random.default_rng(4), system.model
     own, found = len(model.coordinates), []
     for _ in range(100_000):
@@ -48,7 +55,10 @@ def states_of(system, n=24):
         speed = float(velocity[0]) if own == 1 else tuple(velocity)
         gaps = {side: float(model.gap(place, side)) for side in model.sides} if own == 1 else {}
         inside = [side for side, gap in gaps.items() if gap > 0]
-        beyond = any(c.sign * (position[model.coordinates.index(c.coordinate)] - c.position) <= 0 for c in model.contacts)
+        beyond = any(
+            c.sign * (position[model.coordinates.index(c.coordinate)] - c.position) <= 0
+            for c in model.contacts
+        )
         if (gaps and not inside) or (model.holds_coordinates and beyond):
             continue
         side = inside[0] if inside else 1
@@ -66,14 +76,25 @@ def states_of(system, n=24):
 def some_paths(system):
     """One number of the model, one of a channel, the frequency, and one of the impact law."""
     numbers = [path for path in system.parameters if not path.endswith(".order")]
-    chosen = [next(p for p in numbers if p.startswith("model.")), next(p for p in numbers if p.endswith(".amplitude"))]
+    chosen = [
+        next(p for p in numbers if p.startswith("model.")),
+        next(p for p in numbers if p.endswith(".amplitude")),
+    ]
     return tuple(
-        dict.fromkeys([*chosen, "load.frequency", *(p for p in numbers if p.startswith("impact.") and system.model.sides)])
+        dict.fromkeys(
+            [
+                *chosen,
+                "load.frequency",
+                *(p for p in numbers if p.startswith("impact.") and system.model.sides),
+            ]
+        )
     )
 
 
 ONE_CONTACT = {
-    name: model for name, model in MODELS.items() if model.contacts is Model.contacts and model.frictions is Model.frictions
+    name: model
+    for name, model in MODELS.items()
+    if model.contacts is Model.contacts and model.frictions is Model.frictions
 }
 CASES = {**ONE_CONTACT, "Duffing": Duffing, "Curved": Curved, "Pair": Pair}
 
@@ -85,7 +106,9 @@ def ready(request):
 
 
 def one(states, velocity, i):
-    speed = tuple(float(v[i]) for v in velocity) if isinstance(velocity, tuple) else float(velocity[i])
+    speed = (
+        tuple(float(v[i]) for v in velocity) if isinstance(velocity, tuple) else float(velocity[i])
+    )
     return {"velocity": speed, **{name: float(a[i]) for name, a in states.items()}}
 
 
@@ -102,8 +125,14 @@ def test_lanes_are_the_scalar_kernel(ready):
     ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=1.4, tol=1e-14)
     stops = stop_names(ensemble).values
     for i, state in enumerate(end_state(ensemble, system)):
-        motion = saltus.simulate(system, **one(states, velocity, i), periods=1.4, tol=1e-14, dense=False)
-        assert (stops[i], int(ensemble.impact_count[i]), int(ensemble.side[i])) == (motion.stop, len(motion.impacts), motion.side)
+        motion = saltus.simulate(
+            system, **one(states, velocity, i), periods=1.4, tol=1e-14, dense=False
+        )
+        assert (stops[i], int(ensemble.impact_count[i]), int(ensemble.side[i])) == (
+            motion.stop,
+            len(motion.impacts),
+            motion.side,
+        )
         np.testing.assert_allclose(state, motion_state(motion), rtol=0, atol=3e-12)
 
 
@@ -111,10 +140,17 @@ def test_lanes_are_the_scalar_kernel(ready):
 def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(ready):
     system, states, velocity = ready
     paths, compared, periods = some_paths(system), 0, 0.1 if system.model.stops else 1.4
-    ensemble = saltus.simulate_many(system, **states, velocity=velocity, periods=periods, tol=1e-14, sensitivities=paths)
+    ensemble = saltus.simulate_many(
+        system, **states, velocity=velocity, periods=periods, tol=1e-14, sensitivities=paths
+    )
     for i, derivative in enumerate(ensemble.derivative.values):
         result = saltus.sensitivities(
-            system, parameters=paths, **one(states, velocity, i), periods=periods, tol=1e-14, dense=False
+            system,
+            parameters=paths,
+            **one(states, velocity, i),
+            periods=periods,
+            tol=1e-14,
+            dense=False,
         )
         expected = np.hstack([result.state, result.parameters])
         np.testing.assert_array_equal(np.isnan(derivative), np.isnan(expected))
@@ -135,28 +171,42 @@ def test_every_impact_law_runs_in_lanes_where_the_model_takes_it(model, impact):
     states, velocity = states_of(system, 12)
     try:
         system = system.with_({"impact": law(**dict.fromkeys(needed, 0.8))})
-        expected = [saltus.simulate(system, **one(states, velocity, i), periods=1.0, tol=1e-14, dense=False) for i in range(12)]
+        expected = [
+            saltus.simulate(system, **one(states, velocity, i), periods=1.0, tol=1e-14, dense=False)
+            for i in range(12)
+        ]
     except saltus.ParameterError as refused:
         message = re.escape(str(refused))
         with pytest.raises(saltus.ParameterError, match=message):
             saltus.simulate_many(
-                system.with_({"impact": law(**dict.fromkeys(needed, 0.8))}), **states, velocity=velocity, periods=1.0
+                system.with_({"impact": law(**dict.fromkeys(needed, 0.8))}),
+                **states,
+                velocity=velocity,
+                periods=1.0,
             )
         return
     except saltus.MotionError:
         pytest.skip("some of its impacts have no solution; the random cases compare them")
-    ensemble, compared = saltus.simulate_many(system, **states, velocity=velocity, periods=1.0, tol=1e-14), 0
+    ensemble, compared = (
+        saltus.simulate_many(system, **states, velocity=velocity, periods=1.0, tol=1e-14),
+        0,
+    )
     for i, motion in enumerate(expected):
         if np.abs(motion_state(motion)).max() > 100.0:
-            continue  # cells whose hinge has almost no mass in this position, where rounding is as large
+            # cells whose hinge has almost no mass in this position, where rounding is as large
+            continue
         compared += 1
         assert int(ensemble.impact_count[i]) == len(motion.impacts)
-        np.testing.assert_allclose(end_state(ensemble, system)[i], motion_state(motion), rtol=0, atol=3e-12)
+        np.testing.assert_allclose(
+            end_state(ensemble, system)[i], motion_state(motion), rtol=0, atol=3e-12
+        )
     assert compared >= 6
 
 
 def compiled_here():
-    """The modules of generated code that this process has loaded; others may add files to the cache meanwhile."""
+    """The modules of generated code that this process has loaded; others may add files to the cache
+    meanwhile.
+    """
     return {name for name in sys.modules if name.startswith("saltus_")}
 
 
@@ -166,6 +216,8 @@ def test_numbers_that_change_compile_nothing(ready):
     before = compiled_here()
     for path, value in system.parameters.items():
         if not path.endswith(".order") and (system.model.sides or not path.startswith("impact.")):
-            saltus.simulate_many(system, **states, velocity=velocity, periods=0.1, parameters={path: value * 0.99})
+            saltus.simulate_many(
+                system, **states, velocity=velocity, periods=0.1, parameters={path: value * 0.99}
+            )
     assert compiled_here() == before
     assert math.isfinite(system.load.frequency)

@@ -1,8 +1,9 @@
-"""Derivatives in lanes: those of the scalar kernel for every kind of load, and the law of their determinant on many cases.
+"""Derivatives in lanes: those of the scalar kernel for every kind of load, and the law of their
+determinant on many cases.
 
-det d(end)/d(start) = product over impacts of (v+/v-)^2 . exp(-C [c T_lower / (1+m) + T_upper]) (numerics.md, section 5); for the
-wall the same with its one side, and for a block without damping the product alone. Free volumes of two coordinates shrink by the
-integral of the divergence.
+det d(end)/d(start) = product over impacts of (v+/v-)^2 . exp(-C [c T_lower / (1+m) + T_upper])
+(numerics.md, section 5); for the wall the same with its one side, and for a block without damping
+the product alone. Free volumes of two coordinates shrink by the integral of the divergence.
 """
 
 import os
@@ -34,10 +35,15 @@ def test_derivatives_in_lanes_are_those_of_the_scalar_kernel(family):
     for i in range(len(cases)):
         system, arguments = cases.one(i)
         try:
-            result = saltus.sensitivities(system, parameters=PATHS[family], **arguments, tol=1e-14, dense=False)
+            result = saltus.sensitivities(
+                system, parameters=PATHS[family], **arguments, tol=1e-14, dense=False
+            )
         except (saltus.MotionError, saltus.ParameterError):
             continue
-        expected, found = np.hstack([result.state, result.parameters]), ensemble.derivative.values[i]
+        expected, found = (
+            np.hstack([result.state, result.parameters]),
+            ensemble.derivative.values[i],
+        )
         if result.motion.stop == "limit" or result.grazings.size:
             continue
         speeds = np.abs(result.motion.impacts.velocity_before)
@@ -65,7 +71,9 @@ def times_on_sides(motion):
 
 @pytest.mark.parametrize("family", ["paper", "every_channel", "wall", "rocking", "duffing"])
 def test_the_determinant_obeys_its_law(family):
-    """The lanes tell impacts and derivatives of many; the times on each side come from the scalar motion of some."""
+    """The lanes tell impacts and derivatives of many; the times on each side come from the scalar
+    motion of some.
+    """
     cases = FAMILIES[family](np.random.default_rng([10, *family.encode()]), CASES // 5)
     ensemble = cases.in_lanes(tol=1e-14, sensitivities=())
     found = np.linalg.det(np.nan_to_num(ensemble.derivative.values))
@@ -91,7 +99,10 @@ def test_the_determinant_obeys_its_law(family):
                 spent = times_on_sides(motion)
                 if spent[0] > 0:
                     continue
-                c, m = cases.columns["model.dissipation_ratio"][i], cases.columns["model.mass_ratio"][i]
+                c, m = (
+                    cases.columns["model.dissipation_ratio"][i],
+                    cases.columns["model.mass_ratio"][i],
+                )
                 exponent = damping * (c * spent[1] / (1 + m) + spent[-1])
             expected = factor[i] ** (2.0 * int(ensemble.impact_count[i])) * np.exp(-exponent)
         used += 1
@@ -104,18 +115,27 @@ def test_the_determinant_obeys_its_law(family):
 
 
 def held_within(cases, ensemble, i):
-    """Whether the motion may have rested or lost its phase before the end: it starts at contact, or loses speed there."""
+    """Whether the motion may have rested or lost its phase before the end: it starts at contact, or
+    loses speed there.
+    """
     if not cases.system.model.sides:
         return False
     motion = cases.alone(i, tol=1e-14, dense=False)
-    return len(motion.events.of(saltus.EventKind.REST)) > 0 or len(motion.events.of(saltus.EventKind.CHATTER)) > 0
+    return (
+        len(motion.events.of(saltus.EventKind.REST)) > 0
+        or len(motion.events.of(saltus.EventKind.CHATTER)) > 0
+    )
 
 
 def test_after_rest_there_is_no_derivative_to_the_start_left():
     cases = FAMILIES["paper"](np.random.default_rng(1), 400)
-    ensemble = Cases(cases.system, cases.columns, cases.state, cases.velocity, cases.time, {"periods": 6.0}).in_lanes(
-        sensitivities=()
+    ensemble = Cases(
+        cases.system, cases.columns, cases.state, cases.velocity, cases.time, {"periods": 6.0}
+    ).in_lanes(sensitivities=())
+    resting = (
+        (stop_names(ensemble).values == "rest")
+        & (cases.columns["impact.e"] < 1)
+        & (ensemble.impact_count.values > 0)
     )
-    resting = (stop_names(ensemble).values == "rest") & (cases.columns["impact.e"] < 1) & (ensemble.impact_count.values > 0)
     assert resting.sum() >= 5
     assert not ensemble.derivative.values[resting].any()

@@ -1,4 +1,6 @@
-"""How trajectories in lanes end: rest beside the end of a forcing period, captured chatter, impacts without end."""
+"""How trajectories in lanes end: rest beside the end of a forcing period, captured chatter, impacts
+without end.
+"""
 
 import math
 
@@ -14,7 +16,9 @@ from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, Sys
 
 @pytest.mark.parametrize("late", [1e-6, 1e-8, 1e-10, -1e-8])
 @pytest.mark.parametrize("begin", [0.0, 1.0])
-def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernels_impacts(late, begin):
+def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernels_impacts(
+    late, begin
+):
     """It is followed to the end only where the motion itself ends first."""
     system = forced(H=0.0, V=-0.5, e=0.8)
     motion = saltus.simulate(system, theta=0.3, duration=100.0)
@@ -22,7 +26,10 @@ def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernel
     turned = system.with_({"load.frequency": 2 * math.pi / (rest - late)})
     for periods in (1, 2, 3):
         arguments = {"theta": 0.3, "time": begin, "periods": periods}
-        alone, lane = saltus.simulate(turned, **arguments), saltus.simulate_many(turned, **arguments)
+        alone, lane = (
+            saltus.simulate(turned, **arguments),
+            saltus.simulate_many(turned, **arguments),
+        )
         assert int(lane.impact_count) == len(alone.impacts)
         assert str(stop_names(lane).values) == alone.stop.value
         if periods > 1:
@@ -38,7 +45,11 @@ def test_impacts_too_slow_to_be_followed_are_captured_at_once():
     assert (ends.time[speeds > 1e-5] == 0.0).all()
     assert float(ends.time.max()) <= 2 * np.pi  # where they are averaged, within a forcing period
     nothing = saltus.simulate_many(
-        system.with_({"load.horizontal.amplitude": 0.2}), theta=0.0, velocity=speeds, periods=1, until="rest"
+        system.with_({"load.horizontal.amplitude": 0.2}),
+        theta=0.0,
+        velocity=speeds,
+        periods=1,
+        until="rest",
     )
     assert "captured" not in set(stop_names(nothing).values)  # the load lifts it off
 
@@ -63,19 +74,37 @@ ENDLESS = System(
 
 @pytest.mark.thorough
 def test_impacts_that_shrink_as_one_over_their_number_end_in_both_kernels():
-    """Where the ground moves, T+ = T- takes from two impacts a share of the speed in proportion to the speed."""
+    """Where the ground moves, T+ = T- takes from two impacts a share of the speed in proportion to
+    the speed.
+    """
     with pytest.raises(MotionError, match="accumulate too slowly"):
-        saltus.simulate(ENDLESS, theta=0.0, velocity=0.000539313800157078, time=-15.526170929713356, periods=1, dense=False)
-    ends = saltus.simulate_many(ENDLESS, theta=0.0, velocity=0.000539313800157078, time=-15.526170929713356, periods=1)
+        saltus.simulate(
+            ENDLESS,
+            theta=0.0,
+            velocity=0.000539313800157078,
+            time=-15.526170929713356,
+            periods=1,
+            dense=False,
+        )
+    ends = saltus.simulate_many(
+        ENDLESS, theta=0.0, velocity=0.000539313800157078, time=-15.526170929713356, periods=1
+    )
     assert str(stop_names(ends).values) == "unresolved"
 
 
 @pytest.mark.parametrize("frequency", [None, 1e-6])
 def test_a_long_ordinary_motion_has_as_many_impacts_as_it_needs(frequency):
-    """A ball that loses nothing, x'' = 1 towards the wall, speed v: an impact every 2 v, more than a million of them."""
+    """A ball that loses nothing, x'' = 1 towards the wall, speed v: an impact every 2 v, more than
+    a million of them.
+    """
     speed, count = 0.01, 1_200_000
-    system = System(model=WallOscillator(stiffness=0.0, damping=0.0, wall=0.0), load=Load(frequency=frequency, force=1.0))
-    ends = saltus.simulate_many(system, x=0.0, velocity=-speed, duration=2 * speed * (count + 0.5), tol=1e-9)
+    system = System(
+        model=WallOscillator(stiffness=0.0, damping=0.0, wall=0.0),
+        load=Load(frequency=frequency, force=1.0),
+    )
+    ends = saltus.simulate_many(
+        system, x=0.0, velocity=-speed, duration=2 * speed * (count + 0.5), tol=1e-9
+    )
     assert str(stop_names(ends).values) == "horizon"
     assert int(ends.impact_count) == count
     assert float(ends.x) == pytest.approx(-(speed**2) / 2, abs=1e-8)

@@ -1,4 +1,6 @@
-"""Lanes whose contact is far away: each motion is that of the linear system without a contact, by its matrix exponential."""
+"""Lanes whose contact is far away: each motion is that of the linear system without a contact, by
+its matrix exponential.
+"""
 
 import math
 
@@ -23,7 +25,9 @@ def one_mass(make):
 
 
 def pair():
-    """The case on its spring, z'' + c z' + z = A sin(w t), and the mass that slides in it, x'' = -z''."""
+    """The case on its spring, z'' + c z' + z = A sin(w t), and the mass that slides in it, x'' =
+    -z''.
+    """
     spring, forced = np.array([-1, 0, -DAMPING, 0, AMPLITUDE, 0]), np.zeros((6, 6))
     forced[0, 2] = forced[1, 3] = 1.0
     forced[2], forced[3] = spring, -spring
@@ -32,18 +36,28 @@ def pair():
 
 
 def between_walls(d):
-    return System(model=ImpactPair(damping=DAMPING, clearance=d), load=LOAD, impact=NewtonImpact(0.8))
+    return System(
+        model=ImpactPair(damping=DAMPING, clearance=d), load=LOAD, impact=NewtonImpact(0.8)
+    )
 
 
 def wall(d):
-    return System(model=WallOscillator(damping=DAMPING, wall=d), load=LOAD, impact=VelocityReduction(0.8))
+    return System(
+        model=WallOscillator(damping=DAMPING, wall=d), load=LOAD, impact=VelocityReduction(0.8)
+    )
 
 
 def stops(d):
-    return System(model=TwoStops(damping=DAMPING, left=-d, right=d), load=LOAD, impact=NewtonImpact(0.8))
+    return System(
+        model=TwoStops(damping=DAMPING, left=-d, right=d), load=LOAD, impact=NewtonImpact(0.8)
+    )
 
 
-MODELS = {"one wall": one_mass(wall), "two stops": one_mass(stops), "a mass between two walls": pair()}
+MODELS = {
+    "one wall": one_mass(wall),
+    "two stops": one_mass(stops),
+    "a mass between two walls": pair(),
+}
 
 
 def starts(names):
@@ -51,7 +65,9 @@ def starts(names):
     rng, own = np.random.default_rng(5), len(names)
     states = rng.uniform(-1.0, 1.0, (3, 2 * own))
     velocity = tuple(states[:, own + i] for i in range(own))
-    return dict(zip(names, states.T, strict=False)) | {"velocity": velocity if own > 1 else velocity[0]}, states
+    return dict(zip(names, states.T, strict=False)) | {
+        "velocity": velocity if own > 1 else velocity[0]
+    }, states
 
 
 def exact(matrix, states, time):
@@ -66,10 +82,19 @@ def test_states_samples_and_derivatives_are_those_of_the_free_motion(name, dista
     make, matrix, names = MODELS[name]
     arguments, states = starts(names)
     period = 2 * math.pi / FREQUENCY
-    ends = saltus.simulate_many(make(distance), **arguments, periods=3, last="all", sample=("state", "extrema"), sensitivities=())
+    ends = saltus.simulate_many(
+        make(distance),
+        **arguments,
+        periods=3,
+        last="all",
+        sample=("state", "extrema"),
+        sensitivities=(),
+    )
     own = len(names)
     for n in (1, 2, 3):
-        found = np.stack([ends[f"sampled_{coordinate}"].values[..., n - 1] for coordinate in names], axis=-1)
+        found = np.stack(
+            [ends[f"sampled_{coordinate}"].values[..., n - 1] for coordinate in names], axis=-1
+        )
         expected = exact(matrix, states, n * period)[:, :own]
         np.testing.assert_allclose(found, expected, rtol=0, atol=3e-12)
     assert set(stop_names(ends).values) == {"horizon"}
@@ -81,12 +106,17 @@ def test_states_samples_and_derivatives_are_those_of_the_free_motion(name, dista
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("name", ["one wall", "two stops"])
 def test_extrema_are_those_of_the_free_motion(name, distance):
-    """By the closed form at 20 000 instants of a period, whose extrema are exact to the square of their distance."""
+    """By the closed form at 20 000 instants of a period, whose extrema are exact to the square of
+    their distance.
+    """
     make, matrix, names = MODELS[name]
     arguments, states = starts(names)
     duration, count = 5.0, 20_000
     ends = saltus.simulate_many(make(distance), **arguments, duration=duration, sample=("extrema",))
-    step, course = expm(matrix * duration / count), [np.hstack([states, np.zeros((3, 1)), np.ones((3, 1))])]
+    step, course = (
+        expm(matrix * duration / count),
+        [np.hstack([states, np.zeros((3, 1)), np.ones((3, 1))])],
+    )
     for _ in range(count):
         course.append(course[-1] @ step.T)
     x = np.array(course)[:, :, 0]
@@ -97,7 +127,9 @@ def test_extrema_are_those_of_the_free_motion(name, distance):
 @pytest.mark.parametrize("distance", DISTANCES)
 def test_a_motion_settles_as_without_a_wall(distance):
     """On the steady response P sin(w t - phi)."""
-    system = System(model=WallOscillator(damping=1.0, wall=distance), load=LOAD, impact=VelocityReduction(0.8))
+    system = System(
+        model=WallOscillator(damping=1.0, wall=distance), load=LOAD, impact=VelocityReduction(0.8)
+    )
     end = saltus.simulate_many(system, x=0.2, periods=100, until=("settled",))
     assert str(stop_names(end).values) == "settled"
     stiff, damped = 1 - FREQUENCY**2, FREQUENCY
@@ -105,10 +137,17 @@ def test_a_motion_settles_as_without_a_wall(distance):
 
 
 def test_a_wall_far_from_zero_is_met_where_it_is():
-    """A fall over the distance d under the acceleration 2: the impact at sqrt(d), and the way back with half of its speed."""
+    """A fall over the distance d under the acceleration 2: the impact at sqrt(d), and the way back
+    with half of its speed.
+    """
     for d in (1e3, 1e6, 1e9):
-        system = System(model=WallOscillator(stiffness=0.0, wall=d), load=Load(force=2.0), impact=VelocityReduction(0.5))
+        system = System(
+            model=WallOscillator(stiffness=0.0, wall=d),
+            load=Load(force=2.0),
+            impact=VelocityReduction(0.5),
+        )
         end = saltus.simulate_many(system, x=0.0, duration=1.5 * math.sqrt(d))
         assert int(end.impact_count) == 1
-        assert float(end.x) == pytest.approx(0.75 * d, rel=1e-13)  # d - sqrt(d) * sqrt(d) / 2 + d / 4
+        # d - sqrt(d) * sqrt(d) / 2 + d / 4
+        assert float(end.x) == pytest.approx(0.75 * d, rel=1e-13)
         assert float(end.velocity) == pytest.approx(0.0, abs=1e-9 * math.sqrt(d))

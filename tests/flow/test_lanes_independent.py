@@ -1,4 +1,6 @@
-"""Results do not depend on threads, order, neighbours, chunks or the width of a register, to the last bit."""
+"""Results do not depend on threads, order, neighbours, chunks or the width of a register, to the
+last bit.
+"""
 
 import os
 import subprocess
@@ -22,7 +24,9 @@ def cases_of(family, n=MANY):
 
 
 def same_bits(one, other):
-    """Every variable, NaN equal to NaN, zeros with their sign; of the last periods only those that both keep."""
+    """Every variable, NaN equal to NaN, zeros with their sign; of the last periods only those that
+    both keep.
+    """
     kept = min(one.sizes.get("period", 0), other.sizes.get("period", 0))
     if kept:  # fewer than asked for where no trajectory has as many
         one, other = one.isel(period=slice(-kept, None)), other.isel(period=slice(-kept, None))
@@ -58,7 +62,8 @@ def test_neighbours_change_nothing(reference):
 
 
 @pytest.mark.parametrize(
-    ("smallest", "largest"), [(1, 1), pytest.param(7, 7, marks=pytest.mark.thorough), (1, 1000), (10**6, 10**6)]
+    ("smallest", "largest"),
+    [(1, 1), pytest.param(7, 7, marks=pytest.mark.thorough), (1, 1000), (10**6, 10**6)],
 )
 def test_chunks_change_nothing(reference, smallest, largest, monkeypatch):
     cases, expected = reference
@@ -99,11 +104,14 @@ def test_tangents_change_nothing_but_rounding():
     cases = cases_of("paper", 300)
     plain, with_tangent = cases.in_lanes(tol=1e-14), cases.in_lanes(tol=1e-14, sensitivities=())
     np.testing.assert_array_equal(plain.stop, with_tangent.stop)
-    close = np.abs(end_state(plain, cases.system) - end_state(with_tangent, cases.system)).max(axis=1) < 1e-11
+    close = (
+        np.abs(end_state(plain, cases.system) - end_state(with_tangent, cases.system)).max(axis=1)
+        < 1e-11
+    )
     assert close.mean() > 0.97
 
 
-# --- widths ------------------------------------------------------------------------------------------------------------------
+# --- widths ------------------------------------------------------------------
 
 WIDE = """
 import sys
@@ -124,18 +132,30 @@ def run_with_width(width, folder):
     environment = os.environ | {
         "SALTUS_LANES": str(width),
         "PYTHONPATH": os.pathsep.join(
-            [str(Path(__file__).parent), str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+            [
+                str(Path(__file__).parent),
+                str(Path(__file__).parents[1]),
+                os.environ.get("PYTHONPATH", ""),
+            ]
         ),
     }
     file = folder / f"width{width}.npz"
-    subprocess.run([sys.executable, "-c", WIDE, str(file)], env=environment, check=True, timeout=600)
+    subprocess.run(
+        [sys.executable, "-c", WIDE, str(file)], env=environment, check=True, timeout=600
+    )
     return np.load(file)
 
 
 @pytest.mark.thorough
 def test_every_width_of_register_gives_the_same_bits(tmp_path):
-    """The host's own and one other; all of them with SALTUS_WIDTHS=all, as each compiles the lanes anew."""
-    widths = (1, 2, 4, 8, 16) if os.environ.get("SALTUS_WIDTHS") == "all" else (WIDTH, 2 if WIDTH != 2 else 1)
+    """The host's own and one other; all of them with SALTUS_WIDTHS=all, as each compiles the lanes
+    anew.
+    """
+    widths = (
+        (1, 2, 4, 8, 16)
+        if os.environ.get("SALTUS_WIDTHS") == "all"
+        else (WIDTH, 2 if WIDTH != 2 else 1)
+    )
     results = {width: run_with_width(width, tmp_path) for width in widths}
     assert [int(r["width"]) for r in results.values()] == list(widths)
     one = results[widths[0]]
@@ -145,5 +165,7 @@ def test_every_width_of_register_gives_the_same_bits(tmp_path):
         for name in ("state", "extrema"):
             equal = (one[name] == other[name]).mean()
             worst = np.abs(one[name] - other[name]).max()
-            assert one[name].tobytes() == other[name].tobytes(), f"width {width}: {name} {equal:.4f} equal, worst {worst:.2g}"
+            assert one[name].tobytes() == other[name].tobytes(), (
+                f"width {width}: {name} {equal:.4f} equal, worst {worst:.2g}"
+            )
     assert len(set(one["stop"].tolist())) >= 2

@@ -31,8 +31,14 @@ def no_scalar_kernel(monkeypatch):
 
 
 def ball(speed, e=1.0):
-    """A ball that falls on the wall at these speeds under a force, and how long the flights between its impacts take."""
-    system = System(model=WallOscillator(stiffness=0.0, wall=0.0), load=Load(force=0.3), impact=VelocityReduction(e))
+    """A ball that falls on the wall at these speeds under a force, and how long the flights between
+    its impacts take.
+    """
+    system = System(
+        model=WallOscillator(stiffness=0.0, wall=0.0),
+        load=Load(force=0.3),
+        impact=VelocityReduction(e),
+    )
     return system, {"x": -(speed**2) / 0.6, "velocity": 0.0, "tol": TOL}, 2 * speed / 0.3
 
 
@@ -45,8 +51,12 @@ def test_a_ball_bounces_slowly_without_leaving_the_lanes(no_scalar_kernel, fligh
     assert set(stop_names(ends).values) == {"horizon"}
     done, part = np.divmod(duration / flight + 0.5, 1.0)
     np.testing.assert_array_equal(ends.impact_count, done)
-    np.testing.assert_allclose(ends.velocity, speed * (2 * part - 1), rtol=0, atol=1e-12 * flights * THRESHOLD)
-    np.testing.assert_allclose(ends.x, start["x"] * 4 * part * (1 - part), rtol=0, atol=1e-12 * flights * THRESHOLD**2)
+    np.testing.assert_allclose(
+        ends.velocity, speed * (2 * part - 1), rtol=0, atol=1e-12 * flights * THRESHOLD
+    )
+    np.testing.assert_allclose(
+        ends.x, start["x"] * 4 * part * (1 - part), rtol=0, atol=1e-12 * flights * THRESHOLD**2
+    )
 
 
 def test_what_may_accumulate_or_chatter_leaves_the_lanes(no_scalar_kernel):
@@ -62,10 +72,13 @@ def test_an_impact_that_changes_the_speed_and_the_next_one_back_loses_nothing(no
     m, load = 0.5, 0.8
     system = forced(H=0.0, C=0.0, V=-load, m=m, impact=EnergyRestitution(1.0))
     speed, heavy = np.linspace(1.3 * CHATTER_SPEED, 0.7 * THRESHOLD, 32), 1 + m
-    pull, faster = load * math.cos(BETA80), math.sqrt(heavy)  # on the side of the mass 1, and the speeds there by those before
+    # on the side of the mass 1, and the speeds there by those before
+    pull, faster = load * math.cos(BETA80), math.sqrt(heavy)
     first, second = 2 * speed * heavy / pull, 2 * speed * faster / pull  # flights
     duration = 0.02
-    ends = saltus.simulate_many(system, theta=speed**2 * heavy / (2 * pull), velocity=0.0, duration=duration, tol=TOL)
+    ends = saltus.simulate_many(
+        system, theta=speed**2 * heavy / (2 * pull), velocity=0.0, duration=duration, tol=TOL
+    )
     assert set(stop_names(ends).values) == {"horizon"}
     done, beyond = np.divmod(duration + 0.5 * first, first + second)
     np.testing.assert_array_equal(ends.impact_count, 2 * done + (beyond > first))

@@ -1,4 +1,5 @@
-"""A call of `simulate` does what depends on its start alone: what follows from the system is kept with it.
+"""A call of `simulate` does what depends on its start alone: what follows from the system is kept
+with it.
 
 Work is counted in calls of functions, which are the same on every machine.
 """
@@ -14,21 +15,36 @@ import numpy as np
 import pytest
 from shared_systems import forced
 
-from saltus import Harmonic, Load, Model, NewtonImpact, ParameterError, System, TwoLayer, WallOscillator, simulate
+from saltus import (
+    Harmonic,
+    Load,
+    Model,
+    NewtonImpact,
+    ParameterError,
+    System,
+    TwoLayer,
+    WallOscillator,
+    simulate,
+)
 
 LAYERS = System(
     model=TwoLayer(beta0=1.4, damping=0.1, mass_ratio=0.2),
     load=Load(frequency=1.0, vertical=-0.5, horizontal=Harmonic(amplitude=0.4)),
     impact=NewtonImpact(e=0.5),
 )
-CASES = {"one contact": (forced(), {"theta": 0.3}, 65), "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 120)}
+CASES = {
+    "one contact": (forced(), {"theta": 0.3}, 65),
+    "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 120),
+}
 stiffness = 1.0
 
 
 def calls(function):
     """The functions of Python that are called, by their names."""
     names = []
-    sys.setprofile(lambda frame, event, _: names.append(frame.f_code.co_qualname) if event == "call" else None)
+    sys.setprofile(
+        lambda frame, event, _: names.append(frame.f_code.co_qualname) if event == "call" else None
+    )
     try:
         function()
     finally:
@@ -41,7 +57,15 @@ def test_a_second_motion_of_a_system_checks_and_traces_nothing_of_it(name):
     system, start, most = CASES[name]
     simulate(system, periods=1, **start)
     again = calls(lambda: simulate(system, periods=1, **start))
-    assert not {"trace", "children", "numbers", "record_table", "Structure.prepare", "_check_class", "energy_gain"} & {*again}
+    assert not {
+        "trace",
+        "children",
+        "numbers",
+        "record_table",
+        "Structure.prepare",
+        "_check_class",
+        "energy_gain",
+    } & {*again}
     assert len(again) < most
 
 
@@ -54,14 +78,19 @@ def test_arguments_are_checked_whenever_they_are_others():
     for name, wrong in {"periods": True, "tol": 1.0, "time": math.nan, "side": 2}.items():
         with pytest.raises(ParameterError, match=name):
             simulate(system, theta=0.3, **{"periods": 1, name: wrong})
-    assert simulate(system, theta=0.3, periods=1).time == simulate(system, theta=0.3, periods=1, time=0.0).time != 0.0
+    assert (
+        simulate(system, theta=0.3, periods=1).time
+        == simulate(system, theta=0.3, periods=1, time=0.0).time
+        != 0.0
+    )
 
 
 @pytest.mark.parametrize("dense", [True, False])
 def test_a_motion_is_its_own_whatever_is_simulated_next(dense):
     first, others = (simulate(forced(), theta=0.3, periods=3, dense=dense) for _ in range(2))
     simulate(forced(), theta=0.5, periods=3, dense=dense)
-    long = simulate(forced(), theta=0.3, periods=400, dense=dense)  # its buffers are filled several times
+    # its buffers are filled several times
+    long = simulate(forced(), theta=0.3, periods=400, dense=dense)
     assert len(first.events) > 0
     np.testing.assert_array_equal(first.events.times, others.events.times)
     np.testing.assert_array_equal(long.events.times[: len(first.events)], first.events.times)
@@ -86,7 +115,8 @@ def test_what_is_kept_with_a_system_is_no_part_of_it():
     assert system == pickle.loads(before)
     twin = system.with_({"load.horizontal.amplitude": 0.7})
     one, other = (
-        simulate(s, theta=0.3, periods=3).final_state for s in (twin, forced().with_({"load.horizontal.amplitude": 0.7}))
+        simulate(s, theta=0.3, periods=3).final_state
+        for s in (twin, forced().with_({"load.horizontal.amplitude": 0.7}))
     )
     assert np.array_equal(one, other)
     assert not np.array_equal(one, simulate(system, theta=0.3, periods=3).final_state)
@@ -96,11 +126,22 @@ def test_threads_share_a_system_and_not_what_the_kernel_writes():
     starts = [{"theta_1": 0.1 + 0.01 * i, "theta_2": -0.05} for i in range(8)]
     alone = [simulate(LAYERS, periods=20, **start).final_state for start in starts]
     with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(lambda start: simulate(LAYERS, periods=20, **start).final_state, starts))
+        together = list(
+            pool.map(lambda start: simulate(LAYERS, periods=20, **start).final_state, starts)
+        )
     assert np.array_equal(alone, together)
 
 
-STARTS = [(0.3, 0.0), (0.3, -0.4), (-0.2, 0.1), (0.0, 0.2), (0.0, 0.0), (1e-9, 0.0), (7.0, 0.0), (0.3, 0)]
+STARTS = [
+    (0.3, 0.0),
+    (0.3, -0.4),
+    (-0.2, 0.1),
+    (0.0, 0.2),
+    (0.0, 0.0),
+    (1e-9, 0.0),
+    (7.0, 0.0),
+    (0.3, 0),
+]
 SYSTEMS = {
     "lossless": (forced(), {}),
     "comes to rest": (forced(H=0.1, e=0.5), {}),
@@ -123,7 +164,10 @@ def test_a_motion_that_is_asked_for_again_is_the_same(name):
 
     for start in [*STARTS, *STARTS]:
         first, again = motion(start, system.with_()), motion(start, system)
-        one, other = ({key: x for key, x in vars(m).items() if key not in ("system", "events")} for m in (first, again))
+        one, other = (
+            {key: x for key, x in vars(m).items() if key not in ("system", "events")}
+            for m in (first, again)
+        )
         assert one == other
         assert len(first.events) == len(again.events)
         assert all(a == b for a, b in zip(first.events, again.events, strict=True))
@@ -136,7 +180,11 @@ def test_what_is_wrong_is_refused_however_often_a_system_was_followed():
     system = forced()
     for _ in range(4):
         simulate(system, theta=0.3, periods=1, dense=False)
-    for wrong, word in (({"theta": math.nan}, "theta"), ({"tehta": 0.3}, "theta"), ({"theta": 0.3, "x": 1.0}, "'x'")):
+    for wrong, word in (
+        ({"theta": math.nan}, "theta"),
+        ({"tehta": 0.3}, "theta"),
+        ({"theta": 0.3, "x": 1.0}, "'x'"),
+    ):
         with pytest.raises(ParameterError, match=word):
             simulate(system, periods=1, dense=False, **wrong)
     with pytest.raises(ParameterError, match="velocity"):
@@ -178,7 +226,9 @@ def test_a_number_that_a_model_reads_from_its_module_is_read_at_every_call(monke
     for _ in range(4):
         simulate(system, x=1.0, duration=1.0, dense=False)
     monkeypatch.setattr(sys.modules[__name__], "stiffness", 1.0)
-    assert simulate(system, x=1.0, duration=1.0, dense=False).x == pytest.approx(np.cos(1.0), abs=1e-12)
+    assert simulate(system, x=1.0, duration=1.0, dense=False).x == pytest.approx(
+        np.cos(1.0), abs=1e-12
+    )
 
 
 def test_nothing_is_kept_of_a_system_that_can_change():

@@ -1,4 +1,6 @@
-"""Models of a user's own: channels, side-dependent coefficients, several coordinates; numbers that change compile nothing."""
+"""Models of a user's own: channels, side-dependent coefficients, several coordinates; numbers that
+change compile nothing.
+"""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +20,9 @@ from saltus.taylor.cache import cache_directory
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bilinear(OneContactModel):
-    """x'' + c_s x' + k_s x = wind + gust, with one spring and one damper on each side; it crosses x = 0 with v+ = e v-."""
+    """x'' + c_s x' + k_s x = wind + gust, with one spring and one damper on each side; it crosses x
+    = 0 with v+ = e v-.
+    """
 
     left: float
     right: float
@@ -34,7 +38,9 @@ class Bilinear(OneContactModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair(Model):
-    """Two equal masses on equal springs, coupled by a third: x'' = -k x - c (x - y) + force, y'' = -k y - c (y - x)."""
+    """Two equal masses on equal springs, coupled by a third: x'' = -k x - c (x - y) + force, y'' =
+    -k y - c (y - x).
+    """
 
     spring: float
     coupling: float
@@ -54,13 +60,17 @@ PAIR = System(model=Pair(spring=1.0, coupling=0.3), load=Load(frequency=0.7, for
 
 def test_free_motion_of_the_bilinear_oscillator_is_two_half_waves():
     for left, right, e in ((4.0, 1.0, 1.0), (9.0, 0.3, 0.7)):
-        system = FREE.with_({"model.left": left, "model.right": right, "impact": VelocityReduction(e)})
+        system = FREE.with_(
+            {"model.left": left, "model.right": right, "impact": VelocityReduction(e)}
+        )
         period = math.pi / math.sqrt(left) + math.pi / math.sqrt(right)
         motion = simulate(system, x=0.5, duration=5 * period)
         first = 0.5 * math.pi / math.sqrt(right)
         rights = first + period * np.arange(5)
         assert motion.impacts.time[::2] == pytest.approx(rights, abs=1e-11)
-        assert motion.impacts.time[1::2] == pytest.approx(rights + math.pi / math.sqrt(left), abs=1e-11)
+        assert motion.impacts.time[1::2] == pytest.approx(
+            rights + math.pi / math.sqrt(left), abs=1e-11
+        )
         speeds = 0.5 * math.sqrt(right) * e ** np.arange(10)
         assert np.abs(motion.impacts.velocity_before) == pytest.approx(speeds, rel=1e-12)
         assert motion.x == pytest.approx(0.5 * e**10, abs=1e-11)
@@ -74,7 +84,9 @@ def test_side_dependent_damping_and_two_loads_follow_the_closed_form_on_each_sid
         omega = math.sqrt(stiffness - decay**2)
         t = np.linspace(0.0, 0.3, 7)
         a = x - rest
-        expected = rest + np.exp(-decay * t) * a * (np.cos(omega * t) + decay / omega * np.sin(omega * t))
+        expected = rest + np.exp(-decay * t) * a * (
+            np.cos(omega * t) + decay / omega * np.sin(omega * t)
+        )
         assert simulate(system, x=x, duration=0.3).at(t)[0] == pytest.approx(expected, abs=1e-13)
 
 
@@ -101,7 +113,9 @@ def test_driven_pair_reaches_over_its_first_period_what_the_modes_say():
     for squared in (1.0, 1.6):  # z'' + w^2 z = A sin(Omega t), from rest
         w = math.sqrt(squared)
         t = motion.time
-        expected.append(amplitude / (squared - omega**2) * (math.sin(omega * t) - omega / w * math.sin(w * t)))
+        expected.append(
+            amplitude / (squared - omega**2) * (math.sin(omega * t) - omega / w * math.sin(w * t))
+        )
     assert motion.x == pytest.approx((expected[0] + expected[1]) / 2, abs=1e-12)
     assert motion.y == pytest.approx((expected[0] - expected[1]) / 2, abs=1e-12)
 
@@ -110,7 +124,9 @@ def test_numbers_that_change_neither_trace_nor_compile():
     simulate(FREE, x=0.1, duration=0.1)
     known, files = set(_structures), set(cache_directory().iterdir())
     for i in range(5):
-        changed = FREE.with_({"model.left": 1 + i, "model.right": 0.5 + i, "load.wind": -i, "impact.e": 1 / (i + 1)})
+        changed = FREE.with_(
+            {"model.left": 1 + i, "model.right": 0.5 + i, "load.wind": -i, "impact.e": 1 / (i + 1)}
+        )
         simulate(changed, x=0.1, duration=0.1, tol=10.0 ** -(6 + 2 * i), time=float(i))
     assert set(_structures) == known
     assert set(cache_directory().iterdir()) == files
@@ -122,7 +138,9 @@ def test_whole_numbers_move_as_their_floats_do():
         pass
 
     ends = {
-        simulate(System(model=Unchecked(left=left, right=right), load=Load(wind=0)), x=x, duration=t).x
+        simulate(
+            System(model=Unchecked(left=left, right=right), load=Load(wind=0)), x=x, duration=t
+        ).x
         for left, right, x, t in ((4, 1, 1, 3), (4.0, 1.0, 1.0, 3.0))
     }
     assert len(ends) == 1
@@ -162,7 +180,8 @@ def test_an_array_in_a_model_is_not_taken_from_another_one():
     ("gap", "message"),
     [
         ("1 - x**2", "one contact point, not two stops"),
-        ("(1 - x) - (1 - x)**3", "one contact point, not two stops"),  # odd about the contact: 0 there and linear by its values
+        # odd about the contact: 0 there and linear by its values
+        ("(1 - x) - (1 - x)**3", "one contact point, not two stops"),
         ("np.sinh(1 - x)", "one contact point, not two stops"),
         ("1 - 0 * x", "must depend on the coordinate"),
         ("2 - x", "must be 0 at"),
@@ -183,7 +202,10 @@ def test_a_gap_that_is_linear_in_other_words_is_the_same_gap():
             return ((self.wall + 1.0) ** 2 - (x + 1.0) * (self.wall + 1.0)) / (1.0 + self.wall)
 
     load, start = Load(frequency=1.0, force=Harmonic(0.8)), {"x": 0.2, "periods": 5}
-    one, other = (simulate(System(model=cls(wall=0.5), load=load), **start) for cls in (WallOscillator, Rewritten))
+    one, other = (
+        simulate(System(model=cls(wall=0.5), load=load), **start)
+        for cls in (WallOscillator, Rewritten)
+    )
     assert len(one.impacts) > 3
     assert other.impacts.time == pytest.approx(one.impacts.time, abs=1e-9)
 
@@ -201,7 +223,8 @@ class Wall(OneContactModel):
 
 class Sticky(Wall):
     def reset(self, t, velocity, side, load, impact):
-        return side, impact.velocity_after(self, t, velocity, side, side, load)  # a bounce that forgets to turn the sign
+        # a bounce that forgets to turn the sign
+        return side, impact.velocity_after(self, t, velocity, side, side, load)
 
 
 class Leading(Wall):
@@ -227,5 +250,8 @@ def test_sides_that_no_contact_has_are_refused():
 
 @pytest.mark.parametrize("model", [Sticky(), Leading()])
 def test_a_reset_that_leads_beyond_the_contact_is_refused_before_the_first_impact(model):
-    with pytest.raises(SaltusError, match="beyond the contact" if isinstance(model, Sticky) else "leads from side 1 to side 3"):
+    with pytest.raises(
+        SaltusError,
+        match="beyond the contact" if isinstance(model, Sticky) else "leads from side 1 to side 3",
+    ):
         simulate(System(model=model), x=1.0, duration=1e-3)

@@ -1,4 +1,6 @@
-"""Records of samples as loads: forces and ground motions, before, within and after their span, with and without harmonics."""
+"""Records of samples as loads: forces and ground motions, before, within and after their span, with
+and without harmonics.
+"""
 
 import itertools
 import math
@@ -39,7 +41,9 @@ def oscillator(record, amplitude=0.0, **model):
 
 
 def exact(record_times, values, amplitude, start, end, x, v, stiffness=1.3, damping=0.2):
-    """The same by matrix exponentials: the state is (x, v, force, slope of the force, sine, cosine), linear between samples."""
+    """The same by matrix exponentials: the state is (x, v, force, slope of the force, sine,
+    cosine), linear between samples.
+    """
     edges = [start, *[t for t in record_times if start < t < end], end]
     sine = [math.sin(OMEGA * start + 0.4), math.cos(OMEGA * start + 0.4)]
     state = np.array([x, v, 0.0, 0.0, *sine])
@@ -50,7 +54,9 @@ def exact(record_times, values, amplitude, start, end, x, v, stiffness=1.3, damp
     for left, right in itertools.pairwise(edges):
         i = np.searchsorted(record_times, 0.5 * (left + right)) - 1
         inside = 0 <= i < len(values) - 1
-        slope = (values[i + 1] - values[i]) / (record_times[i + 1] - record_times[i]) if inside else 0.0
+        slope = (
+            (values[i + 1] - values[i]) / (record_times[i + 1] - record_times[i]) if inside else 0.0
+        )
         state[2:4] = (values[i] + slope * (left - record_times[i]) if inside else 0.0), slope
         state = expm(rate * (right - left)) @ state
     return state[:2]
@@ -81,7 +87,9 @@ def test_force_record_on_a_linear_oscillator_is_exact(start, end, amplitude):
 def test_force_record_is_exact_at_any_time_between():
     motion = simulate(oscillator(Record(TIMES, FORCES), 0.6), x=0.2, velocity=-0.3, duration=7.0)
     times = np.concatenate([TIMES, np.linspace(0.0, 7.0, 23)])
-    expected = np.array([exact(TIMES, FORCES, 0.6, 0.0, t, 0.2, -0.3) if t else (0.2, -0.3) for t in times])
+    expected = np.array(
+        [exact(TIMES, FORCES, 0.6, 0.0, t, 0.2, -0.3) if t else (0.2, -0.3) for t in times]
+    )
     assert np.stack(motion.at(times), axis=1) == pytest.approx(expected, abs=1e-12)
 
 
@@ -95,7 +103,9 @@ def test_force_record_is_exact_at_any_time_between():
 def test_random_force_records_are_exact(gaps, start, duration, seed):
     times = np.concatenate([[0.3], 0.3 + np.cumsum(gaps)])
     values = np.random.default_rng(seed).normal(size=times.size)
-    motion = simulate(oscillator(Record(times, values, scale=2.0), 0.6), x=0.1, time=start, duration=duration)
+    motion = simulate(
+        oscillator(Record(times, values, scale=2.0), 0.6), x=0.1, time=start, duration=duration
+    )
     expected = exact(times, 2.0 * values, 0.6, start, start + duration, 0.1, 0.0)
     assert (motion.x, motion.velocity) == pytest.approx(tuple(expected), abs=1e-11)
 
@@ -109,7 +119,9 @@ def test_long_record_is_followed_sample_by_sample():
 
 
 def test_impacts_under_a_force_record_agree_with_scipy():
-    system = oscillator(Record(TIMES, FORCES, scale=3.0), 0.6, wall=0.3).with_({"impact": VelocityReduction(0.8)})
+    system = oscillator(Record(TIMES, FORCES, scale=3.0), 0.6, wall=0.3).with_(
+        {"impact": VelocityReduction(0.8)}
+    )
 
     def acceleration(t, x, v, side, middle):
         force = 3.0 * np.interp(t, TIMES, FORCES) if TIMES[0] < middle < TIMES[-1] else 0.0
@@ -132,7 +144,7 @@ def test_impacts_under_a_force_record_agree_with_scipy():
     assert (motion.x, motion.velocity) == pytest.approx((x, v), abs=1e-9)
 
 
-# --- ground motions ------------------------------------------------------------------------------------------------------
+# --- ground motions ----------------------------------------------------------
 
 GROUND_TIMES = np.array([0.0, 0.3, 0.9, 1.4, 2.2, 2.9, 3.1, 4.0, 4.8])
 GROUND = 0.3 * np.sin(1.9 * GROUND_TIMES) + 0.1 * GROUND_TIMES * (4.8 - GROUND_TIMES) / 4
@@ -185,8 +197,11 @@ def block(record, amplitude):
 
 
 def test_block_under_a_finely_sampled_sine_moves_as_under_the_harmonic():
-    # Linear interpolation of zeta'' misses it by h^2/8 max|zeta''''|: the end state errs by as much, and 4 times less at h/2.
-    smooth = simulate(block(Record([0.0, 1.0], [0.0, 0.0], "acceleration"), 0.03), theta=0.05, periods=2)
+    # Linear interpolation of zeta'' misses it by h^2/8 max|zeta''''|: the end state errs by as
+    # much, and 4 times less at h/2.
+    smooth = simulate(
+        block(Record([0.0, 1.0], [0.0, 0.0], "acceleration"), 0.03), theta=0.05, periods=2
+    )
     errors = []
     for count in (200, 400, 800):
         t = np.linspace(0.0, 2 * 2 * math.pi / 3.0, count + 1)
@@ -200,7 +215,8 @@ def test_block_under_a_finely_sampled_sine_moves_as_under_the_harmonic():
 
 
 def test_block_at_rest_is_released_where_the_recorded_acceleration_overcomes_its_slenderness():
-    # It uplifts when |zeta''| = tan(alpha): on a ramp of slope r at t0 + tan(alpha)/r, and grows like r cos(alpha) tau^3/6.
+    # It uplifts when |zeta''| = tan(alpha): on a ramp of slope r at t0 + tan(alpha)/r, and grows
+    # like r cos(alpha) tau^3/6.
     alpha, slope = 0.25, 0.5
     system = block(Record([1.0, 3.0, 3.001], [0.0, 2 * slope, 0.0], "acceleration"), 0.0)
     motion = simulate(system, theta=0.0, duration=2.5)
@@ -213,7 +229,8 @@ def test_block_at_rest_is_released_where_the_recorded_acceleration_overcomes_its
 
 
 def test_block_at_rest_is_released_at_a_jump_of_the_recorded_acceleration():
-    # A record begins with a jump to b: theta grows at once like -s a tau^2/2, a = b cos(alpha) - sin(alpha).
+    # A record begins with a jump to b: theta grows at once like -s a tau^2/2, a = b cos(alpha) -
+    # sin(alpha).
     alpha, jump, start = 0.25, 0.4, 1.3
     system = block(Record([start, start + 1.0], [jump, jump], "acceleration"), 0.0)
     motion = simulate(system, theta=0.0, duration=2.0)
@@ -230,7 +247,9 @@ def test_block_stays_at_rest_where_a_kink_only_touches_its_strength():
     alpha = 0.25
     for peak, leaves in ((0.999, False), (1.001, True)):
         samples = np.array([0.0, peak * math.tan(alpha), 0.0])
-        motion = simulate(block(Record([0.5, 1.5, 2.5], samples, "acceleration"), 0.0), theta=0.0, duration=3.0)
+        motion = simulate(
+            block(Record([0.5, 1.5, 2.5], samples, "acceleration"), 0.0), theta=0.0, duration=3.0
+        )
         assert any(e.kind is EventKind.RELEASE for e in motion.events) == leaves
         assert (np.abs(motion.at(np.linspace(1.499, 1.502, 50))[0]).max() > 0) == leaves
 
@@ -250,26 +269,40 @@ def test_samples_change_without_compiling():
 
     simulate(oscillator(Record(TIMES, FORCES)), x=0.0, duration=1.0)
     known = set(_structures)
-    simulate(oscillator(Record(np.arange(50.0), np.ones(50), scale=3.0, source="other.csv")), x=0.0, duration=1.0)
+    simulate(
+        oscillator(Record(np.arange(50.0), np.ones(50), scale=3.0, source="other.csv")),
+        x=0.0,
+        duration=1.0,
+    )
     assert set(_structures) == known
 
 
 def test_records_of_different_spans_and_kinds_are_read_together():
-    # The generated functions against the model's own Python, in every piece: accelerations, and velocities in the impact law.
+    # The generated functions against the model's own Python, in every piece: accelerations, and
+    # velocities in the impact law.
     load = Load(
         horizontal=Record([-1.0, 0.5, 2.0], [0.3, -0.2, 0.1]) + Record([0.0, 3.5], [0.1, 0.4]),
         vertical=-0.5,
         ground_horizontal=Record([0.2, 0.9, 1.7, 2.4], [0.0, 0.3, -0.1, 0.2], "velocity"),
-        ground_vertical=Record(GROUND_TIMES, GROUND, "displacement") + Record([1.0, 4.0], [0.2, -0.1], "acceleration"),
+        ground_vertical=Record(GROUND_TIMES, GROUND, "displacement")
+        + Record([1.0, 4.0], [0.2, -0.1], "acceleration"),
     )
-    system = System(model=Metainterface(beta0=1.3, mass_ratio=0.4), load=load, impact=EnergyRestitution(0.9))
+    system = System(
+        model=Metainterface(beta0=1.3, mass_ratio=0.4), load=load, impact=EnergyRestitution(0.9)
+    )
     generated = Generated(system)
     breaks = generated.env[2]
-    assert breaks == pytest.approx(np.unique(np.concatenate([[-1, 0.5, 2, 0, 3.5, 0.2, 0.9, 1.7, 2.4, 1, 4], GROUND_TIMES])))
+    assert breaks == pytest.approx(
+        np.unique(np.concatenate([[-1, 0.5, 2, 0, 3.5, 0.2, 0.9, 1.7, 2.4, 1, 4], GROUND_TIMES]))
+    )
     for t in np.concatenate([[-5.0], 0.5 * (breaks[1:] + breaks[:-1]), [9.0]]):
         piece = int(np.searchsorted(breaks, t, side="right"))
         for side in (1, -1):
             computed = generated.coefficients(t, side * 0.2, 0.4, 3, float(side), piece)[0]
-            assert 2 * computed[2] == pytest.approx(float(system.model.acceleration(t, side * 0.2, 0.4, side, load)), abs=1e-14)
+            assert 2 * computed[2] == pytest.approx(
+                float(system.model.acceleration(t, side * 0.2, 0.4, side, load)), abs=1e-14
+            )
             expected = system.model.reset(t, -side * 1.2, side, load, system.impact)
-            assert generated.reset(t, -side * 1.2, float(side), piece) == pytest.approx([float(x) for x in expected], abs=1e-14)
+            assert generated.reset(t, -side * 1.2, float(side), piece) == pytest.approx(
+                [float(x) for x in expected], abs=1e-14
+            )

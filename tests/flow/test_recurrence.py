@@ -5,7 +5,15 @@ import pytest
 from shared_systems import forced
 
 import saltus
-from saltus.flow import RECURRENCE, Ending, find_recurrence, load_releases, nearest_return, return_distances, return_period
+from saltus.flow import (
+    RECURRENCE,
+    Ending,
+    find_recurrence,
+    load_releases,
+    nearest_return,
+    return_distances,
+    return_period,
+)
 from saltus.flow.long_time.recurrence import _long_period
 from saltus.systems import Harmonic, Load, RockingBlock, System, VelocityReduction
 
@@ -39,7 +47,9 @@ def test_extrema_and_impacts_are_those_of_one_period():
     seen = 0
     for row in np.flatnonzero(ends.periodic):
         state = ends.last[row]
-        motion = saltus.simulate(system, theta=state[0], velocity=state[1], periods=int(ends.period[row]))
+        motion = saltus.simulate(
+            system, theta=state[0], velocity=state[1], periods=int(ends.period[row])
+        )
         dense = motion.at(np.linspace(motion.start, motion.time, 4001))[0]
         assert dense.max() == pytest.approx(ends.highest[row], abs=1e-5)
         assert dense.min() == pytest.approx(ends.lowest[row], abs=1e-5)
@@ -51,22 +61,31 @@ def test_extrema_and_impacts_are_those_of_one_period():
 def test_extrema_are_those_of_what_is_kept_whatever_else_is_recorded():
     system, periods, kept = forced(), 14, 4
     ends = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True)
-    whole = find_recurrence(system, STATES, periods, kept=kept, max_period=2, extrema=True, from_start=True)
+    whole = find_recurrence(
+        system, STATES, periods, kept=kept, max_period=2, extrema=True, from_start=True
+    )
     rows = np.flatnonzero(ends.unsettled)
     assert rows.size > 5
     assert np.array_equal(ends.extrema[rows], whole.extrema[rows])
     for row in rows[:8]:
-        motion = saltus.simulate(system, theta=STATES[row, 0], velocity=STATES[row, 1], periods=periods)
+        motion = saltus.simulate(
+            system, theta=STATES[row, 0], velocity=STATES[row, 1], periods=periods
+        )
         length = (motion.time - motion.start) / periods
         for back in range(kept):
             end = motion.time - back * length
             dense = motion.at(np.linspace(end - length, end, 2001))[0]
-            assert (dense.max(), dense.min()) == pytest.approx(ends.extrema[row, -1 - back], abs=2e-5)
+            assert (dense.max(), dense.min()) == pytest.approx(
+                ends.extrema[row, -1 - back], abs=2e-5
+            )
 
 
 def test_motions_that_come_to_rest_have_no_extrema_unless_they_are_recorded_from_the_start():
     system = forced(0.015)  # below the load of the fold at which motions begin
-    ends, all_of_it = (find_recurrence(system, STATES, 200, kept=2, extrema=True, from_start=start) for start in (False, True))
+    ends, all_of_it = (
+        find_recurrence(system, STATES, 200, kept=2, extrema=True, from_start=start)
+        for start in (False, True)
+    )
     assert np.count_nonzero(ends.rest) > 5
     assert np.isnan(ends.extrema[ends.rest]).all()
     assert np.isfinite(all_of_it.extrema[ends.rest, -2:]).all()
@@ -80,7 +99,8 @@ def test_extrema_of_a_motion_that_a_limit_ends_are_those_before_its_end():
     assert ends.ended.all()
     for state, count, found in zip(states, ends.periods, ends.extrema, strict=True):
         motion = saltus.simulate(system, theta=state[0], velocity=state[1], periods=60)
-        begin = motion.start + (np.ceil(count) - 2.0) * 2.0 * np.pi / 4.0  # of the last whole period
+        # of the last whole period
+        begin = motion.start + (np.ceil(count) - 2.0) * 2.0 * np.pi / 4.0
         dense = motion.at(np.linspace(begin, begin + 2.0 * np.pi / 4.0, 2001))[0]
         assert (dense.max(), dense.min()) == pytest.approx(found[-2], abs=2e-5)
 
@@ -115,13 +135,18 @@ def test_returns_are_measured_back_from_the_last_state():
     states = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1e-7]])
     assert return_distances(states, 3) == pytest.approx([1.0, 1e-7, 1.0], rel=1e-6)
     assert return_distances(states, 9).shape == (3,)
-    assert return_period(np.stack([states, states + np.array([0, 0, 0, 0.5])[:, None]]), 3).tolist() == [2, 0]
+    assert return_period(
+        np.stack([states, states + np.array([0, 0, 0, 0.5])[:, None]]), 3
+    ).tolist() == [2, 0]
     assert nearest_return(states, 3) == 2
 
 
 def test_a_motion_followed_to_the_end_has_the_period_that_is_found_on_the_way():
     system = forced()
-    early, late = find_recurrence(system, STATES, 600, kept=20), find_recurrence(system, STATES, 600, kept=20, stop_early=False)
+    early, late = (
+        find_recurrence(system, STATES, 600, kept=20),
+        find_recurrence(system, STATES, 600, kept=20, stop_early=False),
+    )
     settled = early.periodic
     assert settled.sum() > 5
     assert (late.period[settled] == early.period[settled]).all()

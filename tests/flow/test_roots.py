@@ -1,4 +1,6 @@
-"""The first root of a polynomial on (0, 1]: none is missed, none is invented, and a simple one is exact to rounding."""
+"""The first root of a polynomial on (0, 1]: none is missed, none is invented, and a simple one is
+exact to rounding.
+"""
 
 import math
 
@@ -19,7 +21,16 @@ _kernel = {"np": np, "ZERO": ZERO} | dict.fromkeys(("jit", "lean_jit"), numba.nj
 exec(compiled_part(roots), _kernel)
 excluded, first_root, horner, value_and_slope, newton, roots_within, to_bernstein, variations = (
     _kernel[name]
-    for name in ("excluded", "first_root", "horner", "value_and_slope", "newton", "roots_within", "to_bernstein", "variations")
+    for name in (
+        "excluded",
+        "first_root",
+        "horner",
+        "value_and_slope",
+        "newton",
+        "roots_within",
+        "to_bernstein",
+        "variations",
+    )
 )
 EPS = 2.0**-52
 DEGREES = st.integers(2, 23)
@@ -30,7 +41,10 @@ def test_a_polynomial_and_its_slope_are_those_of_numpy(degree):
     p = np.polynomial.Polynomial(np.random.default_rng(degree).normal(size=degree + 1))
     for x in (0.0, 0.3, 1.0, -0.7):
         assert horner(p.coef, degree, x) == pytest.approx(p(x), abs=1e-14)
-        assert value_and_slope(p.coef, degree, x) == (horner(p.coef, degree, x), pytest.approx(p.deriv()(x), abs=1e-13))
+        assert value_and_slope(p.coef, degree, x) == (
+            horner(p.coef, degree, x),
+            pytest.approx(p.deriv()(x), abs=1e-13),
+        )
 
 
 def solve(coefficients):
@@ -44,7 +58,9 @@ def size(p):
 
 
 def expand(roots, pairs, constant):
-    """The ascending coefficients of prod (r - u) prod ((u - a)^2 + b^2), scaled to the value `constant` at 0."""
+    """The ascending coefficients of prod (r - u) prod ((u - a)^2 + b^2), scaled to the value
+    `constant` at 0.
+    """
     p = np.array([1.0])
     for r in roots:
         p = np.convolve(p, [r, -1.0])
@@ -54,7 +70,9 @@ def expand(roots, pairs, constant):
 
 
 def assert_first(p, kind, root, touch):
-    """The answer is right to within the rounding of p: up to the root p is not negative, at the root it is zero."""
+    """The answer is right to within the rounding of p: up to the root p is not negative, at the
+    root it is zero.
+    """
     noise = 60 * EPS * size(p)
     end = root if kind == SIMPLE else 1.0
     slope = np.polynomial.Polynomial(p).deriv()
@@ -74,16 +92,25 @@ def assert_first(p, kind, root, touch):
 
 @st.composite
 def polynomials(draw):
-    """Any mixture of roots inside (single, close together, repeated) and outside, real and complex, of degree 2 to 23."""
+    """Any mixture of roots inside (single, close together, repeated) and outside, real and complex,
+    of degree 2 to 23.
+    """
     degree = draw(DEGREES)
     inside = st.floats(0.01, 1.0)
-    roots = draw(st.lists(st.one_of(inside, inside, st.sampled_from([0.25, 0.5, 0.75, 1.0])), max_size=min(degree, 5)))
+    roots = draw(
+        st.lists(
+            st.one_of(inside, inside, st.sampled_from([0.25, 0.5, 0.75, 1.0])),
+            max_size=min(degree, 5),
+        )
+    )
     for r in list(roots):
         if len(roots) < degree and draw(st.booleans()):  # a cluster, or a repeated root
             roots.append(min(1.0, r + draw(st.sampled_from([0.0, 1e-9, 1e-7, 1e-5, 1e-3]))))
     pairs = []
     while degree - len(roots) - 2 * len(pairs) >= 2 and draw(st.booleans()):
-        pairs.append((draw(st.floats(-0.5, 1.5)), draw(st.sampled_from([1e-8, 1e-6, 1e-3, 0.1, 1.0]))))
+        pairs.append(
+            (draw(st.floats(-0.5, 1.5)), draw(st.sampled_from([1e-8, 1e-6, 1e-3, 0.1, 1.0])))
+        )
     while len(roots) + 2 * len(pairs) < degree:
         roots.append(draw(st.one_of(st.floats(-20.0, -0.5), st.floats(1.1, 20.0))))
     return expand(roots, pairs, 10.0 ** draw(st.integers(-12, 3)))
@@ -125,7 +152,8 @@ def polyroots(p):
 @example(8, 4, 0)
 @settings(max_examples=60, deadline=None)
 def test_roots_where_boxes_meet_are_found_exactly(first, second, bend):
-    # (i/16 - u)(j/16 - u)(1 + u)^bend has coefficients without rounding, and its roots lie on the boxes' borders.
+    # (i/16 - u)(j/16 - u)(1 + u)^bend has coefficients without rounding, and its roots lie on the
+    # boxes' borders.
     p = np.array([1.0])
     for factor in ([first / 16, -1.0], [second / 16, -1.0], *[[1.0, 1.0]] * bend):
         p = np.convolve(p, factor)
@@ -134,11 +162,16 @@ def test_roots_where_boxes_meet_are_found_exactly(first, second, bend):
         assert (kind == NONE) == (touch != NEVER)
         assert min(root, touch) == pytest.approx(first / 16, abs=2e-7)
     else:
-        assert (kind, root, touch) == (SIMPLE, pytest.approx(min(first, second) / 16, abs=4 * EPS), NEVER)
+        assert (kind, root, touch) == (
+            SIMPLE,
+            pytest.approx(min(first, second) / 16, abs=4 * EPS),
+            NEVER,
+        )
 
 
 def test_touch_at_the_border_of_a_box_does_not_hide_the_crossing_before_it():
-    # Rounding decides the sign at the touches 1/4 and 1/2, where a search for the root 15/128 must not begin.
+    # Rounding decides the sign at the touches 1/4 and 1/2, where a search for the root 15/128 must
+    # not begin.
     kind, root, touch = solve(expand([15 / 128, 0.25, 0.25, 0.5, 0.5], [], 0.1))
     assert (kind, touch) == (SIMPLE, NEVER)
     assert root == pytest.approx(15 / 128, abs=1e-12)
@@ -160,7 +193,8 @@ def test_root_at_the_end_is_found_there_or_left_to_the_next_step():
 def test_double_root_is_a_touch_and_the_crossing_after_it_is_found(place, degree):
     outside = [-2.0] * (degree - 2)
     kind, root, touch = solve(expand([place, place, *outside], [], 1.0))
-    assert (kind, root) == (NONE, NEVER) or abs(root - place) < 1e-6  # rounding of p may push it through
+    # rounding of p may push it through
+    assert (kind, root) == (NONE, NEVER) or abs(root - place) < 1e-6
     if kind == NONE and touch != NEVER:
         assert touch == pytest.approx(place, abs=1e-6)
     if place < 0.9 and degree > 2:
@@ -173,7 +207,8 @@ def test_double_root_is_a_touch_and_the_crossing_after_it_is_found(place, degree
 
 
 def test_exact_double_root_is_a_touch_or_a_crossing_there_and_nowhere_else():
-    # (2^j u - i)^2 (2 + u)^n has exact coefficients. With n = 0 the Bernstein coefficients are exact too, and it is a touch.
+    # (2^j u - i)^2 (2 + u)^n has exact coefficients. With n = 0 the Bernstein coefficients are
+    # exact too, and it is a touch.
     for i, j in ((1, 1), (1, 2), (3, 2), (5, 3), (11, 4)):
         for n in range(5):
             p = np.array([i * i, -2.0 * i * 2**j, 4.0**j])
@@ -185,7 +220,9 @@ def test_exact_double_root_is_a_touch_or_a_crossing_there_and_nowhere_else():
             assert min(root, touch) == pytest.approx(i / 2**j, abs=2e-7)
             kind, root, touch = solve(np.convolve(p, [15 / 16, -1.0]))  # and a crossing after it
             assert kind == SIMPLE
-            assert root == pytest.approx(15 / 16, abs=1e-12) or root == pytest.approx(i / 2**j, abs=2e-7)
+            assert root == pytest.approx(15 / 16, abs=1e-12) or root == pytest.approx(
+                i / 2**j, abs=2e-7
+            )
             assert touch == NEVER or touch == pytest.approx(i / 2**j, abs=2e-7)
 
 
@@ -227,7 +264,8 @@ def test_tiny_leading_values(lead):
     kind, root, touch = solve([lead, -1.0, 0.3, 0.1])
     assert (kind, touch) == (SIMPLE, NEVER)
     assert root == pytest.approx(lead, rel=1e-8 if lead > 1e-10 else 1e-15)
-    assert solve([lead, 1.0, -0.5, -0.2]) == (NONE, NEVER, NEVER)  # starts near zero, rises, does not come back
+    # starts near zero, rises, does not come back
+    assert solve([lead, 1.0, -0.5, -0.2]) == (NONE, NEVER, NEVER)
     kind, root, _ = solve([lead, 1.0, -2.0, 0.0])  # rises from a tiny value and returns at 1/2
     assert kind == SIMPLE
     assert root == pytest.approx(0.5, rel=1e-8 if lead > 1e-10 else 4 * EPS)
@@ -247,7 +285,9 @@ def test_exclusion_only_when_certain():
     kept = 0
     for _ in range(2000):
         p = rng.normal(size=rng.integers(3, 24))
-        p = np.concatenate([[abs(p[0]) + rng.exponential(0.5)], p[1:] * 0.5 ** np.arange(1, p.size)])
+        p = np.concatenate(
+            [[abs(p[0]) + rng.exponential(0.5)], p[1:] * 0.5 ** np.arange(1, p.size)]
+        )
         if excluded(p, p.size - 1):
             kept += 1
             assert np.polynomial.polynomial.polyval(np.linspace(0, 1, 200), p).min() > 0
@@ -281,7 +321,15 @@ def test_newton_is_exact_to_rounding_and_stays_in_its_bracket():
     rng = np.random.default_rng(4)
     for _ in range(200):
         root = rng.uniform(0.05, 0.95)
-        p = expand([root, *rng.uniform(1.5, 4.0, rng.integers(0, 12)), *rng.uniform(-4, -1, rng.integers(1, 9))], [], 1.0)
+        p = expand(
+            [
+                root,
+                *rng.uniform(1.5, 4.0, rng.integers(0, 12)),
+                *rng.uniform(-4, -1, rng.integers(1, 9)),
+            ],
+            [],
+            1.0,
+        )
         found = newton(p, p.size - 1, 0.0, 1.0)
         slope = abs(np.polynomial.Polynomial(p).deriv()(root))
         assert abs(found - root) <= 4 * EPS * p.size * size(p) / slope
@@ -290,7 +338,9 @@ def test_newton_is_exact_to_rounding_and_stays_in_its_bracket():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_root_beside_one_at_the_start_is_found_beside_it(sign):
-    """As of the speed of a gap whose contact has just been released: 0 with its slope, up to rounding of the slope."""
+    """As of the speed of a gap whose contact has just been released: 0 with its slope, up to
+    rounding of the slope.
+    """
     p, found = sign * np.array([0.0, -1e-12, 1.0, 0.5]), np.zeros(4)
     assert roots_within(p, 3, found, 1e-18) == 1
     assert found[0] == pytest.approx(1e-12, rel=1e-9)

@@ -1,6 +1,8 @@
-"""The determinant of the flow's derivative is the product of its saltations and of its damping, on 10^4 random motions.
+"""The determinant of the flow's derivative is the product of its saltations and of its damping, on
+10^4 random motions.
 
-det Phi = prod(R_v v+ / v-) exp(-C [c T_lower / (1+m) + T_upper]), R the law of the impact (numerics.md, section 5).
+det Phi = prod(R_v v+ / v-) exp(-C [c T_lower / (1+m) + T_upper]), R the law of the impact
+(numerics.md, section 5).
 """
 
 import math
@@ -35,7 +37,10 @@ def side_times(motion):
 
 def energy_slope(system, t, v, side):
     """dT/dv at contact: T is a quadratic in v, so that this difference is exact."""
-    energy = [float(system.model.kinetic_energy(t, system.model.contact, w, side, system.load)) for w in (v + 1.0, v - 1.0)]
+    energy = [
+        float(system.model.kinetic_energy(t, system.model.contact, w, side, system.load))
+        for w in (v + 1.0, v - 1.0)
+    ]
     return (energy[0] - energy[1]) / 2
 
 
@@ -46,7 +51,11 @@ def impact_slope(system, t, side, before, after):
         return impact.e
     if isinstance(impact, EnergyRestitution):
         forward = abs(after) * np.sign(before)
-        return impact.r * energy_slope(system, t, before, side) / energy_slope(system, t, forward, turned)
+        return (
+            impact.r
+            * energy_slope(system, t, before, side)
+            / energy_slope(system, t, forward, turned)
+        )
     if isinstance(system.model, RockingBlock):
         return 1.0 - 1.5 * math.sin(system.model.alpha) ** 2
     factor = max(-math.cos(2 * system.model.beta0), 0.0)
@@ -67,8 +76,13 @@ def damping_integral(system, motion):
 def law(system, motion):
     """The determinant, from the impacts and the times spent on each side."""
     impacts = motion.impacts
-    rows = zip(impacts.time, impacts.side, impacts.velocity_before, impacts.velocity_after, strict=True)
-    factors = [impact_slope(system, t, int(s), before, after) * abs(after / before) for t, s, before, after in rows]
+    rows = zip(
+        impacts.time, impacts.side, impacts.velocity_before, impacts.velocity_after, strict=True
+    )
+    factors = [
+        impact_slope(system, t, int(s), before, after) * abs(after / before)
+        for t, s, before, after in rows
+    ]
     return math.prod(factors) * math.exp(-damping_integral(system, motion))
 
 
@@ -79,7 +93,9 @@ def metainterface(rng, impact):
         horizontal=Harmonic(rng.uniform(0.0, 0.8), phase=rng.uniform(0.0, 6.0)),
         vertical=Harmonic(mean=rng.uniform(-0.8, 0.3), amplitude=rng.uniform(0.0, 0.2)),
         lower_horizontal=rng.uniform(-0.1, 0.1),
-        lower_vertical=Harmonic(mean=rng.uniform(-0.2, 0.0), amplitude=rng.uniform(0.0, 0.1), order=2),
+        lower_vertical=Harmonic(
+            mean=rng.uniform(-0.2, 0.0), amplitude=rng.uniform(0.0, 0.1), order=2
+        ),
         ground_horizontal=Harmonic(rng.uniform(0.0, 0.05)),
         ground_vertical=Harmonic(rng.uniform(0.0, 0.02), phase=rng.uniform(0.0, 6.0)),
     )
@@ -90,29 +106,53 @@ def metainterface(rng, impact):
         stiffness_ratio=rng.uniform(0.5, 2.0),
         dissipation_ratio=rng.uniform(0.0, 2.0),
     )
-    return System(model=model, load=load, impact=impact), {"theta": rng.choice([-1, 1]) * rng.uniform(0.2, 1.0)}
+    return System(model=model, load=load, impact=impact), {
+        "theta": rng.choice([-1, 1]) * rng.uniform(0.2, 1.0)
+    }
 
 
 def rocking_block(rng, impact):
-    ground = {name: Harmonic(rng.uniform(0.0, 0.05), phase=rng.uniform(0.0, 6.0)) for name in RockingBlock.channels}
+    ground = {
+        name: Harmonic(rng.uniform(0.0, 0.05), phase=rng.uniform(0.0, 6.0))
+        for name in RockingBlock.channels
+    }
     load = Load(frequency=rng.uniform(0.6, 2.0), **ground)
     alpha = rng.uniform(0.1, 0.35)  # slender enough to rock on
-    return System(model=RockingBlock(alpha=alpha), load=load, impact=impact), {"theta": rng.uniform(-0.6, 0.6) * alpha}
+    return System(model=RockingBlock(alpha=alpha), load=load, impact=impact), {
+        "theta": rng.uniform(-0.6, 0.6) * alpha
+    }
 
 
 def wall_oscillator(rng, impact):
-    model = WallOscillator(stiffness=rng.uniform(0.0, 2.0), damping=rng.uniform(0.0, 0.3), wall=rng.uniform(-0.2, 0.4))
-    load = Load(frequency=rng.uniform(0.6, 2.0), force=Harmonic(rng.uniform(0.2, 0.9), phase=rng.uniform(0.0, 6.0), mean=0.2))
+    model = WallOscillator(
+        stiffness=rng.uniform(0.0, 2.0), damping=rng.uniform(0.0, 0.3), wall=rng.uniform(-0.2, 0.4)
+    )
+    load = Load(
+        frequency=rng.uniform(0.6, 2.0),
+        force=Harmonic(rng.uniform(0.2, 0.9), phase=rng.uniform(0.0, 6.0), mean=0.2),
+    )
     return System(model=model, load=load, impact=impact), {"x": model.wall - rng.uniform(0.1, 1.0)}
 
 
 CASES = {
-    "metainterface, e": (metainterface, lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])), 3000),
+    "metainterface, e": (
+        metainterface,
+        lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])),
+        3000,
+    ),
     "metainterface, r": (metainterface, lambda rng: EnergyRestitution(rng.uniform(0.6, 1.0)), 2000),
     "metainterface, inelastic": (metainterface, lambda rng: InelasticImpact(), 1500),
-    "block, e": (rocking_block, lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])), 1000),
+    "block, e": (
+        rocking_block,
+        lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])),
+        1000,
+    ),
     "block, inelastic": (rocking_block, lambda rng: InelasticImpact(), 1000),
-    "wall, e": (wall_oscillator, lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])), 1500),
+    "wall, e": (
+        wall_oscillator,
+        lambda rng: VelocityReduction(rng.choice([1.0, rng.uniform(0.5, 1.0)])),
+        1500,
+    ),
 }
 
 
@@ -125,15 +165,22 @@ def test_the_determinant_is_the_product_of_the_saltations_and_of_the_damping(nam
         system, start = build(rng, impact(rng))
         speed = rng.uniform(-0.7, 0.7) * (0.2 if build is rocking_block else 1.0)
         try:
-            result = saltus.sensitivities(system, **start, velocity=speed, duration=DURATION, tol=1e-14, dense=False)
+            result = saltus.sensitivities(
+                system, **start, velocity=speed, duration=DURATION, tol=1e-14, dense=False
+            )
         except MotionError:  # errata 26: no velocity after the impact
             refused += 1
             continue
         motion = result.motion
-        if any(event.kind != "impact" for event in motion.events):  # rest, or the block overturned: its tests are elsewhere
+        # rest, or the block overturned: its tests are elsewhere
+        if any(event.kind != "impact" for event in motion.events):
             continue
         assert result.undefined is None
-        assert result.determinant == pytest.approx(law(system, motion), rel=0, abs=1e-10), (system, start, speed)
+        assert result.determinant == pytest.approx(law(system, motion), rel=0, abs=1e-10), (
+            system,
+            start,
+            speed,
+        )
         used, with_impacts = used + 1, with_impacts + (len(motion.impacts) > 0)
     assert used > 0.6 * count, used
     assert with_impacts > 0.5 * count, with_impacts
@@ -141,14 +188,19 @@ def test_the_determinant_is_the_product_of_the_saltations_and_of_the_damping(nam
 
 
 def trace_integral(system, motion):
-    """The integral of the trace, by differences (quadratic in the velocities, so exact) and Gauss's rule."""
+    """The integral of the trace, by differences (quadratic in the velocities, so exact) and Gauss's
+    rule.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(40)
     times = motion.time * (nodes + 1) / 2
     position, velocity = motion.at(times)
     total = np.zeros_like(times)
     for i in (0, 1):
         ahead, behind = (velocity + s * np.eye(2)[i][:, None] for s in (1, -1))
-        a, b = (system.model.acceleration(times, position, v, 1, system.load)[i] for v in (ahead, behind))
+        a, b = (
+            system.model.acceleration(times, position, v, 1, system.load)[i]
+            for v in (ahead, behind)
+        )
         total += (a - b) / 2
     return motion.time / 2 * weights @ total
 

@@ -1,4 +1,6 @@
-"""Derivatives of the end state and of the event times against differences of 30-digit motions, and against closed forms."""
+"""Derivatives of the end state and of the event times against differences of 30-digit motions, and
+against closed forms.
+"""
 
 import math
 
@@ -104,12 +106,24 @@ def test_all_derivatives_are_those_of_a_30_digit_motion(numbers, start, impacts,
     span = (length.get("periods"), length.get("duration"))
     with mp.workdps(30):
         columns = [
-            difference(lambda x: precise(numbers, (x, start[1]), *span), start[0]) if start[0] else None,
+            difference(lambda x: precise(numbers, (x, start[1]), *span), start[0])
+            if start[0]
+            else None,
             difference(lambda v: precise(numbers, (start[0], v), *span), start[1]),
-            *(difference(lambda p, name=name: precise({**numbers, name: p}, start, *span), numbers[name]) for name in PATHS),
+            *(
+                difference(
+                    lambda p, name=name: precise({**numbers, name: p}, start, *span), numbers[name]
+                )
+                for name in PATHS
+            ),
         ]
     result = saltus.sensitivities(
-        forced(**numbers), theta=start[0], velocity=start[1], **length, parameters=tuple(PATHS.values()), tol=1e-12
+        forced(**numbers),
+        theta=start[0],
+        velocity=start[1],
+        **length,
+        parameters=tuple(PATHS.values()),
+        tol=1e-12,
     )
     assert result.parameter_paths == tuple(PATHS.values())
     assert result.undefined is None
@@ -117,13 +131,17 @@ def test_all_derivatives_are_those_of_a_30_digit_motion(numbers, start, impacts,
     if start[0]:
         check(result, np.array(columns).T)
     else:  # at contact the reference has no motions on the other side: without the first column
-        computed = np.vstack([np.hstack([result.state, result.parameters]), result.event_times])[:, 1:]
+        computed = np.vstack([np.hstack([result.state, result.parameters]), result.event_times])[
+            :, 1:
+        ]
         expected = np.array(columns[1:]).T
         assert (np.abs(computed - expected) / np.abs(expected).max(axis=0)).max() < 1e-9
 
 
 class PreciseWall:
-    """x'' + c x' + k x = F sin(W t) before a wall at d, v+ = -e v-: closed forms between impacts, by variation of constants."""
+    """x'' + c x' + k x = F sin(W t) before a wall at d, v+ = -e v-: closed forms between impacts,
+    by variation of constants.
+    """
 
     def __init__(self, *, k, c, d, F, W, e):
         self.k, self.c, self.d, self.F, self.W, self.e = map(mp.mpf, (k, c, d, F, W, e))
@@ -159,23 +177,40 @@ class PreciseWall:
 
 def test_the_wall_s_place_and_law_and_the_oscillator_s_numbers():
     numbers = {"k": 1.3, "c": 0.1, "d": 0.4, "F": 0.9, "W": 1.7, "e": 0.8}
-    paths = ("model.stiffness", "model.damping", "model.wall", "load.force.amplitude", "load.frequency", "impact.e")
+    paths = (
+        "model.stiffness",
+        "model.damping",
+        "model.wall",
+        "load.force.amplitude",
+        "load.frequency",
+        "impact.e",
+    )
     system = System(
         model=WallOscillator(stiffness=1.3, damping=0.1, wall=0.4),
         load=Load(frequency=1.7, force=Harmonic(0.9)),
         impact=VelocityReduction(0.8),
     )
     start, duration = (-0.5, 0.3), 15.0
-    result = saltus.sensitivities(system, x=start[0], velocity=start[1], duration=duration, parameters=paths)
+    result = saltus.sensitivities(
+        system, x=start[0], velocity=start[1], duration=duration, parameters=paths
+    )
     guesses = result.motion.impacts.time
     assert len(guesses) >= 4
     with mp.workdps(30):
         columns = [
-            difference(lambda x: PreciseWall(**numbers).run(x, mp.mpf(start[1]), duration, guesses), start[0]),
-            difference(lambda v: PreciseWall(**numbers).run(mp.mpf(start[0]), v, duration, guesses), start[1]),
+            difference(
+                lambda x: PreciseWall(**numbers).run(x, mp.mpf(start[1]), duration, guesses),
+                start[0],
+            ),
+            difference(
+                lambda v: PreciseWall(**numbers).run(mp.mpf(start[0]), v, duration, guesses),
+                start[1],
+            ),
             *(
                 difference(
-                    lambda p, n=name: PreciseWall(**{**numbers, n: p}).run(mp.mpf(start[0]), mp.mpf(start[1]), duration, guesses),
+                    lambda p, n=name: PreciseWall(**{**numbers, n: p}).run(
+                        mp.mpf(start[0]), mp.mpf(start[1]), duration, guesses
+                    ),
                     numbers[name],
                 )
                 for name in numbers
@@ -187,7 +222,9 @@ def test_the_wall_s_place_and_law_and_the_oscillator_s_numbers():
 def test_the_start_counts_in_the_derivative_to_the_frequency():
     """From time t0 on H(t) = H sin(W t): W moves the phase at the start as well, by t0 a unit of W."""
     t0, system = 12345.678, forced(H=0.5, W=1.3)
-    late = saltus.sensitivities(system, theta=0.3, duration=9.0, time=t0, parameters=("load.frequency",), tol=1e-14)
+    late = saltus.sensitivities(
+        system, theta=0.3, duration=9.0, time=t0, parameters=("load.frequency",), tol=1e-14
+    )
     phase = math.fmod(1.3 * t0, 2 * math.pi)
     early = saltus.sensitivities(
         forced(H=0.5, W=1.3, phase=phase),
@@ -196,15 +233,22 @@ def test_the_start_counts_in_the_derivative_to_the_frequency():
         parameters=SHARED_PATHS,
         tol=1e-14,
     )
-    frequency, start = (early.parameters[:, SHARED_PATHS.index(p)] for p in ("load.frequency", "load.horizontal.phase"))
+    frequency, start = (
+        early.parameters[:, SHARED_PATHS.index(p)]
+        for p in ("load.frequency", "load.horizontal.phase")
+    )
     np.testing.assert_allclose(late.parameters[:, 0], frequency + t0 * start, rtol=1e-10)
     np.testing.assert_allclose(late.state, early.state, rtol=1e-10, atol=1e-10)
 
 
 def test_the_end_of_a_motion_of_so_many_periods_moves_with_the_frequency():
     system = forced(H=0.5, W=1.3)
-    whole = saltus.sensitivities(system, theta=0.3, periods=4, parameters=("load.frequency",), tol=1e-14)
-    fixed = saltus.sensitivities(system, theta=0.3, duration=whole.motion.time, parameters=("load.frequency",), tol=1e-14)
+    whole = saltus.sensitivities(
+        system, theta=0.3, periods=4, parameters=("load.frequency",), tol=1e-14
+    )
+    fixed = saltus.sensitivities(
+        system, theta=0.3, duration=whole.motion.time, parameters=("load.frequency",), tol=1e-14
+    )
     acceleration = system.model.acceleration(
         whole.motion.time, whole.motion.theta, whole.motion.velocity, whole.motion.side, system.load
     )
@@ -217,7 +261,12 @@ def test_the_derivative_of_two_stretches_is_the_product_of_theirs():
     system = forced(H=0.5, m=0.3, e=0.9)
     first = saltus.sensitivities(system, theta=0.3, velocity=0.1, duration=7.0, tol=1e-14)
     then = saltus.sensitivities(
-        system, theta=first.motion.theta, velocity=first.motion.velocity, time=7.0, duration=6.0, tol=1e-14
+        system,
+        theta=first.motion.theta,
+        velocity=first.motion.velocity,
+        time=7.0,
+        duration=6.0,
+        tol=1e-14,
     )
     whole = saltus.sensitivities(system, theta=0.3, velocity=0.1, duration=13.0, tol=1e-14)
     np.testing.assert_allclose(then.state @ first.state, whole.state, rtol=1e-11, atol=1e-11)
@@ -226,7 +275,9 @@ def test_the_derivative_of_two_stretches_is_the_product_of_theirs():
 def test_mirror_motions_have_mirror_derivatives():
     system = forced(H=0.5, mean=0.05, phase=0.4)
     one = saltus.sensitivities(system, theta=0.3, velocity=-0.2, periods=4, parameters=SHARED_PATHS)
-    other = saltus.sensitivities(system.mirrored(), theta=-0.3, velocity=0.2, periods=4, parameters=SHARED_PATHS)
+    other = saltus.sensitivities(
+        system.mirrored(), theta=-0.3, velocity=0.2, periods=4, parameters=SHARED_PATHS
+    )
     assert one.motion.theta == -other.motion.theta
     signs = np.array([1, -1, -1, -1, -1, -1])  # -H is what the mirrored system has for H
     np.testing.assert_allclose(other.state, one.state, rtol=1e-12)
@@ -237,7 +288,9 @@ def test_mirror_motions_have_mirror_derivatives():
 def test_the_motion_is_that_of_simulate_to_the_last_bit():
     system = forced(H=0.5, m=0.3, e=0.9)
     plain = saltus.simulate(system, theta=0.3, velocity=0.1, periods=20)
-    motion = saltus.sensitivities(system, theta=0.3, velocity=0.1, periods=20, parameters=("load.frequency",)).motion
+    motion = saltus.sensitivities(
+        system, theta=0.3, velocity=0.1, periods=20, parameters=("load.frequency",)
+    ).motion
     assert (motion.theta, motion.velocity) == (plain.theta, plain.velocity)
     np.testing.assert_array_equal(motion.impacts.time, plain.impacts.time)
     times = np.linspace(0.0, motion.time, 100)
@@ -255,7 +308,9 @@ def test_the_error_follows_the_tolerance(tol):
 
 
 def test_at_an_equilibrium_the_tangent_sets_the_steps():
-    """x'' + c x' + k x = F at x = F / k: the motion is constant, and its tangent the exponential of a matrix."""
+    """x'' + c x' + k x = F at x = F / k: the motion is constant, and its tangent the exponential of
+    a matrix.
+    """
     from scipy.linalg import expm
 
     load = Load(force=0.3)
@@ -263,4 +318,6 @@ def test_at_an_equilibrium_the_tangent_sets_the_steps():
     result = saltus.sensitivities(system, x=0.3, duration=50.0, parameters=("load.force",))
     exact = expm(50.0 * np.array([[0.0, 1.0], [-1.0, -0.1]]))
     np.testing.assert_allclose(result.state, exact, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(result.parameters[:, 0], (np.eye(2) - exact) @ [1.0, 0.0], atol=1e-11)
+    np.testing.assert_allclose(
+        result.parameters[:, 0], (np.eye(2) - exact) @ [1.0, 0.0], atol=1e-11
+    )

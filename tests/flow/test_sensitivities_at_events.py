@@ -1,4 +1,6 @@
-"""Derivatives through rest, release, margins and records; and where there are none, the result says why."""
+"""Derivatives through rest, release, margins and records; and where there are none, the result says
+why.
+"""
 
 import importlib.util
 import math
@@ -44,23 +46,39 @@ def event_times(motion):
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
 def test_a_ball_s_rest_moves_as_its_geometric_series_says(e):
-    """It rests at t = f (1 + 2 e / (1 - e)), f = sqrt(2 (d - x) / F) the fall: dt/dx = -t / (2 (d - x)), dt/dF = -t / (2 F)."""
+    """It rests at t = f (1 + 2 e / (1 - e)), f = sqrt(2 (d - x) / F) the fall: dt/dx = -t / (2 (d -
+    x)), dt/dF = -t / (2 F).
+    """
     drop, force = 0.4, 0.7
-    ball = System(model=WallOscillator(stiffness=0.0, wall=1.0), load=Load(force=force), impact=VelocityReduction(e))
+    ball = System(
+        model=WallOscillator(stiffness=0.0, wall=1.0),
+        load=Load(force=force),
+        impact=VelocityReduction(e),
+    )
     paths = ("load.force", "model.wall", *(["impact.e"] if e else []))
     result = saltus.sensitivities(ball, x=1.0 - drop, duration=30.0, parameters=paths)
     fall = math.sqrt(2 * drop / force)
     end = fall * (1 + 2 * e / (1 - e))
     assert result.motion.rest_time == pytest.approx(end, rel=1e-14)
     rest = result.event_times[-1]
-    # A speed at the start brings the first impact forward, and changes its speed in second order only.
-    expected = [-end / (2 * drop), -1 / force, -end / (2 * force), end / (2 * drop), 2 * fall / (1 - e) ** 2]
+    # A speed at the start brings the first impact forward, and changes its speed in second order
+    # only.
+    expected = [
+        -end / (2 * drop),
+        -1 / force,
+        -end / (2 * force),
+        end / (2 * drop),
+        2 * fall / (1 - e) ** 2,
+    ]
     at_wall = [j for j, path in enumerate(("", "", *paths)) if path == "model.wall"]
-    np.testing.assert_allclose(rest[at_wall], end / (2 * drop), rtol=1e-8)  # from dx = 1, rounded, over speeds down to 1e-6
+    # from dx = 1, rounded, over speeds down to 1e-6
+    np.testing.assert_allclose(rest[at_wall], end / (2 * drop), rtol=1e-8)
     others = np.delete(np.arange(len(rest)), at_wall)
     np.testing.assert_allclose(rest[others], np.array(expected)[others], rtol=1e-11)
     np.testing.assert_array_equal(result.state, 0.0)
-    np.testing.assert_array_equal(result.parameters, [[0.0, 1.0, *([0.0] if e else [])], [0.0] * len(paths)])
+    np.testing.assert_array_equal(
+        result.parameters, [[0.0, 1.0, *([0.0] if e else [])], [0.0] * len(paths)]
+    )
     assert result.determinant == 0.0
 
 
@@ -73,7 +91,9 @@ def test_the_end_of_an_accumulation_on_unequal_layers_moves_as_its_differences_d
     rest = result.event_times[-1]
 
     def rest_time(system=system, theta=0.3, velocity=0.1):
-        return saltus.simulate(system, theta=theta, velocity=velocity, duration=40.0, tol=1e-15).rest_time
+        return saltus.simulate(
+            system, theta=theta, velocity=velocity, duration=40.0, tol=1e-15
+        ).rest_time
 
     expected = [
         difference(lambda d: rest_time(theta=0.3 + d)),
@@ -95,7 +115,16 @@ def test_a_release_moves_with_the_load_that_holds_it():
     assert result.motion.events[release].time == pytest.approx(time, rel=1e-13)
     by_level = 1 / (W * math.sqrt(H**2 - level**2))
     by_angle = V / math.sin(BETA80) ** 2 * by_level
-    expected = [0, 0, -level / H * by_level, -1 / W, -time / W, -by_level / math.tan(BETA80), by_angle, 0]
+    expected = [
+        0,
+        0,
+        -level / H * by_level,
+        -1 / W,
+        -time / W,
+        -by_level / math.tan(BETA80),
+        by_angle,
+        0,
+    ]
     np.testing.assert_allclose(result.event_times[release], expected, rtol=1e-11, atol=1e-12)
     np.testing.assert_array_equal(result.state, 0.0)
     assert result.determinant == 0.0
@@ -107,27 +136,42 @@ def test_a_release_moves_with_the_load_that_holds_it():
     for j, path in enumerate(SHARED_PATHS):
         step = 1e-4 if path == "load.frequency" else 1e-3
         np.testing.assert_allclose(
-            result.parameters[:, j], difference(lambda d, p=path: end(changed(system, p, d)), step), rtol=1e-8, atol=1e-9
+            result.parameters[:, j],
+            difference(lambda d, p=path: end(changed(system, p, d)), step),
+            rtol=1e-8,
+            atol=1e-9,
         )
 
 
 def test_a_release_by_a_jump_of_the_load_has_its_time():
-    """Where a record rises to the level that lifts it off, its scale moves the release; where it jumps there, it does not."""
+    """Where a record rises to the level that lifts it off, its scale moves the release; where it
+    jumps there, it does not.
+    """
     record = Record([0.0, 2.0, 4.0], [0.0, 0.4, 0.4], quantity="force")
     system = System(
-        model=Metainterface(beta0=BETA80, damping=0.1), load=Load(horizontal=record, vertical=-0.5), impact=VelocityReduction(0.5)
+        model=Metainterface(beta0=BETA80, damping=0.1),
+        load=Load(horizontal=record, vertical=-0.5),
+        impact=VelocityReduction(0.5),
     )
-    result = saltus.sensitivities(system, theta=0.0, duration=3.5, parameters=("load.horizontal.scale", "load.vertical"))
+    result = saltus.sensitivities(
+        system, theta=0.0, duration=3.5, parameters=("load.horizontal.scale", "load.vertical")
+    )
     times = event_times(result.motion)
     level = 0.5 / math.tan(BETA80)  # 0.2 t = level
     assert times[1] == pytest.approx(level / 0.2, rel=1e-13)
-    np.testing.assert_allclose(result.event_times[1], [0, 0, -level / 0.2, -1 / math.tan(BETA80) / 0.2], rtol=1e-11)
+    np.testing.assert_allclose(
+        result.event_times[1], [0, 0, -level / 0.2, -1 / math.tan(BETA80) / 0.2], rtol=1e-11
+    )
     late = System(
         model=system.model,
-        load=Load(horizontal=Record([1.0, 2.0, 4.0], [0.4, 0.4, 0.4], quantity="force"), vertical=-0.5),
+        load=Load(
+            horizontal=Record([1.0, 2.0, 4.0], [0.4, 0.4, 0.4], quantity="force"), vertical=-0.5
+        ),
         impact=system.impact,
     )
-    jumped = saltus.sensitivities(late, theta=0.0, duration=3.5, parameters=("load.horizontal.scale", "load.vertical"))
+    jumped = saltus.sensitivities(
+        late, theta=0.0, duration=3.5, parameters=("load.horizontal.scale", "load.vertical")
+    )
     assert event_times(jumped.motion)[1] == 1.0
     np.testing.assert_array_equal(jumped.event_times[1], 0.0)
 
@@ -136,12 +180,22 @@ GROUND_PATHS = ("load.ground_horizontal.scale", "model.mass_ratio", "impact.r")
 
 
 def test_records_of_the_ground_in_an_energy_law_and_in_a_release():
-    """R(v-, t) reads the ground's velocity, the release its acceleration: their time derivatives are the next rows."""
+    """R(v-, t) reads the ground's velocity, the release its acceleration: their time derivatives
+    are the next rows.
+    """
     time = np.linspace(0.0, 12.0, 61)
-    ground = Record(time, 0.3 * np.sin(1.1 * time) * (1 - np.cos(0.5 * time)), quantity="acceleration")
+    ground = Record(
+        time, 0.3 * np.sin(1.1 * time) * (1 - np.cos(0.5 * time)), quantity="acceleration"
+    )
     model = Metainterface(beta0=BETA80, damping=0.1, mass_ratio=0.3)
-    system = System(model=model, load=Load(ground_horizontal=ground, vertical=-0.5), impact=EnergyRestitution(0.8))
-    result = saltus.sensitivities(system, theta=0.6, velocity=0.1, duration=9.0, parameters=GROUND_PATHS, tol=1e-14)
+    system = System(
+        model=model,
+        load=Load(ground_horizontal=ground, vertical=-0.5),
+        impact=EnergyRestitution(0.8),
+    )
+    result = saltus.sensitivities(
+        system, theta=0.6, velocity=0.1, duration=9.0, parameters=GROUND_PATHS, tol=1e-14
+    )
     assert len(result.motion.impacts) >= 2
 
     def values(system=system, theta=0.6):
@@ -149,16 +203,24 @@ def test_records_of_the_ground_in_an_energy_law_and_in_a_release():
         return np.array([motion.theta, motion.velocity, *event_times(motion)])
 
     expected = [difference(lambda d: values(theta=0.6 + d))]
-    expected += [difference(lambda d, p=path: values(changed(system, p, d))) for path in GROUND_PATHS]
-    computed = np.vstack([np.hstack([result.state, result.parameters]), result.event_times])[:, [0, 2, 3, 4]]
+    expected += [
+        difference(lambda d, p=path: values(changed(system, p, d))) for path in GROUND_PATHS
+    ]
+    computed = np.vstack([np.hstack([result.state, result.parameters]), result.event_times])[
+        :, [0, 2, 3, 4]
+    ]
     np.testing.assert_allclose(computed.T, expected, rtol=1e-8, atol=1e-8)
 
 
 def test_a_release_under_a_record_of_acceleration_reads_the_record_s_slope():
-    """The lower side lifts off where 0.1 t scale = abs(V) / (tan(beta0) (1 + m)), whatever impacts do."""
+    """The lower side lifts off where 0.1 t scale = abs(V) / (tan(beta0) (1 + m)), whatever impacts
+    do.
+    """
     ground = Record([0.0, 5.0, 6.0], [0.0, -0.5, 0.0], quantity="acceleration")
     system = System(
-        model=Metainterface(beta0=BETA80), load=Load(ground_horizontal=ground, vertical=-0.5), impact=EnergyRestitution(0.25)
+        model=Metainterface(beta0=BETA80),
+        load=Load(ground_horizontal=ground, vertical=-0.5),
+        impact=EnergyRestitution(0.25),
     )
     result = saltus.sensitivities(system, theta=0.0, duration=2.0, parameters=GROUND_PATHS)
     time = 0.5 / math.tan(BETA80) / 0.1
@@ -167,11 +229,16 @@ def test_a_release_under_a_record_of_acceleration_reads_the_record_s_slope():
 
 
 def test_a_margin_stops_the_motion_where_it_is_and_moves_with_everything():
-    block = System(model=RockingBlock(alpha=0.3), load=Load(frequency=2.0, ground_horizontal=Harmonic(0.3)))
+    block = System(
+        model=RockingBlock(alpha=0.3), load=Load(frequency=2.0, ground_horizontal=Harmonic(0.3))
+    )
     paths = ("load.ground_horizontal.amplitude", "load.frequency", "model.alpha")
-    result = saltus.sensitivities(block, theta=0.28, velocity=0.2, periods=40, parameters=paths, tol=1e-14)
+    result = saltus.sensitivities(
+        block, theta=0.28, velocity=0.2, periods=40, parameters=paths, tol=1e-14
+    )
     assert result.motion.stop == "limit"
-    assert np.abs(np.hstack([result.state[0], result.parameters[0]])).max() < 1e-12  # it stops at pi / 2, wherever it started
+    # it stops at pi / 2, wherever it started
+    assert np.abs(np.hstack([result.state[0], result.parameters[0]])).max() < 1e-12
 
     def end(system=block, velocity=0.2):
         motion = saltus.simulate(system, theta=0.28, velocity=velocity, periods=40, tol=1e-15)
@@ -187,13 +254,18 @@ def test_a_margin_stops_the_motion_where_it_is_and_moves_with_everything():
 
 def test_a_margin_of_the_acceleration_moves_too():
     system = forced(H=0.5)
-    result = saltus.sensitivities(system, theta=0.3, periods=9, stop_at="reaction", parameters=("load.vertical",), tol=1e-14)
+    result = saltus.sensitivities(
+        system, theta=0.3, periods=9, stop_at="reaction", parameters=("load.vertical",), tol=1e-14
+    )
     assert result.motion.limit == "reaction"
 
     def end(system=system, theta=0.3):
         return saltus.simulate(system, theta=theta, periods=9, stop_at="reaction", tol=1e-15).time
 
-    expected = [difference(lambda d: end(theta=0.3 + d)), difference(lambda d: end(changed(system, "load.vertical", d)))]
+    expected = [
+        difference(lambda d: end(theta=0.3 + d)),
+        difference(lambda d: end(changed(system, "load.vertical", d))),
+    ]
     np.testing.assert_allclose(result.event_times[-1][[0, 2]], expected, rtol=1e-8)
 
 
@@ -208,7 +280,9 @@ def duffing():
 
 def test_a_model_of_one_s_own_has_sensitivities_unasked():
     system = System(
-        model=duffing()(damping=0.1, cubic=0.7), load=Load(frequency=1.2, force=Harmonic(0.4)), impact=VelocityReduction()
+        model=duffing()(damping=0.1, cubic=0.7),
+        load=Load(frequency=1.2, force=Harmonic(0.4)),
+        impact=VelocityReduction(),
     )
     paths = ("model.damping", "model.cubic", "load.force.amplitude", "load.frequency")
     result = saltus.sensitivities(system, x=1.0, periods=4, parameters=paths, tol=1e-14)
@@ -219,7 +293,9 @@ def test_a_model_of_one_s_own_has_sensitivities_unasked():
         return np.array([motion.x, motion.velocity])
 
     np.testing.assert_allclose(result.state[:, 0], difference(lambda d: end(x=1.0 + d)), rtol=1e-9)
-    expected = np.transpose([difference(lambda d, p=path: end(changed(system, p, d))) for path in paths])
+    expected = np.transpose(
+        [difference(lambda d, p=path: end(changed(system, p, d))) for path in paths]
+    )
     np.testing.assert_allclose(result.parameters, expected, rtol=1e-9)
 
 
@@ -236,15 +312,27 @@ class Power(Model):
 
 def test_an_exponent_is_a_parameter_like_another():
     def end(exponent):
-        motion = saltus.simulate(System(model=Power(exponent=exponent)), x=0.5, duration=0.6, tol=1e-15)
+        motion = saltus.simulate(
+            System(model=Power(exponent=exponent)), x=0.5, duration=0.6, tol=1e-15
+        )
         return np.array([motion.x, motion.velocity])
 
-    result = saltus.sensitivities(System(model=Power()), x=0.5, duration=0.6, parameters=("model.exponent",))
-    np.testing.assert_allclose(result.parameters[:, 0], difference(lambda d: end(2.5 + d)), rtol=1e-9)
+    result = saltus.sensitivities(
+        System(model=Power()), x=0.5, duration=0.6, parameters=("model.exponent",)
+    )
+    np.testing.assert_allclose(
+        result.parameters[:, 0], difference(lambda d: end(2.5 + d)), rtol=1e-9
+    )
 
 
 def test_chatter_takes_the_derivative_and_says_so():
-    result = saltus.sensitivities(forced(H=0.0, C=1.0, V=-1.5), theta=0.0, velocity=2e-4, duration=15.0, parameters=SHARED_PATHS)
+    result = saltus.sensitivities(
+        forced(H=0.0, C=1.0, V=-1.5),
+        theta=0.0,
+        velocity=2e-4,
+        duration=15.0,
+        parameters=SHARED_PATHS,
+    )
     assert not result.motion.phase_known
     assert "phase is lost" in result.undefined
     assert np.isnan(result.state).all()
@@ -256,7 +344,9 @@ def test_chatter_takes_the_derivative_and_says_so():
 
 
 def test_rest_without_loss_has_no_derivative_to_the_state_but_to_the_loads():
-    """Beside the state at rest every motion chatters for ever; at rest the loads alone say when it is released."""
+    """Beside the state at rest every motion chatters for ever; at rest the loads alone say when it
+    is released.
+    """
     H, W = 0.2, 0.5
     system = forced(H=H, W=W)
     result = saltus.sensitivities(system, theta=0.0, duration=4.0, parameters=SHARED_PATHS)
@@ -270,15 +360,23 @@ def test_rest_without_loss_has_no_derivative_to_the_state_but_to_the_loads():
     np.testing.assert_allclose(result.parameters[:, 0], difference(lambda d: end(H + d)), rtol=1e-8)
     assert np.isnan(result.event_times[1, :2]).all()
     level = 0.5 / math.tan(BETA80)
-    assert result.event_times[1, 2] == pytest.approx(-level / H / (W * math.sqrt(H**2 - level**2)), rel=1e-11)
+    assert result.event_times[1, 2] == pytest.approx(
+        -level / H / (W * math.sqrt(H**2 - level**2)), rel=1e-11
+    )
 
 
 @pytest.mark.parametrize("wall", [1.0, 1.0 + 1e-14])
 def test_a_grazing_is_reported_and_leaves_no_nan(wall):
-    """x = -cos t touches the wall at pi; on this side of the touch nothing happens to the derivative."""
+    """x = -cos t touches the wall at pi; on this side of the touch nothing happens to the
+    derivative.
+    """
     load = Load(frequency=1.0, force=Harmonic(amplitude=1.0, phase=math.pi / 2))
-    system = System(model=WallOscillator(stiffness=0.0, wall=wall), load=load, impact=VelocityReduction(0.8))
-    result = saltus.sensitivities(system, x=-1.0, duration=5.0, parameters=("model.wall",), tol=1e-15)
+    system = System(
+        model=WallOscillator(stiffness=0.0, wall=wall), load=load, impact=VelocityReduction(0.8)
+    )
+    result = saltus.sensitivities(
+        system, x=-1.0, duration=5.0, parameters=("model.wall",), tol=1e-15
+    )
     touches = [*result.grazings, *result.motion.impacts.time]
     for touch in touches:
         assert touch == pytest.approx(math.pi, abs=1e-6)
@@ -309,7 +407,10 @@ def test_derivatives_beyond_the_range_of_numbers_are_said_to_be():
     ("parameters", "message"),
     [
         (("load.freqency",), "did you mean 'load.frequency'"),
-        (("load.horizontal",), "load.horizontal is not a number.*amplitude|load.horizontal is not a number.*mean"),
+        (
+            ("load.horizontal",),
+            "load.horizontal is not a number.*amplitude|load.horizontal is not a number.*mean",
+        ),
         (("load.horizontal.order",), "whole number"),
         (("model.smoothing",), "not a number"),
         (("model.beta0", "model.beta0"), "once"),

@@ -1,4 +1,6 @@
-"""The smoothed sign of the paper (`smoothing`) as an option of the model, and its limit, the exact motion."""
+"""The smoothed sign of the paper (`smoothing`) as an option of the model, and its limit, the exact
+motion.
+"""
 
 import math
 
@@ -43,7 +45,8 @@ def test_smoothed_motion_agrees_with_scipy_on_the_paper_s_formula(sharpness):
         dense_output=True,
     )
     times = np.linspace(0, motion.time, 60)
-    assert np.stack(motion.at(times)) == pytest.approx(expected.sol(times), abs=1e-7)  # of SciPy's interpolant
+    # of SciPy's interpolant
+    assert np.stack(motion.at(times)) == pytest.approx(expected.sol(times), abs=1e-7)
     assert (motion.theta, motion.velocity) == pytest.approx(tuple(expected.y[:, -1]), abs=1e-10)
 
 
@@ -55,7 +58,8 @@ def test_hyperbolic_tangent_is_the_paper_s_q():
 
 
 def test_smoothed_motion_converges_to_the_exact_one_with_the_square_of_the_width():
-    # Over a crossing at speed v the odd part of sgn - q cancels, and the rest lasts 1/(B v) with a force of order 1/B.
+    # Over a crossing at speed v the odd part of sgn - q cancels, and the rest lasts 1/(B v) with a
+    # force of order 1/B.
     exact = simulate(EXACT, theta=0.3, duration=7.0)
     assert len(exact.impacts) >= 1
     sharpness = np.array([50.0, 200.0, 1000.0, 5000.0])
@@ -85,10 +89,18 @@ def test_smoothed_motion_stops_at_its_limit_on_both_sides(side):
 
 @pytest.mark.parametrize(
     "unequal",
-    [{"stiffness_ratio": 1.1}, {"mass_ratio": 0.1}, {"dissipation_ratio": 0.9}, {"mass_ratio": 1.0, "stiffness_ratio": 2.0}],
+    [
+        {"stiffness_ratio": 1.1},
+        {"mass_ratio": 0.1},
+        {"dissipation_ratio": 0.9},
+        {"mass_ratio": 1.0, "stiffness_ratio": 2.0},
+    ],
 )
 def test_smoothing_of_unequal_layers_is_refused(unequal):
-    with pytest.raises(ParameterError, match=r"smoothing is for symmetric layers only .* drop it to compute the exact motion"):
+    with pytest.raises(
+        ParameterError,
+        match=r"smoothing is for symmetric layers only .* drop it to compute the exact motion",
+    ):
         Metainterface(beta0=1.4, smoothing=100.0, **unequal)
     with pytest.raises(ParameterError, match="smoothing is for symmetric layers only"):
         SMOOTH.with_({f"model.{name}": value for name, value in unequal.items()})

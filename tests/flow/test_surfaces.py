@@ -1,4 +1,6 @@
-"""Switching surfaces: motions, derivatives, ensembles and orbits, against closed forms and an independent integrator."""
+"""Switching surfaces: motions, derivatives, ensembles and orbits, against closed forms and an
+independent integrator.
+"""
 
 import dataclasses
 import itertools
@@ -18,7 +20,9 @@ from saltus.systems import ContactModel, Harmonic, Load, System
 
 @dataclass(frozen=True, kw_only=True)
 class SoftStop(ContactModel):
-    """A mass x with a soft stop at d (spring and damper, whose force jumps) and a mass y on a bilinear spring to it."""
+    """A mass x with a soft stop at d (spring and damper, whose force jumps) and a mass y on a
+    bilinear spring to it.
+    """
 
     stop: float = 0.5
     stiffness: float = 20.0
@@ -31,7 +35,9 @@ class SoftStop(ContactModel):
     @property
     def surfaces(self):
         apart = {"y": 1.0, "x": -1.0}
-        return Surface(name="stop", coordinate="x", position=self.stop), Surface(name="tight", coordinate=apart, position=0.8)
+        return Surface(name="stop", coordinate="x", position=self.stop), Surface(
+            name="tight", coordinate=apart, position=0.8
+        )
 
     def mass_matrix(self, q):
         return [[1.0, 0.0], [0.0, self.mass]]
@@ -47,7 +53,9 @@ SOFT = System(model=SoftStop(), load=Load(frequency=0.9, force=Harmonic(0.7)))
 
 
 def by_dop853(end):
-    """The state of SOFT at the end and the times of its crossings, by SciPy's DOP853 from one event to the next."""
+    """The state of SOFT at the end and the times of its crossings, by SciPy's DOP853 from one event
+    to the next.
+    """
     state, t, sides, times = np.zeros(4), 0.0, [-1.0, -1.0], []
 
     def rates(t, z, pressed, tight):
@@ -65,7 +73,16 @@ def by_dop853(end):
     at_stop.terminal = at_tight.terminal = True
     while t < end:
         at_stop.direction, at_tight.direction = -sides[0], -sides[1]
-        found = solve_ivp(rates, (t, end), state, "DOP853", rtol=1e-13, atol=1e-14, events=(at_stop, at_tight), args=(*sides,))
+        found = solve_ivp(
+            rates,
+            (t, end),
+            state,
+            "DOP853",
+            rtol=1e-13,
+            atol=1e-14,
+            events=(at_stop, at_tight),
+            args=(*sides,),
+        )
         t, state = found.t[-1], found.y[:, -1]
         for i in range(2):
             if found.t_events[i].size:
@@ -85,7 +102,9 @@ def test_a_soft_stop_with_two_coordinates_moves_as_dop853_with_events_says():
     assert list(motion.sides.values()) == sides
     data = motion.to_xarray()
     inside = np.abs(data.x - 0.5) > 1e-9
-    np.testing.assert_array_equal(data.side_stop.values[inside], np.sign(data.x - 0.5).values[inside])
+    np.testing.assert_array_equal(
+        data.side_stop.values[inside], np.sign(data.x - 0.5).values[inside]
+    )
 
 
 def test_derivatives_jump_with_the_field_alone():
@@ -97,15 +116,21 @@ def test_derivatives_jump_with_the_field_alone():
         for sign in (step, -step):
             at = np.array([0.1, 0.3, 0.2, 0.1]) + sign * (np.arange(4) == j)
             system = SOFT if j < 4 else SOFT.with_({paths[j - 4]: SOFT.get(paths[j - 4]) + sign})
-            motion = simulate(system, **{**given, "x": at[0], "y": at[1], "velocity": tuple(at[2:])})
+            motion = simulate(
+                system, **{**given, "x": at[0], "y": at[1], "velocity": tuple(at[2:])}
+            )
             pair.append((motion.final_state, motion.events.times))
         columns.append((pair[0][0] - pair[1][0]) / (2 * step))
         times.append((pair[0][1] - pair[1][1]) / (2 * step))
     assert len(found.motion.events) > 15
-    np.testing.assert_allclose(np.hstack([found.state, found.parameters]), np.array(columns).T, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(
+        np.hstack([found.state, found.parameters]), np.array(columns).T, rtol=0, atol=1e-7
+    )
     np.testing.assert_allclose(found.event_times, np.array(times).T, rtol=0, atol=1e-7)
     # M is constant, so that volumes shrink by the damping alone, wherever it acts
-    pressed = found.motion.to_xarray(np.linspace(0.0, found.motion.time, 400_001)).side_stop.values > 0
+    pressed = (
+        found.motion.to_xarray(np.linspace(0.0, found.motion.time, 400_001)).side_stop.values > 0
+    )
     rate = 0.1 + 0.05 / 0.6 + 0.3 * pressed.mean()
     assert found.determinant == pytest.approx(math.exp(-rate * found.motion.time), rel=1e-4)
 
@@ -115,7 +140,9 @@ def test_motions_in_lanes_pass_the_same_surfaces():
     many = simulate_many(SOFT, x=x, y=0.3, periods=5)
     for i in range(6):
         one = simulate(SOFT, x=float(x[i]), y=0.3, periods=5)
-        np.testing.assert_allclose([many.x.values[i], many.y.values[i]], one.position, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(
+            [many.x.values[i], many.y.values[i]], one.position, rtol=0, atol=1e-11
+        )
 
 
 def test_orbits_of_a_soft_stop_are_found_and_followed():
@@ -125,14 +152,20 @@ def test_orbits_of_a_soft_stop_are_found_and_followed():
     motion = orbit.motion()
     assert len(motion.events) == 6
     tangent = sensitivities(SOFT, **orbit.start(), periods=1)
-    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), np.sort_complex(np.linalg.eigvals(tangent.state)), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort_complex(orbit.multipliers),
+        np.sort_complex(np.linalg.eigvals(tangent.state)),
+        atol=1e-9,
+    )
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92))
     assert max(point.orbit.residual for point in branch.points) < 1e-11
     assert abs(saltus.energies(orbit).defect) < 1e-12
 
 
 def test_a_branch_goes_on_where_crossings_appear_beside_its_section():
-    """With the section there no step would lead on: the new crossings are nearer to it than orbits may have events."""
+    """With the section there no step would lead on: the new crossings are nearer to it than orbits
+    may have events.
+    """
     near = {"x": -0.959, "y": -0.762, "velocity": (-1.372, 0.459)}
     orbit = saltus.find_orbit(SOFT.with_({"load.frequency": 1.00074}), **near, settle=0, period=1)
     branch = saltus.continue_orbit(orbit, "load.frequency", (1.0, 1.0008))
@@ -150,7 +183,9 @@ def test_a_branch_goes_on_where_crossings_appear_beside_its_section():
 
 @dataclass(frozen=True, kw_only=True)
 class Backlash(ContactModel):
-    """Two equal masses whose spring acts where abs(y - x) > b: r'' = -2 k (r -+ b) there, and r'' = 0 between."""
+    """Two equal masses whose spring acts where abs(y - x) > b: r'' = -2 k (r -+ b) there, and r'' =
+    0 between.
+    """
 
     room: float = 0.25
     stiffness: float = 8.0
@@ -170,21 +205,45 @@ class Backlash(ContactModel):
 
 
 def test_a_backlash_pair_follows_its_piecewise_linear_closed_form():
-    motion = simulate(System(model=Backlash()), x=0.0, y=0.0, velocity=(-0.2, 0.8), duration=150.0, tol=1e-15)
-    free, pressed = 2 * 0.25 / 1.0, math.pi / 4.0  # across the room with the speed 1, and half a period of sqrt(2 k) = 4
-    times = np.cumsum([free / 2, *itertools.islice(itertools.cycle((pressed, free)), len(motion.events) - 1)])
+    motion = simulate(
+        System(model=Backlash()), x=0.0, y=0.0, velocity=(-0.2, 0.8), duration=150.0, tol=1e-15
+    )
+    # across the room with the speed 1, and half a period of sqrt(2 k) = 4
+    free, pressed = 2 * 0.25 / 1.0, math.pi / 4.0
+    times = np.cumsum(
+        [free / 2, *itertools.islice(itertools.cycle((pressed, free)), len(motion.events) - 1)]
+    )
     assert len(motion.events) > 200
     np.testing.assert_allclose(motion.events.times, times, rtol=0, atol=1e-11)
-    assert [event.contact for event in motion.events[:5]] == ["right", "right", "left", "left", "right"]
+    assert [event.contact for event in motion.events[:5]] == [
+        "right",
+        "right",
+        "left",
+        "left",
+        "right",
+    ]
     np.testing.assert_allclose((motion.x + motion.y) / 2, 0.3 * 150.0, rtol=0, atol=1e-11)
 
 
 def model_of(force, surfaces, contacts=(), names=("x",)):
-    space = {"coordinates": names, "channels": ("force",), "surfaces": surfaces, "contacts": contacts, "force": force}
-    return dataclasses.make_dataclass("Made", [], bases=(ContactModel,), namespace=space, frozen=True)()
+    space = {
+        "coordinates": names,
+        "channels": ("force",),
+        "surfaces": surfaces,
+        "contacts": contacts,
+        "force": force,
+    }
+    return dataclasses.make_dataclass(
+        "Made", [], bases=(ContactModel,), namespace=space, frozen=True
+    )()
 
 
-WELL = System(model=model_of(lambda self, t, x, v, load, sides: -2.0 * sides.middle, (Surface(name="middle", coordinate="x"),)))
+WELL = System(
+    model=model_of(
+        lambda self, t, x, v, load, sides: -2.0 * sides.middle,
+        (Surface(name="middle", coordinate="x"),),
+    )
+)
 
 
 def test_a_force_that_turns_its_sign_swings_as_a_fall_does():
@@ -214,8 +273,15 @@ def test_a_start_at_rest_on_a_surface_follows_the_field_or_is_refused():
 
 def test_a_start_at_rest_on_a_surface_from_which_both_sides_lead_away_is_refused():
     """x'' = s goes to +inf or to -inf from there; beside it, and with a speed, it is unique."""
-    system = System(model=model_of(lambda self, t, x, v, load, sides: sides.ridge, (Surface(name="ridge", coordinate="x"),)))
-    with pytest.raises(saltus.MotionError, match="both lead away from it, so that it is not unique; start beside it"):
+    system = System(
+        model=model_of(
+            lambda self, t, x, v, load, sides: sides.ridge, (Surface(name="ridge", coordinate="x"),)
+        )
+    )
+    with pytest.raises(
+        saltus.MotionError,
+        match="both lead away from it, so that it is not unique; start beside it",
+    ):
         simulate(system, x=0.0, duration=1.0)
     assert simulate(system, x=1e-12, duration=2.0).x == pytest.approx(2.0, abs=1e-11)
     assert simulate(system, x=-1e-12, duration=2.0).x == pytest.approx(-2.0, abs=1e-11)
@@ -225,12 +291,16 @@ def test_a_start_at_rest_on_a_surface_from_which_both_sides_lead_away_is_refused
 def test_a_motion_that_only_touches_a_surface_stays_on_its_side():
     """x = cos t touches 1; the force beyond would throw it far away."""
     model = model_of(
-        lambda self, t, x, v, load, sides: -x - 50.0 * (1.0 + sides.top), (Surface(name="top", coordinate="x", position=1.0),)
+        lambda self, t, x, v, load, sides: -x - 50.0 * (1.0 + sides.top),
+        (Surface(name="top", coordinate="x", position=1.0),),
     )
     motion = simulate(System(model=model), x=0.0, velocity=1.0 - 1e-9, duration=30.0)
     assert not len(motion.events)
     assert motion.x == pytest.approx((1.0 - 1e-9) * math.sin(30.0), abs=1e-12)
-    assert simulate(System(model=model), x=0.0, velocity=1.0 + 1e-9, duration=30.0).events[0].contact == "top"
+    assert (
+        simulate(System(model=model), x=0.0, velocity=1.0 + 1e-9, duration=30.0).events[0].contact
+        == "top"
+    )
 
 
 def test_contacts_and_surfaces_act_in_one_motion():
@@ -243,7 +313,10 @@ def test_contacts_and_surfaces_act_in_one_motion():
     motion = simulate(System(model=model, impact=NewtonImpact(e=0.5)), x=3.0, duration=3.4)
     down = math.sqrt(10.0)  # the speed at the floor: 2 g h = 4 + 6
     times = [2.0, 2.0 + (down - 2.0) / 3.0]
-    assert [(str(event.kind), event.contact) for event in motion.events[:2]] == [("crossing", "half"), ("impact", "floor")]
+    assert [(str(event.kind), event.contact) for event in motion.events[:2]] == [
+        ("crossing", "half"),
+        ("impact", "floor"),
+    ]
     np.testing.assert_allclose(motion.events.times[:2], times, rtol=0, atol=1e-12)
     assert motion.events[1].velocity_after[0] == pytest.approx(down / 2.0, abs=1e-12)
 
@@ -253,7 +326,10 @@ def test_surfaces_without_meaning_are_refused_when_the_system_is_made():
         return -x
 
     side = Surface(name="a", coordinate="x")
-    with pytest.raises(saltus.ParameterError, match="force must take the arguments self, t, theta, velocity, load, sides"):
+    with pytest.raises(
+        saltus.ParameterError,
+        match="force must take the arguments self, t, theta, velocity, load, sides",
+    ):
         System(model=model_of(two, (side,)))
 
     def reads(self, t, x, v, load, sides):
@@ -270,7 +346,12 @@ def test_surfaces_without_meaning_are_refused_when_the_system_is_made():
     with pytest.raises(saltus.ParameterError, match="must have names of their own"):
         System(model=model_of(reads, (side, side)))
     with pytest.raises(saltus.ParameterError, match="7 frictions and surfaces, and at most 6"):
-        System(model=model_of(reads, tuple(Surface(name=f"a{i}", coordinate="x", position=float(i)) for i in range(7))))
+        System(
+            model=model_of(
+                reads,
+                tuple(Surface(name=f"a{i}", coordinate="x", position=float(i)) for i in range(7)),
+            )
+        )
     with pytest.raises(saltus.ParameterError, match="the sign of the surface 'a'"):
         Surface(name="a", coordinate="x", sign=0)
     assert WELL.mirrored() is None

@@ -1,4 +1,6 @@
-"""The tangent's expressions, evaluated as they stand, against differences of the jump that they linearise."""
+"""The tangent's expressions, evaluated as they stand, against differences of the jump that they
+linearise.
+"""
 
 import math
 
@@ -25,12 +27,26 @@ from saltus.taylor.graph import Expr, differentiate, ordered
 
 WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # central differences of order 8
 STEP = 2e-3
-COMPARE = {"greater": np.greater, "less": np.less, "greater_equal": np.greater_equal, "less_equal": np.less_equal}
-NUMPY = {"add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "pow": np.power, **COMPARE}
+COMPARE = {
+    "greater": np.greater,
+    "less": np.less,
+    "greater_equal": np.greater_equal,
+    "less_equal": np.less_equal,
+}
+NUMPY = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "div": np.divide,
+    "pow": np.power,
+    **COMPARE,
+}
 
 
 def value(root, leaves):
-    """An expression's number, node by node with NumPy; `leaves` gives (operation, index) or (operation) its number."""
+    """An expression's number, node by node with NumPy; `leaves` gives (operation, index) or
+    (operation) its number.
+    """
     made = {}
     for node in ordered([root]):
         if node.op == "number":
@@ -41,7 +57,9 @@ def value(root, leaves):
             condition, yes, no = (made[a] for a in node.args)
             made[node] = yes if condition else no
         else:
-            made[node] = NUMPY.get(node.op, getattr(np, node.op, None))(*(made[a] for a in node.args))
+            made[node] = NUMPY.get(node.op, getattr(np, node.op, None))(
+                *(made[a] for a in node.args)
+            )
     return float(made[root])
 
 
@@ -50,7 +68,9 @@ def difference(function):
 
 
 LAYERS = System(
-    model=Metainterface(beta0=1.3, damping=0.2, mass_ratio=0.4, stiffness_ratio=0.8, dissipation_ratio=1.3),
+    model=Metainterface(
+        beta0=1.3, damping=0.2, mass_ratio=0.4, stiffness_ratio=0.8, dissipation_ratio=1.3
+    ),
     load=Load(
         frequency=0.9,
         horizontal=Harmonic(0.4, phase=0.3),
@@ -66,10 +86,23 @@ WALL = System(
     impact=VelocityReduction(0.8),
 )
 BLOCK = System(
-    model=RockingBlock(alpha=0.3), load=Load(frequency=2.0, ground_horizontal=Harmonic(0.2)), impact=VelocityReduction(0.9)
+    model=RockingBlock(alpha=0.3),
+    load=Load(frequency=2.0, ground_horizontal=Harmonic(0.2)),
+    impact=VelocityReduction(0.9),
 )
 CASES = {
-    "layers": (LAYERS, 1, -0.9, ("load.frequency", "model.beta0", "model.mass_ratio", "impact.r", "load.ground_vertical.phase")),
+    "layers": (
+        LAYERS,
+        1,
+        -0.9,
+        (
+            "load.frequency",
+            "model.beta0",
+            "model.mass_ratio",
+            "impact.r",
+            "load.ground_vertical.phase",
+        ),
+    ),
     "layers from above": (LAYERS, -1, 0.9, ("load.frequency", "model.beta0", "model.damping")),
     "wall": (WALL, 1, 0.6, ("load.frequency", "model.wall", "model.stiffness", "impact.e")),
     "block": (BLOCK, -1, 0.5, ("load.frequency", "model.alpha", "impact.e")),
@@ -77,9 +110,11 @@ CASES = {
 
 
 def jump(system, side, t, state):
-    """A state near an impact on the old side's arc, carried to the impact, through it and back to `t` on the new side's arc.
+    """A state near an impact on the old side's arc, carried to the impact, through it and back to
+    `t` on the new side's arc.
 
-    To first order in the distance from the impact an arc is one of constant acceleration, that at the impact.
+    To first order in the distance from the impact an arc is one of constant acceleration, that at
+    the impact.
     """
     model, load = system.model, system.load
     q, v = state
@@ -100,7 +135,9 @@ def columns(system, side, t, before, paths):
     yield difference(lambda d: jump(system, side, t, (contact + d, before)))
     yield difference(lambda d: jump(system, side, t, (contact, before + d)))
     for path in paths:
-        yield difference(lambda d, p=path: jump(system.with_({p: system.get(p) + d}), side, t, (contact, before)))
+        yield difference(
+            lambda d, p=path: jump(system.with_({p: system.get(p) + d}), side, t, (contact, before))
+        )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -116,7 +153,10 @@ def test_the_saltation_is_the_derivative_of_the_jump(name):
     for j, expected in enumerate(columns(system, side, t, before, paths)):
         (u,), (z,) = traced.tangent_leaves(j)
         start = {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
-        computed = [value(part[j], leaves | start) for part in (jumps.coordinate, jumps.velocity, jumps.shift)]
+        computed = [
+            value(part[j], leaves | start)
+            for part in (jumps.coordinate, jumps.velocity, jumps.shift)
+        ]
         np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-9, err_msg=f"column {j}")
 
 
@@ -132,15 +172,24 @@ def test_the_determinant_of_the_saltation_is_that_of_the_law(name):
     matrix = np.zeros((2, 2))
     for j in (0, 1):
         (u,), (z,) = traced.tangent_leaves(j)
-        start = leaves | {("coordinate", u.value): float(j == 0), ("velocity", z.value): float(j == 1)}
+        start = leaves | {
+            ("coordinate", u.value): float(j == 0),
+            ("velocity", z.value): float(j == 1),
+        }
         matrix[:, j] = value(jumps.coordinate[j], start), value(jumps.velocity[j], start)
     after = system.model.reset(0.4, before, side, system.load, system.impact)[1]
-    slope = difference(lambda d: np.float64(system.model.reset(0.4, before + d, side, system.load, system.impact)[1]))
+    slope = difference(
+        lambda d: np.float64(
+            system.model.reset(0.4, before + d, side, system.load, system.impact)[1]
+        )
+    )
     assert np.linalg.det(matrix) == pytest.approx(slope * after / before, rel=1e-10)
 
 
 def test_the_series_of_the_columns_are_those_of_the_differences():
-    """Of two coordinates: the Taylor coefficients of u are the derivatives of the coordinates' coefficients."""
+    """Of two coordinates: the Taylor coefficients of u are the derivatives of the coordinates'
+    coefficients.
+    """
     system = paired(0.3, 0.9)
     position, velocity, order = np.array([0.3, -0.5]), np.array([0.7, 0.2]), 8
     own = Generated(system)
@@ -150,13 +199,19 @@ def test_the_series_of_the_columns_are_those_of_the_differences():
     np.testing.assert_array_equal(computed[:2], own.coefficients(0.4, position, velocity, order))
     for j in range(4):
         dq, dv = np.eye(4)[j, :2], np.eye(4)[j, 2:]
-        expected = difference(lambda d, dq=dq, dv=dv: own.coefficients(0.4, position + d * dq, velocity + d * dv, order))
+        expected = difference(
+            lambda d, dq=dq, dv=dv: own.coefficients(
+                0.4, position + d * dq, velocity + d * dv, order
+            )
+        )
         np.testing.assert_allclose(computed[2 + 2 * j : 4 + 2 * j], expected, rtol=1e-8, atol=1e-8)
 
 
 def test_the_rate_of_a_record_is_its_next_row():
     record = Record(np.linspace(0.0, 4.0, 9), np.cos(np.linspace(0.0, 4.0, 9)), quantity="velocity")
-    system = System(model=Metainterface(beta0=1.3), load=Load(ground_horizontal=record, vertical=-0.5))
+    system = System(
+        model=Metainterface(beta0=1.3), load=Load(ground_horizontal=record, vertical=-0.5)
+    )
     traced = trace(system, (), ())
     assert traced.records == [("load.ground_horizontal", 2), ("load.ground_horizontal", 3)]
     breaks, table = record_table(system, traced.records)
@@ -173,7 +228,9 @@ def test_an_exponent_that_varies_has_its_own_term():
     """d(x^p)/dp = x^p log x."""
     x, p = Expr("coordinate", (), 0), Expr("parameter", (), 0)
     leaves = {("coordinate", 0): 1.7, ("parameter", 0): 2.3}
-    assert value(differentiate(x**p, p), leaves) == pytest.approx(1.7**2.3 * math.log(1.7), rel=1e-14)
+    assert value(differentiate(x**p, p), leaves) == pytest.approx(
+        1.7**2.3 * math.log(1.7), rel=1e-14
+    )
     assert value(differentiate(x**p, x), leaves) == pytest.approx(2.3 * 1.7**1.3, rel=1e-14)
 
 

@@ -11,12 +11,17 @@ import pytest
 import saltus
 
 MOST_FILES = 10
-# A peak: the first coordinate has a maximum on a smooth arc. In each file, what is put behind which of its lines.
+# A peak: the first coordinate has a maximum on a smooth arc. In each file, what is put behind which
+# of its lines.
 PEAK = {
     "flow/kernel/layout.py": {
-        "    CROSSING = 10\n    RESET_SLOPES = 11": "    CROSSING = 10\n    PEAK = 11\n    RESET_SLOPES = 12"
+        "    CROSSING = 10\n    RESET_SLOPES = 11": (
+            "    CROSSING = 10\n    PEAK = 11\n    RESET_SLOPES = 12"
+        )
     },
-    "flow/motion/events.py": {'    CROSSING = "crossing"': '    CROSSING = "crossing"\n    PEAK = "peak"\n    # once'},
+    "flow/motion/events.py": {
+        '    CROSSING = "crossing"': '    CROSSING = "crossing"\n    PEAK = "peak"\n    # once'
+    },
     "flow/one_contact/kernel.py": {
         "    tau = first * h if hit >= 0 else h\n": """\
     tau = first * h if hit >= 0 else h
@@ -76,7 +81,9 @@ def changed():
 
 
 def test_a_new_kind_of_event_takes_few_files():
-    """The files are those of the dry run below, and each still has the lines behind which it puts something."""
+    """The files are those of the dry run below, and each still has the lines behind which it puts
+    something.
+    """
     assert len(PEAK) <= MOST_FILES
     for name, text in changed():
         compile(text, name, "exec")
@@ -85,9 +92,19 @@ def test_a_new_kind_of_event_takes_few_files():
 @pytest.mark.thorough
 def test_a_new_kind_of_event_comes_from_the_kernel_to_a_plot(tmp_path):
     """x'' = -x from x = 0, x' = 1 is sin t, whose maxima are at pi/2 + 2 pi n."""
-    shutil.copytree(Path(saltus.__file__).parent, tmp_path / "saltus", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(saltus.__file__).parent,
+        tmp_path / "saltus",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
     for name, text in changed():
         (tmp_path / "saltus" / name).write_text(text)
     command = [sys.executable, "-c", MOTION, str(tmp_path)]
-    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.stdout == "3 peaks\n", done.stderr

@@ -1,4 +1,6 @@
-"""Series whose last coefficients vanish by symmetry: the step must not go as far as the terms that are not there."""
+"""Series whose last coefficients vanish by symmetry: the step must not go as far as the terms that
+are not there.
+"""
 
 import math
 from dataclasses import dataclass
@@ -27,14 +29,17 @@ class Odd(Model):
 def lemniscate(time):
     """x of x'' = -x^3 from x = 0, x' = 1, by the lemniscate sine."""
     with mp.workdps(30):
-        # x'^2 = 1 - x^4/2: x = a sl(t / a) with a = 2^(1/4) and sl the lemniscate sine, sl(u) = sd(sqrt(2) u, 1/2) / sqrt(2)
+        # x'^2 = 1 - x^4/2: x = a sl(t / a) with a = 2^(1/4) and sl the lemniscate sine, sl(u) =
+        # sd(sqrt(2) u, 1/2) / sqrt(2)
         a = mp.mpf(2) ** mp.mpf("0.25")
         return float(a * mp.ellipfun("sd", mp.sqrt(2) * time / a, m=mp.mpf("0.5")) / mp.sqrt(2))
 
 
 @pytest.mark.parametrize("digits", range(6, 16))
 def test_a_cubic_oscillator_through_zero_follows_the_lemniscate_at_every_tolerance(digits):
-    motion = simulate(System(model=Odd(cubic=1.0)), x=0.0, velocity=1.0, duration=5.0, tol=10.0**-digits)
+    motion = simulate(
+        System(model=Odd(cubic=1.0)), x=0.0, velocity=1.0, duration=5.0, tol=10.0**-digits
+    )
     assert motion.x == pytest.approx(lemniscate(5.0), abs=10 * 10.0**-digits + 1e-14)
 
 
@@ -42,7 +47,13 @@ def test_a_cubic_oscillator_through_zero_follows_the_lemniscate_at_every_toleran
 @pytest.mark.parametrize("linear", [0.0, 1e-12, 1e-6, 1e-3, 1.0])
 @pytest.mark.parametrize("power", ["cubic", "quintic"])
 def test_odd_oscillators_keep_their_energy_from_zero_at_every_tolerance(digits, linear, power):
-    motion = simulate(System(model=Odd(linear=linear, **{power: 1.0})), x=0.0, velocity=1.0, duration=20.0, tol=10.0**-digits)
+    motion = simulate(
+        System(model=Odd(linear=linear, **{power: 1.0})),
+        x=0.0,
+        velocity=1.0,
+        duration=20.0,
+        tol=10.0**-digits,
+    )
     degree = 4 if power == "cubic" else 6
     energy = motion.velocity**2 / 2 + linear * motion.x**2 / 2 + motion.x**degree / degree
     assert energy == pytest.approx(0.5, abs=30 * 10.0**-digits + 2e-14)

@@ -1,11 +1,15 @@
-"""The wall oscillator x'' + c x' + k x = A cos(w t), v+ = -e v- at x = d: its motion with one impact per period, in closed form.
+"""The wall oscillator x'' + c x' + k x = A cos(w t), v+ = -e v- at x = d: its motion with one
+impact per period, in closed form.
 
-Let the impacts be at t0 + n T, T = 2 pi / w, each with speed v > 0 before it. On [0, T], s = t - t0, the motion is p(s) + y(s):
+Let the impacts be at t0 + n T, T = 2 pi / w, each with speed v > 0 before it. On [0, T], s = t -
+t0, the motion is p(s) + y(s):
 
-* p(s) = P cos(w s + a), P = A / sqrt((k - w^2)^2 + c^2 w^2), the steady response, with a = w t0 - atan2(c w, k - w^2);
+* p(s) = P cos(w s + a), P = A / sqrt((k - w^2)^2 + c^2 w^2), the steady response, with a = w t0 -
+  atan2(c w, k - w^2);
 * y(s) = exp(-c s / 2) (D cos n s + B sin n s), n^2 = k - c^2 / 4, the free part.
 
-Since p has the period T, the conditions x = d at both ends, x'(0) = -e v and x'(T) = v are a linear two-point problem for y:
+Since p has the period T, the conditions x = d at both ends, x'(0) = -e v and x'(T) = v are a linear
+two-point problem for y:
 
     y(0) = y(T) = D = d - p(0),  y'(0) = -e v - p'(0),  y'(T) = v - p'(0).
 
@@ -13,12 +17,13 @@ y(T) = D gives B = D (exp(c T / 2) - cos n T) / sin n T, hence y'(0) = g0 D, y'(
 
     g0 = -c/2 + n B/D,  g1 = -c/2 + n exp(-c T / 2) ((B/D) cos n T - sin n T),
 
-and the difference of the last two conditions is D = q v, q = (1 + e) / (g1 - g0). So p(0) = d - q v, p'(0) = -(e + g0 q) v and
-p(0)^2 + (p'(0) / w)^2 = P^2 is a quadratic in the impact speed,
+and the difference of the last two conditions is D = q v, q = (1 + e) / (g1 - g0). So p(0) = d - q
+v, p'(0) = -(e + g0 q) v and p(0)^2 + (p'(0) / w)^2 = P^2 is a quadratic in the impact speed,
 
     (q^2 + (e + g0 q)^2 / w^2) v^2 - 2 d q v + d^2 - P^2 = 0;
 
-the phase follows from P cos a = p(0), -w P sin a = p'(0). A root is a motion if v > 0 and x < d between the impacts.
+the phase follows from P cos a = p(0), -w P sin a = p'(0). A root is a motion if v > 0 and x < d
+between the impacts.
 """
 
 import math
@@ -31,7 +36,9 @@ from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscill
 
 
 def one_impact_orbits(*, A, w, k=1.0, c=0.1, d=1.0, e=0.8):
-    """(impact speed, w t0 in [0, 2 pi)) of each root of the quadratic with v > 0 and x < d between the impacts."""
+    """(impact speed, w t0 in [0, 2 pi)) of each root of the quadratic with v > 0 and x < d between
+    the impacts.
+    """
     T, n, P = 2 * math.pi / w, math.sqrt(k - c * c / 4), A / math.hypot(k - w * w, c * w)
     ratio = (math.exp(c * T / 2) - math.cos(n * T)) / math.sin(n * T)
     g0 = -c / 2 + n * ratio
@@ -54,7 +61,9 @@ def one_impact_orbits(*, A, w, k=1.0, c=0.1, d=1.0, e=0.8):
 def oscillator(*, A, w, k=1.0, c=0.1, d=1.0, e=0.8):
     """F = A cos(w t), as a sine of phase pi / 2."""
     load = Load(frequency=w, force=Harmonic(amplitude=A, phase=math.pi / 2))
-    return System(model=WallOscillator(stiffness=k, damping=c, wall=d), load=load, impact=VelocityReduction(e))
+    return System(
+        model=WallOscillator(stiffness=k, damping=c, wall=d), load=load, impact=VelocityReduction(e)
+    )
 
 
 def test_the_steady_impacts_have_the_speed_and_the_phase_of_the_closed_form():
@@ -83,10 +92,19 @@ def test_a_start_on_a_closed_form_orbit_returns_after_each_period(numbers):
     for speed, phase in orbits:
         w, d, e = numbers["w"], numbers.get("d", 1.0), numbers.get("e", 0.8)
         start = phase / w
-        motion = simulate(oscillator(**numbers), x=d, velocity=-e * speed, time=start, duration=2.5 * 2 * math.pi / w, tol=1e-15)
+        motion = simulate(
+            oscillator(**numbers),
+            x=d,
+            velocity=-e * speed,
+            time=start,
+            duration=2.5 * 2 * math.pi / w,
+            tol=1e-15,
+        )
         assert len(motion.impacts) == 2
         np.testing.assert_allclose(motion.impacts.velocity_before, speed, atol=2e-12)
-        np.testing.assert_allclose(motion.impacts.time - start, np.array([1, 2]) * 2 * math.pi / w, atol=2e-12)
+        np.testing.assert_allclose(
+            motion.impacts.time - start, np.array([1, 2]) * 2 * math.pi / w, atol=2e-12
+        )
 
 
 def test_a_start_into_the_wall_begins_with_its_impact():
@@ -98,8 +116,14 @@ def test_a_start_into_the_wall_begins_with_its_impact():
 
 def test_before_any_impact_the_motion_is_that_of_the_linear_oscillator():
     A, w, k, c = 0.2, 1.3, 1.1, 0.15
-    motion = simulate(oscillator(A=A, w=w, k=k, c=c, d=50.0), x=0.4, velocity=-0.3, duration=40.0, tol=1e-15)
-    P, lag, n = A / math.hypot(k - w * w, c * w), math.atan2(c * w, k - w * w), math.sqrt(k - c * c / 4)
+    motion = simulate(
+        oscillator(A=A, w=w, k=k, c=c, d=50.0), x=0.4, velocity=-0.3, duration=40.0, tol=1e-15
+    )
+    P, lag, n = (
+        A / math.hypot(k - w * w, c * w),
+        math.atan2(c * w, k - w * w),
+        math.sqrt(k - c * c / 4),
+    )
     D = 0.4 - P * math.cos(lag)
     B = (-0.3 - w * P * math.sin(lag) + c / 2 * D) / n
     t = np.linspace(0, 40, 333)

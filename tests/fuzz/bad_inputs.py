@@ -8,10 +8,57 @@ import random
 import tomli_w
 
 VALUES = (
-    *(0, 1, -1, 2, 0.5, -0.0, 1e-320, 1e22, 1e308, -1e308, 2**63 - 1, 2**64, math.nan, math.inf, -math.inf, True, False),
-    *("", "a", "80 deg", "[red]", "[/]", "$x_", "\x1b[2J", "é" * 300, "self", "__class__", "../../etc/passwd", "load.frequency"),
-    *([], [1], [1, 2], [2, 1], [[0, 1], [0, 1]], [math.nan], ["a"], {}, {"self": 1}, {"from": 0, "to": 1, "count": 2}),
-    *({"from": 0, "to": 1, "count": 1e9}, {"amplitude": 1e308}, {"type": "Metainterface"}, {"time": [0, 1], "value": [0, 1]}),
+    *(
+        0,
+        1,
+        -1,
+        2,
+        0.5,
+        -0.0,
+        1e-320,
+        1e22,
+        1e308,
+        -1e308,
+        2**63 - 1,
+        2**64,
+        math.nan,
+        math.inf,
+        -math.inf,
+        True,
+        False,
+    ),
+    *(
+        "",
+        "a",
+        "80 deg",
+        "[red]",
+        "[/]",
+        "$x_",
+        "\x1b[2J",
+        "é" * 300,
+        "self",
+        "__class__",
+        "../../etc/passwd",
+        "load.frequency",
+    ),
+    *(
+        [],
+        [1],
+        [1, 2],
+        [2, 1],
+        [[0, 1], [0, 1]],
+        [math.nan],
+        ["a"],
+        {},
+        {"self": 1},
+        {"from": 0, "to": 1, "count": 2},
+    ),
+    *(
+        {"from": 0, "to": 1, "count": 1e9},
+        {"amplitude": 1e308},
+        {"type": "Metainterface"},
+        {"time": [0, 1], "value": [0, 1]},
+    ),
 )
 STUDY = {
     "model": {"type": "Metainterface", "beta0": 1.4, "damping": 0.1},
@@ -20,7 +67,12 @@ STUDY = {
     "simulate": {"theta": 0.3, "periods": 3},
     "bifurcation_diagram": {"path": "load.frequency", "bounds": [0.5, 1.0], "starts": 4, "seed": 1},
     "attractors": {"starts": 4, "seed": 1, "max_period": 2},
-    "stability_chart": {"horizontal": [0.1, 0.2], "vertical": [-0.5, -0.4], "starts": 2, "periods": 40},
+    "stability_chart": {
+        "horizontal": [0.1, 0.2],
+        "vertical": [-0.5, -0.4],
+        "starts": 2,
+        "periods": 40,
+    },
 }
 NAMES = (
     *[
@@ -47,7 +99,9 @@ NAMES = (
 
 
 def mutated(rng: random.Random, tree, times: int):
-    """A tree of dicts and lists with so many changes: a value replaced, a key renamed, added or left out."""
+    """A tree of dicts and lists with so many changes: a value replaced, a key renamed, added or
+    left out.
+    """
     tree = copy.deepcopy(tree)
     for _ in range(times):
         place = tree
@@ -77,10 +131,16 @@ def damaged(rng: random.Random, content: bytes) -> bytes:
     part = slice(start, start + length)
     change = rng.randrange(5)
     if change == 0:
-        return content[:start] + bytes([content[start] ^ 1 << rng.randrange(8)]) + content[start + 1 :]
+        return (
+            content[:start] + bytes([content[start] ^ 1 << rng.randrange(8)]) + content[start + 1 :]
+        )
     if change == 1:
         return content[:start]
-    new = (bytes(len(content[part])), content[part] * 2, rng.randbytes(min(length, len(content) - start)))[change - 2]
+    new = (
+        bytes(len(content[part])),
+        content[part] * 2,
+        rng.randbytes(min(length, len(content) - start)),
+    )[change - 2]
     return content[:start] + new + content[part.stop :]
 
 
@@ -94,7 +154,15 @@ def record(rng: random.Random) -> bytes:
     """A record of a few samples that is wrong in a few places."""
     separator = rng.choice((",", ";", "\t", " ", ", "))
     rows = [
-        [str(i), str(rng.choice((0.5, -1, 1e308, "nan", "1,5", "x", "", '"2"')) if rng.random() < 0.2 else i)] for i in range(6)
+        [
+            str(i),
+            str(
+                rng.choice((0.5, -1, 1e308, "nan", "1,5", "x", "", '"2"'))
+                if rng.random() < 0.2
+                else i
+            ),
+        ]
+        for i in range(6)
     ]
     if rng.random() < 0.3:
         rows[rng.randrange(6)].append("7")
@@ -106,7 +174,9 @@ def record(rng: random.Random) -> bytes:
 
 def system_json(rng: random.Random) -> str:
     """The JSON of a system that is wrong in a few places, or whose text is."""
-    tree = mutated(rng, {name: STUDY[name] for name in ("model", "load", "impact")}, rng.randrange(1, 4))
+    tree = mutated(
+        rng, {name: STUDY[name] for name in ("model", "load", "impact")}, rng.randrange(1, 4)
+    )
     text = json.dumps(tree)
     if rng.random() < 0.3:
         text = damaged(rng, text.encode()).decode("utf-8", "replace")

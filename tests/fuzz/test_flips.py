@@ -1,6 +1,7 @@
 """Single flipped bits in files of every kind: each is noticed, or what is read is as it was.
 
-50 bits of each kind in each test run, in `make thorough` 1500, or as many as SALTUS_FLIPS says; the same in every run.
+50 bits of each kind in each test run, in `make thorough` 1500, or as many as SALTUS_FLIPS says; the
+same in every run.
 """
 
 import os
@@ -18,7 +19,13 @@ from saltus.sweep import open_store, status
 from saltus.systems import System
 
 SYSTEM = {name: bad_inputs.STUDY[name] for name in ("model", "load")}
-CHART = {"horizontal": [0.1, 0.2, 0.3], "vertical": [-0.5, -0.4], "starts": 2, "periods": 40, "rows": 1}
+CHART = {
+    "horizontal": [0.1, 0.2, 0.3],
+    "vertical": [-0.5, -0.4],
+    "starts": 2,
+    "periods": 40,
+    "rows": 1,
+}
 KINDS = ("chart", "diagram", "netcdf", "study")
 THOROUGH = int(os.environ.get("SALTUS_FLIPS", "1500"))
 
@@ -29,7 +36,9 @@ class Computed(BaseException):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A study, the store of its chart, the store of a diagram with its parts, and the diagram's netCDF file."""
+    """A study, the store of its chart, the store of a diagram with its parts, and the diagram's
+    netCDF file.
+    """
     from saltus.cli.run_command import run_study
 
     folder = tmp_path_factory.mktemp("results")
@@ -37,7 +46,9 @@ def results(tmp_path_factory):
     run_study(folder / "study.toml", folder / "out", False, None)
     system = System.from_dict(SYSTEM)
     asked = {"effort": "quick", "max_period": 1, "values": [0.98, 1.02], "starts": 2}
-    diagram = response_spectrum(system, "load.frequency", (0.95, 1.05), **asked, store=folder / "diagram.zarr")
+    diagram = response_spectrum(
+        system, "load.frequency", (0.95, 1.05), **asked, store=folder / "diagram.zarr"
+    )
     write_dataset(folder / "diagram.nc", diagram)
     return folder
 
@@ -47,16 +58,24 @@ def files_of(kind, folder):
     single = {"netcdf": folder / "diagram.nc", "study": folder / "study.toml"}
     if kind in single:
         return [single[kind]]
-    store = {"chart": folder / "out" / "stability_chart.zarr", "diagram": folder / "diagram.zarr"}[kind]
+    store = {"chart": folder / "out" / "stability_chart.zarr", "diagram": folder / "diagram.zarr"}[
+        kind
+    ]
     return sorted(file for file in store.rglob("*") if file.is_file())
 
 
 def home_of(kind, folder, file):
-    """What a file is read as part of: itself, a store, or of a diagram's search a part of its store."""
+    """What a file is read as part of: itself, a store, or of a diagram's search a part of its
+    store.
+    """
     if kind in ("netcdf", "study"):
         return file
     homes = ("parts", "out", folder.name)
-    return next(place for place in file.parents if (place / "zarr.json").is_file() and place.parent.name in homes)
+    return next(
+        place
+        for place in file.parents
+        if (place / "zarr.json").is_file() and place.parent.name in homes
+    )
 
 
 def content_of(kind, folder, home):
@@ -77,7 +96,9 @@ def content_of(kind, folder, home):
 
 
 def asked_again(folder):
-    """The chart that the study gives where its store is there: that store's, or a refusal; another one would be computed."""
+    """The chart that the study gives where its store is there: that store's, or a refusal; another
+    one would be computed.
+    """
     from saltus.cli.run_command import run_study
 
     run_study(folder / "study.toml", folder / "out", False, None)
@@ -110,7 +131,9 @@ def test_a_flipped_bit_is_noticed_or_harmless(results, tmp_path, monkeypatch, ki
         except SaltusError:
             told["noticed"] += 1
         else:
-            assert read.identical(good[homes[file]]), f"case {case}: bit {place} of {file} is read in silence"
+            assert read.identical(good[homes[file]]), (
+                f"case {case}: bit {place} of {file} is read in silence"
+            )
             told["harmless"] += 1
         file.write_bytes(content)
     print(kind, told)  # the counts, with -s

@@ -1,7 +1,8 @@
-"""Whatever is given, the answer is a result or one sentence: no traceback, no file left, no work begun that has no bounds.
+"""Whatever is given, the answer is a result or one sentence: no traceback, no file left, no work
+begun that has no bounds.
 
-The cases are the same in every run: 200 of each kind, and in `make thorough` 100 000 in all, or as many of each kind as
-SALTUS_CASES says, in four pieces with a seed each.
+The cases are the same in every run: 200 of each kind, and in `make thorough` 100 000 in all, or as
+many of each kind as SALTUS_CASES says, in four pieces with a seed each.
 """
 
 import os
@@ -17,7 +18,10 @@ from saltus.errors import SaltusError
 from saltus.systems import System
 
 THOROUGH = int(os.environ.get("SALTUS_CASES", "20000"))
-PIECES = [(200, 0), *(pytest.param(THOROUGH // 4, piece, marks=pytest.mark.thorough) for piece in range(1, 5))]
+PIECES = [
+    (200, 0),
+    *(pytest.param(THOROUGH // 4, piece, marks=pytest.mark.thorough) for piece in range(1, 5)),
+]
 LONGEST, SLOWEST, LARGEST = 400, 10.0, 2e9  # characters, seconds, bytes
 
 
@@ -50,12 +54,16 @@ def answer(case: int, ask, *given, **named) -> str | None:
     except Computed:
         sentence = None
     except Exception as error:
-        pytest.fail(f"case {case}: {type(error).__name__}: {error!s:.300} for {given!r:.300} {named!r:.300}")
+        pytest.fail(
+            f"case {case}: {type(error).__name__}: {error!s:.300} for {given!r:.300} {named!r:.300}"
+        )
     else:
         sentence = None
     assert sentence is None or len(sentence) < LONGEST, f"case {case}: {sentence}"
     assert time.process_time() - begun < SLOWEST, f"case {case}"
-    assert 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) < LARGEST, f"case {case}"
+    assert 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) < LARGEST, (
+        f"case {case}"
+    )
     return sentence
 
 
@@ -82,7 +90,10 @@ def test_bad_studies(tmp_path, nothing_is_computed, count, piece):
 def test_bad_records(tmp_path, count, piece):
     from saltus.config import load_study
 
-    text = '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nhorizontal = { file = "q.csv", quantity = "force" }\n'
+    text = (
+        '[model]\ntype = "Metainterface"\nbeta0 = 1.4\n[load]\nhorizontal = { file = "q.csv", '
+        'quantity = "force" }\n'
+    )
     (tmp_path / "study.toml").write_text(text)
     rng, refused = random.Random(f"records {piece}"), 0
     for case in range(count):
@@ -107,15 +118,22 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
     import tomli_w
 
-    asks = {"stability_chart": bad_inputs.STUDY["stability_chart"], "simulate": {"theta": 0.3, "periods": 2}}
-    (folder / "study.toml").write_text(tomli_w.dumps({name: bad_inputs.STUDY[name] for name in ("model", "load")} | asks))
+    asks = {
+        "stability_chart": bad_inputs.STUDY["stability_chart"],
+        "simulate": {"theta": 0.3, "periods": 2},
+    }
+    (folder / "study.toml").write_text(
+        tomli_w.dumps({name: bad_inputs.STUDY[name] for name in ("model", "load")} | asks)
+    )
     run_study(folder / "study.toml", folder, False, None)
     return folder
 
 
 @pytest.mark.parametrize(("count", "piece"), [(40, 0), *PIECES[1:]])
 def test_damaged_results(results, tmp_path, count, piece):
-    """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is as it was."""
+    """A file of a store or a netCDF file is damaged: `status` and `plot` say so, or what is read is
+    as it was.
+    """
     from saltus.config import open_result
     from saltus.sweep import status
 
@@ -132,7 +150,8 @@ def test_damaged_results(results, tmp_path, count, piece):
         read = []
         sentence = answer(case, lambda path=whole, into=read: into.append(open_result(path).load()))
         assert sentence is not None or not changed or file != motion, f"case {case}"
-        assert sentence is not None or read[0].identical(good[whole]), f"case {case}: {file}"  # a space in JSON, say
+        # a space in JSON, say
+        assert sentence is not None or read[0].identical(good[whole]), f"case {case}: {file}"
         if whole == store:
             answer(case, status, store)
             answer(case, status, store, verify=True)

@@ -3,10 +3,13 @@
 import pytest
 from orbit_cases import ORBITS, orbit_of
 
-ELSEWHERE = ("ground, restitution of energy", "a user's smooth model", "smoothed", "rocking block")  # each compiles for itself
+# each compiles for itself
+ELSEWHERE = ("ground, restitution of energy", "a user's smooth model", "smoothed", "rocking block")
 
 
-@pytest.fixture(params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in ORBITS])
+@pytest.fixture(
+    params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in ORBITS]
+)
 def name(request):
     """The name of a case."""
     return request.param

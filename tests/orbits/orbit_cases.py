@@ -1,4 +1,6 @@
-"""Systems of the orbit tests, few structures among them: what differs is numbers, and each structure is compiled once."""
+"""Systems of the orbit tests, few structures among them: what differs is numbers, and each
+structure is compiled once.
+"""
 
 import functools
 import math
@@ -31,8 +33,13 @@ CASES = {
 }
 
 
-def random_guess(rng: np.random.Generator, system: System, paths: tuple[str, ...], impacts: int, periods: int = 1):
-    """A problem and unknowns that solve nothing: the equations are smooth there as well. The last segment runs back in time."""
+def random_guess(
+    rng: np.random.Generator, system: System, paths: tuple[str, ...], impacts: int, periods: int = 1
+):
+    """A problem and unknowns that solve nothing: the equations are smooth there as well.
+
+    The last segment runs back in time.
+    """
     both = len(system.model.sides) == 2
     sides = tuple((-1) ** i if both else 1 for i in range(impacts))
     problem = OneContactEquations(system, Signature(sides, periods), paths)
@@ -47,7 +54,10 @@ def slope(function, x: np.ndarray, column: int, h: float = 2e-3) -> np.ndarray:
     """The derivative in one argument by central differences of sixth order."""
     step = np.zeros_like(x)
     step[column] = h
-    return sum(weight * (function(x + j * step) - function(x - j * step)) for j, weight in SIXTH_ORDER) / h
+    return (
+        sum(weight * (function(x + j * step) - function(x - j * step)) for j, weight in SIXTH_ORDER)
+        / h
+    )
 
 
 PAIRED_START = {"x": 0.3, "y": 0.1, "velocity": (0.0, 0.0)}

@@ -1,4 +1,6 @@
-"""Branches at random parameters of all models, a user's own among them, for tests of what holds on any branch."""
+"""Branches at random parameters of all models, a user's own among them, for tests of what holds on
+any branch.
+"""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +9,17 @@ from typing import Any, ClassVar
 import numpy as np
 from shared_systems import BETA80, forced, hinged, rocking, shaken, walled
 
-from saltus import Harmonic, Load, Metainterface, Model, OneContactModel, SaltusError, System, VelocityReduction, find_orbit
+from saltus import (
+    Harmonic,
+    Load,
+    Metainterface,
+    Model,
+    OneContactModel,
+    SaltusError,
+    System,
+    VelocityReduction,
+    find_orbit,
+)
 
 FREQUENCY = "load.frequency"
 
@@ -93,21 +105,31 @@ class ImpactDuffing(OneContactModel):
 def pushed(model, amplitude, frequency, e=1.0, mean=0.0):
     """A model of this file under a harmonic push."""
     push = Harmonic(amplitude=amplitude, mean=mean)
-    return System(model=model, load=Load(frequency=frequency, push=push), impact=VelocityReduction(e))
+    return System(
+        model=model, load=Load(frequency=frequency, push=push), impact=VelocityReduction(e)
+    )
 
 
 def swung(H=0.5, W=1.0, swing=0.25, e=1.0):
     """Load (iii) of the paper: horizontal and vertical forces."""
     vertical = Harmonic(mean=-0.5, amplitude=swing, phase=math.pi / 2)
     load = Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=vertical)
-    return System(model=Metainterface(beta0=BETA80, damping=0.1), load=load, impact=VelocityReduction(e))
+    return System(
+        model=Metainterface(beta0=BETA80, damping=0.1), load=load, impact=VelocityReduction(e)
+    )
 
 
 def metainterface(rng):
-    k, m, c = (1.0, 0.0, 1.0) if rng.random() < 0.6 else rng.uniform((0.7, 0.0, 0.7), (1.4, 0.4, 1.4))
+    k, m, c = (
+        (1.0, 0.0, 1.0) if rng.random() < 0.6 else rng.uniform((0.7, 0.0, 0.7), (1.4, 0.4, 1.4))
+    )
     e = 1.0 if rng.random() < 0.6 else rng.uniform(0.6, 1.0)
     H, W, V, C = rng.uniform((0.05, 0.3, -0.9, 0.05), (1.2, 2.5, -0.2, 0.3))
-    return forced(H, W, V, C, e, beta0=rng.uniform(0.9, 1.5), k=k, m=m, c=c), "load.horizontal.amplitude", 1.5
+    return (
+        forced(H, W, V, C, e, beta0=rng.uniform(0.9, 1.5), k=k, m=m, c=c),
+        "load.horizontal.amplitude",
+        1.5,
+    )
 
 
 def grounded(rng):
@@ -117,7 +139,11 @@ def grounded(rng):
 
 def both_forces(rng):
     H, W, swing = rng.uniform((0.1, 0.4, 0.05), (1.0, 2.5, 0.4))
-    return swung(H, W, swing, 1.0 if rng.random() < 0.5 else rng.uniform(0.7, 1.0)), "load.horizontal.amplitude", 1.5
+    return (
+        swung(H, W, swing, 1.0 if rng.random() < 0.5 else rng.uniform(0.7, 1.0)),
+        "load.horizontal.amplitude",
+        1.5,
+    )
 
 
 def block(rng):
@@ -132,7 +158,11 @@ def wall(rng):
 
 def hinge(rng):
     push, W, edge, e = rng.uniform((0.2, 0.5, -0.2, 0.7), (1.2, 2.0, 0.6, 1.0))
-    return hinged(push, W, edge, e).with_({"load.push.mean": rng.uniform(0.05, 0.2)}), "load.push.amplitude", 1.0
+    return (
+        hinged(push, W, edge, e).with_({"load.push.mean": rng.uniform(0.05, 0.2)}),
+        "load.push.amplitude",
+        1.0,
+    )
 
 
 def pendulum(rng):
@@ -141,13 +171,25 @@ def pendulum(rng):
 
 
 def duffing(rng):
-    push, W, damping, cubic, mean = rng.uniform((0.2, 0.3, 0.03, 0.3, -0.2), (8.0, 2.5, 0.3, 1.5, 0.2))
-    return pushed(Duffing(damping=damping, cubic=cubic), push, W, mean=mean), "load.push.amplitude", 12.0
+    push, W, damping, cubic, mean = rng.uniform(
+        (0.2, 0.3, 0.03, 0.3, -0.2), (8.0, 2.5, 0.3, 1.5, 0.2)
+    )
+    return (
+        pushed(Duffing(damping=damping, cubic=cubic), push, W, mean=mean),
+        "load.push.amplitude",
+        12.0,
+    )
 
 
 def bilinear(rng):
-    push, W, damping, edge, stiffness = rng.uniform((0.2, 0.4, 0.03, 0.1, 1.0), (1.5, 3.0, 0.2, 0.8, 9.0))
-    return pushed(Bilinear(damping=damping, edge=edge, stiffness=stiffness), push, W), "load.push.amplitude", 2.0
+    push, W, damping, edge, stiffness = rng.uniform(
+        (0.2, 0.4, 0.03, 0.1, 1.0), (1.5, 3.0, 0.2, 0.8, 9.0)
+    )
+    return (
+        pushed(Bilinear(damping=damping, edge=edge, stiffness=stiffness), push, W),
+        "load.push.amplitude",
+        2.0,
+    )
 
 
 def impact_duffing(rng):
@@ -155,7 +197,18 @@ def impact_duffing(rng):
     return pushed(ImpactDuffing(damping=damping, wall=at), push, W, e), "load.push.amplitude", 2.5
 
 
-MODELS = (metainterface, grounded, both_forces, block, wall, hinge, pendulum, duffing, bilinear, impact_duffing)
+MODELS = (
+    metainterface,
+    grounded,
+    both_forces,
+    block,
+    wall,
+    hinge,
+    pendulum,
+    duffing,
+    bilinear,
+    impact_duffing,
+)
 
 
 def random_branch(model, seed):
@@ -169,12 +222,20 @@ def random_branch(model, seed):
         x, velocity = scale * rng.uniform((-1.0, -0.5), (1.0, 0.5))
         if system.model.sides == (1,):
             x = system.model.wall - abs(x)
-        settle = {"settle": 0, "period": int(rng.integers(1, 4))} if rng.random() < 0.4 else {"max_period": 4}
+        settle = (
+            {"settle": 0, "period": int(rng.integers(1, 4))}
+            if rng.random() < 0.4
+            else {"max_period": 4}
+        )
         try:
             orbit = find_orbit(system, **{name: x}, velocity=velocity, parameters=(path,), **settle)
         except SaltusError:
             continue
         value = system.get(path)
-        low, high = (value * rng.uniform(0.4, 0.9), value * rng.uniform(1.1, 2.0)) if path == FREQUENCY else (0.02 * top, top)
+        low, high = (
+            (value * rng.uniform(0.4, 0.9), value * rng.uniform(1.1, 2.0))
+            if path == FREQUENCY
+            else (0.02 * top, top)
+        )
         if low < value < high:
             return orbit, path, (low, high)

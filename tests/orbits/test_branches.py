@@ -1,4 +1,6 @@
-"""Branches: every point is a motion, branches do not depend on how they were walked, and they end where they say."""
+"""Branches: every point is a motion, branches do not depend on how they were walked, and they end
+where they say.
+"""
 
 import functools
 import math
@@ -25,15 +27,23 @@ def branch(name):
     """The branches that the tests look at, each followed once."""
     if name == "impact oscillator":
         path = "load.force.amplitude"
-        return continue_orbit(find_orbit(walled(A=0.5, W=1.0), x=0.2, parameters=(path,)), path, (0.02, 3.0))
+        return continue_orbit(
+            find_orbit(walled(A=0.5, W=1.0), x=0.2, parameters=(path,)), path, (0.02, 3.0)
+        )
     if name == "a user's model":
-        return continue_orbit(find_orbit(hinged(), x=1.2, parameters=(FREQUENCY,)), FREQUENCY, (0.3, 3.0))
+        return continue_orbit(
+            find_orbit(hinged(), x=1.2, parameters=(FREQUENCY,)), FREQUENCY, (0.3, 3.0)
+        )
     orbit, path, bounds = {
         "Hhat 0.5": (lambda: start(), FREQUENCY, (0.15, 3.0)),
         "Hhat 1": (lambda: start(H=1.0, W=1.5), FREQUENCY, (0.25, 3.2)),
         "losses": (lambda: start(e=0.9), FREQUENCY, (0.2, 3.0)),
         "unequal layers": (lambda: start(k=1.1), FREQUENCY, (0.2, 3.0)),
-        "unequal everything": (lambda: start(k=1.2, m=0.2, c=0.7, mean=0.1, e=0.9), FREQUENCY, (0.25, 3.0)),
+        "unequal everything": (
+            lambda: start(k=1.2, m=0.2, c=0.7, mean=0.1, e=0.9),
+            FREQUENCY,
+            (0.25, 3.0),
+        ),
         "period 3": (lambda: start(H=1.0, W=2.4, theta=2.0), FREQUENCY, (1.0, 8.0)),
         "loop": (lambda: start(H=0.5, W=2.8, theta=3.0), FREQUENCY, (0.25, 30.0)),
         "onset": (lambda: start(AMPLITUDE, H=0.05), AMPLITUDE, (0.001, 0.085)),
@@ -43,7 +53,8 @@ def branch(name):
     return continue_orbit(orbit(), path, bounds)
 
 
-NAMES = ("Hhat 0.5", "Hhat 1", "losses", "unequal layers", "unequal everything", "period 3", "loop", "onset", "one side",
+NAMES = ("Hhat 0.5", "Hhat 1", "losses", "unequal layers", "unequal everything", ("period "
+                                                                                 "3"), "loop", "onset", "one side",
          "impact oscillator", "a user's model")  # fmt: skip
 
 
@@ -57,16 +68,21 @@ def parameter(branch, kind, near):
     return min((s.parameter for s in branch.special if s.kind == kind), key=lambda p: abs(p - near))
 
 
-# --- references ----------------------------------------------------------------------------------------------------------
+# --- references --------------------------------------------------------------
 
 
 def test_grazing_at_which_the_smoothed_problem_stops():
-    (graze,) = (s for s in branch("Hhat 0.5").special if s.kind == "GR" and abs(s.parameter - 0.2846) < 1e-4)
+    (graze,) = (
+        s for s in branch("Hhat 0.5").special if s.kind == "GR" and abs(s.parameter - 0.2846) < 1e-4
+    )
     assert graze.parameter == pytest.approx(0.284630020, abs=5e-10)
     assert graze.amplitude == pytest.approx(1.05950014, abs=5e-9)
-    counts = [o.signature.impact_count for o in branch("Hhat 0.5").orbits if 0.2840 < o.frequency < 0.2860]
+    counts = [
+        o.signature.impact_count for o in branch("Hhat 0.5").orbits if 0.2840 < o.frequency < 0.2860
+    ]
     assert set(counts) == {2, 6}
-    assert parameter(branch("Hhat 0.5"), "LP", 0.28465) == pytest.approx(0.28467, abs=2e-5)  # the fold just above it
+    # the fold just above it
+    assert parameter(branch("Hhat 0.5"), "LP", 0.28465) == pytest.approx(0.28467, abs=2e-5)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +95,9 @@ def test_grazing_at_which_the_smoothed_problem_stops():
 )
 def test_folds_of_two_independent_codes(name, folds):
     for fold in folds:
-        assert parameter(branch(name), "LP", fold) == pytest.approx(fold, abs=6e-11 if name == "period 3" else 1e-12)
+        assert parameter(branch(name), "LP", fold) == pytest.approx(
+            fold, abs=6e-11 if name == "period 3" else 1e-12
+        )
 
 
 def test_onset_in_the_amplitude_of_the_load():
@@ -110,7 +128,7 @@ def test_the_dataset_of_a_branch_says_what_its_margins_mean_and_simulation_agree
             assert abs(least) < 1e-6 or (violated[name] is not None) == (least < 0.0)
 
 
-# --- every point of every branch -----------------------------------------------------------------------------------------
+# --- every point of every branch ---------------------------------------------
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -137,13 +155,19 @@ def test_every_point_is_periodic_under_the_event_driven_flow(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_stable_points_stay_under_simulation_for_twenty_periods(name):
     """Also from a little beside them; the event-driven flow knows nothing of the equations."""
-    points = [o for o in branch(name).orbits if o.stable and min(abs(o.slowest), abs(o.clearance)) > 1e-6]
+    points = [
+        o for o in branch(name).orbits if o.stable and min(abs(o.slowest), abs(o.clearance)) > 1e-6
+    ]
     for orbit in points[:: max(1, len(points) // 12)]:
         begin = orbit.start()
         motion = simulate(orbit.system, **begin, periods=20 * orbit.period, tol=1e-13, dense=False)
         first = orbit.system.model.coordinates[0]
         position = abs(float(motion.position) - begin[first])
-        speeds = [abs(begin["velocity"]), orbit.speeds[0]] if orbit.signature.impact_count else [abs(begin["velocity"])]
+        speeds = (
+            [abs(begin["velocity"]), orbit.speeds[0]]
+            if orbit.signature.impact_count
+            else [abs(begin["velocity"])]
+        )
         assert position < 1e-8
         assert min(abs(abs(motion.velocity) - v) for v in speeds) < 1e-8
 
@@ -152,7 +176,10 @@ def test_stable_points_stay_under_simulation_for_twenty_periods(name):
 def test_multipliers_on_branches_obey_the_determinant_law(name):
     for orbit in branch(name).orbits[::7]:
         model, e = orbit.system.model, orbit.system.impact.e
-        if not np.isfinite(orbit.multipliers).all() or min(orbit.slowest, abs(orbit.clearance)) < 1e-6:
+        if (
+            not np.isfinite(orbit.multipliers).all()
+            or min(orbit.slowest, abs(orbit.clearance)) < 1e-6
+        ):
             continue
         spent = {1: 0.0, -1: 0.0}
         if name in ("impact oscillator", "a user's model"):
@@ -163,7 +190,9 @@ def test_multipliers_on_branches_obey_the_determinant_law(name):
                 spent[int(side)] += duration
             if not len(orbit.sides):
                 spent[orbit.signature.side] = orbit.duration
-            rate = model.damping * (model.dissipation_ratio * spent[1] / (1 + model.mass_ratio) + spent[-1])
+            rate = model.damping * (
+                model.dissipation_ratio * spent[1] / (1 + model.mass_ratio) + spent[-1]
+            )
         expected = e ** (2 * len(orbit.speeds)) * math.exp(-rate)
         size = max(1.0, abs(orbit.multipliers[0])) ** 2
         assert abs(np.prod(orbit.multipliers) - expected) < 1e-8 * expected + 1e-13 * size
@@ -179,7 +208,7 @@ def test_neighbouring_points_are_near_each_other(name):
         assert abs(a.system.get(found.path) - b.system.get(found.path)) < 0.12 * span + 1e-12
 
 
-# --- special points ------------------------------------------------------------------------------------------------------
+# --- special points ----------------------------------------------------------
 
 
 def expected_multiplier(special):
@@ -193,7 +222,8 @@ def test_special_points_have_the_multiplier_that_makes_them_special(name):
         if special.kind in ("LP", "PD", "BPC"):
             distance = np.abs(special.orbit.multipliers - expected_multiplier(special)).min()
             assert distance < 1e-6, special
-        assert special.kind != "NS"  # excluded where the multipliers' product is below 1 (errata 22)
+        # excluded where the multipliers' product is below 1 (errata 22)
+        assert special.kind != "NS"
         if special.kind == "PD":
             assert not special.orbit.symmetric
             assert (special.orbit.multipliers.imag == 0.0).all()
@@ -207,14 +237,19 @@ def test_special_points_have_the_multiplier_that_makes_them_special(name):
 def test_special_points_carry_their_evidence(name):
     for special in branch(name).special:
         assert special.evidence.before * special.evidence.after <= 0.0
-        assert abs(special.evidence.value) <= min(abs(special.evidence.before), abs(special.evidence.after)) + 1e-15
+        assert (
+            abs(special.evidence.value)
+            <= min(abs(special.evidence.before), abs(special.evidence.after)) + 1e-15
+        )
         assert special.evidence.bracket < 1e-10
         assert special.evidence.residual < 3e-12
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_stability_changes_only_at_special_points(name):
-    """Between two points of one stability and two of the other lies an LP, PD, BPC or GR: none is missed."""
+    """Between two points of one stability and two of the other lies an LP, PD, BPC or GR: none is
+    missed.
+    """
     found = branch(name)
     order = found.parameters
     special = np.array([s.parameter for s in found.special if s.kind in ("LP", "PD", "BPC", "GR")])
@@ -227,7 +262,9 @@ def test_stability_changes_only_at_special_points(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_parameter_turns_only_at_folds_and_grazings(name):
     found = branch(name)
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(found.parameters)[np.diff(found.parameters) != 0.0])))
+    turns = np.flatnonzero(
+        np.diff(np.sign(np.diff(found.parameters)[np.diff(found.parameters) != 0.0]))
+    )
     assert len(turns) <= len(kinds(found, "LP", "GR"))
 
 
@@ -236,7 +273,10 @@ def test_the_parameter_turns_only_at_folds_and_grazings(name):
 def test_special_points_do_not_depend_on_the_step(name, step):
     found = branch(name)
     other = continue_orbit(
-        found.orbits[len(found.orbits) // 2], found.path, (found.parameters.min(), found.parameters.max()), step=step
+        found.orbits[len(found.orbits) // 2],
+        found.path,
+        (found.parameters.min(), found.parameters.max()),
+        step=step,
     )
     wanted = ("LP", "PD", "BPC", "GR")
     one, two = sorted(kinds(found, *wanted)), sorted(kinds(other, *wanted))
@@ -249,21 +289,38 @@ def test_branch_does_not_depend_on_the_orbit_it_is_followed_from(W):
     found, other = branch("Hhat 0.5"), continue_orbit(start(W=W), FREQUENCY, (0.15, 3.0))
     wanted = ("LP", "BPC", "GR", "line_limit", "reaction")
     assert [k for k, _ in kinds(found, *wanted)] == [k for k, _ in kinds(other, *wanted)]
-    differences = np.array([p for _, p in kinds(found, *wanted)]) - np.array([p for _, p in kinds(other, *wanted)])
+    differences = np.array([p for _, p in kinds(found, *wanted)]) - np.array(
+        [p for _, p in kinds(other, *wanted)]
+    )
     assert np.abs(differences).max() < 1e-10
     assert found.ends == other.ends
 
 
 @pytest.mark.parametrize("W", [0.2, 0.7, 0.88, 2.0])
 def test_branches_along_two_parameters_meet_in_the_same_orbits(W):
-    """Along the frequency at Hhat = 0.5, and along Hhat at that frequency: the orbits of the first are also on the second."""
+    """Along the frequency at Hhat = 0.5, and along Hhat at that frequency: the orbits of the first
+    are also on the second.
+    """
     along_frequency = [o for o in branch("Hhat 0.5").at(W) if o.stable]
     assert along_frequency
     for orbit in along_frequency:
         position, velocity = orbit.state
-        again = find_orbit(forced(W=W), parameters=(AMPLITUDE,), theta=position, velocity=velocity, settle=0, period=1)
+        again = find_orbit(
+            forced(W=W),
+            parameters=(AMPLITUDE,),
+            theta=position,
+            velocity=velocity,
+            settle=0,
+            period=1,
+        )
         across = continue_orbit(again, AMPLITUDE, (0.4, 0.6))
-        assert min(abs(o.amplitude - orbit.amplitude) + abs(o.state[0] - position) for o in across.at(0.5)) < 1e-9
+        assert (
+            min(
+                abs(o.amplitude - orbit.amplitude) + abs(o.state[0] - position)
+                for o in across.at(0.5)
+            )
+            < 1e-9
+        )
 
 
 def test_orbits_at_a_value_are_solved_there():
@@ -291,18 +348,22 @@ def test_unstable_orbits_are_found_from_beside_them_without_settling():
 
 def test_mirror_images_have_mirrored_branches():
     one, other = branch("one side"), branch("other side")
-    assert [k for k, _ in kinds(one, "LP", "PD", "GR")] == [k for k, _ in kinds(other, "LP", "PD", "GR")]
+    assert [k for k, _ in kinds(one, "LP", "PD", "GR")] == [
+        k for k, _ in kinds(other, "LP", "PD", "GR")
+    ]
     for a, b in zip(one.special, other.special, strict=True):
         assert a.parameter == pytest.approx(b.parameter, abs=1e-10)
         assert a.orbit.highest == pytest.approx(-b.orbit.lowest, abs=1e-9)
 
 
-# --- nearly symmetric systems --------------------------------------------------------------------------------------------
+# --- nearly symmetric systems ------------------------------------------------
 
 
 @pytest.mark.parametrize("excess", [1e-7, 1e-5, 1e-3])
 def test_systems_that_are_almost_symmetric(excess):
-    """The two mirror pairs of impacts appear one after the other, at grazings as near to each other as the stiffness is to 1."""
+    """The two mirror pairs of impacts appear one after the other, at grazings as near to each other
+    as the stiffness is to 1.
+    """
     found = continue_orbit(start(k=1.0 + excess, W=0.3), FREQUENCY, (0.2845, 0.31))
     assert [str(end) for end in found.ends] == ["bound 0.2845", "bound 0.31"]
     assert parameter(found, "LP", 0.284668) == pytest.approx(0.284668455747, abs=2 * excess)
@@ -310,13 +371,17 @@ def test_systems_that_are_almost_symmetric(excess):
     assert len(near) == 2
     for special in found.special:
         if special.kind in ("LP", "PD", "BPC"):
-            assert np.abs(special.orbit.multipliers - expected_multiplier(special)).min() < 1e-6, special
+            assert np.abs(special.orbit.multipliers - expected_multiplier(special)).min() < 1e-6, (
+                special
+            )
         assert special.evidence.bracket < 1e-10
     assert all(o.admissible for o in found.orbits)
 
 
 def test_symmetric_but_for_rounding():
-    """The second grazing lies within rounding of the first: the branch may end there, but with a reason and nothing false."""
+    """The second grazing lies within rounding of the first: the branch may end there, but with a
+    reason and nothing false.
+    """
     found = continue_orbit(start(k=1.0 + 1e-9, W=0.3), FREQUENCY, (0.2845, 0.31))
     assert all(o.admissible for o in found.orbits)
     assert not found.closed
@@ -324,11 +389,13 @@ def test_symmetric_but_for_rounding():
     assert {s.kind for s in found.special} <= {"GR", "LP", "PD"}
 
 
-# --- what is asked -------------------------------------------------------------------------------------------------------
+# --- what is asked -----------------------------------------------------------
 
 
 def test_functions_of_the_user_are_special_points_too():
-    found = continue_orbit(start(), FREQUENCY, (0.6, 2.0), functions={"small": lambda orbit: orbit.amplitude - 0.8})
+    found = continue_orbit(
+        start(), FREQUENCY, (0.6, 2.0), functions={"small": lambda orbit: orbit.amplitude - 0.8}
+    )
     names = kinds(found, "small")
     assert len(names) == np.count_nonzero(np.diff(np.sign(found.amplitudes - 0.8)))
     for special in found.special:
@@ -351,7 +418,9 @@ def test_a_start_on_a_bound_is_followed_the_other_way():
 
 def test_progress_hears_of_every_step():
     heard = []
-    found = continue_orbit(start(), FREQUENCY, (0.95, 1.4), progress=lambda *told: heard.append(told))
+    found = continue_orbit(
+        start(), FREQUENCY, (0.95, 1.4), progress=lambda *told: heard.append(told)
+    )
     fractions, steps = zip(*heard, strict=True)
     assert list(fractions) == sorted(fractions)
     assert fractions[-1] == 1.0

@@ -1,4 +1,6 @@
-"""Periodic orbits with several contacts: against closed forms, the reduced model, simulation, and through their switchings."""
+"""Periodic orbits with several contacts: against closed forms, the reduced model, simulation, and
+through their switchings.
+"""
 
 import math
 from dataclasses import dataclass
@@ -36,9 +38,11 @@ def room(A=0.8, W=1.0, e=0.7, **numbers):
 
 
 def test_between_two_walls_the_symmetric_orbit_is_its_closed_form():
-    """Without a spring: x'' = A cos(W tau), solved in tests/flow/test_contacts.py. The product of its multipliers is e^4.
+    """Without a spring: x'' = A cos(W tau), solved in tests/flow/test_contacts.py. The product of
+    its multipliers is e^4.
 
-    The impacts are half a period apart, after each the speed is v; the first wall is left at the phase phi.
+    The impacts are half a period apart, after each the speed is v; the first wall is left at the
+    phase phi.
     """
     A, W, e, d, found = 0.8, 1.0, 0.7, 1.0, 0
     a = -(1 - e) * W / (2 * e * A)  # sin phi = a v
@@ -51,9 +55,13 @@ def test_between_two_walls_the_symmetric_orbit_is_its_closed_form():
         turns = math.floor(-phi / math.pi)
         s, sign = -(phi + turns * math.pi) / W, (-1) ** turns
         x, speed = way(A, W, d, v, phi, s), v + A / W * (math.sin(W * s + phi) - math.sin(phi))
-        orbit = saltus.find_orbit(room(A, W, e, stiffness=0.0), x=sign * x, velocity=sign * speed, settle=0, period=1)
+        orbit = saltus.find_orbit(
+            room(A, W, e, stiffness=0.0), x=sign * x, velocity=sign * speed, settle=0, period=1
+        )
         np.testing.assert_allclose(e * orbit.speeds, v, rtol=0, atol=1e-10)
-        np.testing.assert_allclose((orbit.impact_times * W - phi + 1.0) % math.pi, 1.0, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(
+            (orbit.impact_times * W - phi + 1.0) % math.pi, 1.0, rtol=0, atol=1e-10
+        )
         first, second, *zeros = orbit.multipliers
         assert first * second == pytest.approx(e**4, abs=1e-10)
         assert np.abs(zeros).max() < 1e-12
@@ -93,23 +101,38 @@ def test_orbits_repeat_and_have_the_multipliers_of_their_motions(orbit):
 
 
 def test_the_equations_have_the_derivatives_of_their_differences(orbit):
-    paths = ("load.frequency", "impact.transfer", H if "theta_1" in orbit.system.model.coordinates else "load.force.amplitude")
+    paths = (
+        "load.frequency",
+        "impact.transfer",
+        H if "theta_1" in orbit.system.model.coordinates else "load.force.amplitude",
+    )
     problem = type(orbit.equations)(orbit.system, orbit.signature, paths)
-    place = np.append(orbit.solution.unknowns, problem.values) + 1e-3 * np.random.default_rng(1).normal(size=problem.size + 3)
+    place = np.append(orbit.solution.unknowns, problem.values) + 1e-3 * np.random.default_rng(
+        1
+    ).normal(size=problem.size + 3)
     place[-2] = 0.5
 
     def residual(at):
         return problem.evaluate(at[: problem.size], at[problem.size :]).residual
 
     step = 1e-5
-    columns = [(residual(place + step * row) - residual(place - step * row)) / (2 * step) for row in np.eye(place.size)]
+    columns = [
+        (residual(place + step * row) - residual(place - step * row)) / (2 * step)
+        for row in np.eye(place.size)
+    ]
     exact = problem.evaluate(place[: problem.size], place[problem.size :]).derivatives()
-    np.testing.assert_allclose(np.array(columns).T, exact, rtol=0, atol=2e-7 * max(1.0, np.abs(exact).max()))
+    np.testing.assert_allclose(
+        np.array(columns).T, exact, rtol=0, atol=2e-7 * max(1.0, np.abs(exact).max())
+    )
 
 
 def test_where_the_other_layer_stays_closed_orbits_are_those_of_the_reduced_model():
     full = saltus.find_orbit(layers(H=0.1, transfer=0.95), theta_1=0.1, theta_2=0.0)
-    reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=full.system.load, impact=VelocityReduction(0.95))
+    reduced = System(
+        model=Metainterface(beta0=BETA80, damping=0.1),
+        load=full.system.load,
+        impact=VelocityReduction(0.95),
+    )
     one = saltus.find_orbit(reduced, theta=0.1)
     assert full.amplitude == pytest.approx(one.amplitude, abs=1e-12)
     assert full.highest == pytest.approx(one.highest, abs=1e-12)
@@ -119,22 +142,29 @@ def test_where_the_other_layer_stays_closed_orbits_are_those_of_the_reduced_mode
 
 
 def test_the_largest_angles_are_those_of_the_derivation():
-    """0.5694 at H = 0.2 and 1.0161 at 0.5, from an independent simulation (where the reduced model has .5856 and 1.0205)."""
+    """0.5694 at H = 0.2 and 1.0161 at 0.5, from an independent simulation (where the reduced model
+    has .5856 and 1.0205).
+    """
     for load, angle in ((0.2, 0.5694), (0.5, 1.0161)):
-        assert saltus.find_orbit(layers(H=load, transfer=1.0), theta_1=0.1, theta_2=0.0).amplitude == pytest.approx(
-            angle, abs=6e-5
-        )
+        assert saltus.find_orbit(
+            layers(H=load, transfer=1.0), theta_1=0.1, theta_2=0.0
+        ).amplitude == pytest.approx(angle, abs=6e-5)
 
 
 def test_a_release_appears_where_the_reduced_model_s_reaction_vanishes():
     full = saltus.find_orbit(layers(H=0.1, transfer=1.0), theta_1=0.1, theta_2=0.0)
     branch = saltus.continue_orbit(full, H, (0.05, 0.3))
-    reduced = System(model=Metainterface(beta0=BETA80, damping=0.1), load=full.system.load, impact=VelocityReduction(1.0))
+    reduced = System(
+        model=Metainterface(beta0=BETA80, damping=0.1),
+        load=full.system.load,
+        impact=VelocityReduction(1.0),
+    )
     theirs = saltus.continue_orbit(saltus.find_orbit(reduced, theta=0.1), H, (0.05, 0.3))
     vanishes = [s.parameter for s in theirs.special if s.kind == "reaction"]
     assert [s.kind for s in branch.special] == [SpecialKind.SW]
     assert branch.special[0].parameter == pytest.approx(vanishes[0], abs=1e-10)
-    assert "at one instant" in str(branch.ends[1])  # the impact finds the layer open then, and its transfer does not act
+    # the impact finds the layer open then, and its transfer does not act
+    assert "at one instant" in str(branch.ends[1])
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +174,9 @@ def branch():
 
 
 def test_a_branch_goes_through_its_switchings(branch):
-    """Without restitution and transfer nothing jumps where a release or a closing appears: orbits and multipliers go on."""
+    """Without restitution and transfer nothing jumps where a release or a closing appears: orbits
+    and multipliers go on.
+    """
     assert [str(end) for end in branch.ends] == ["bound 0.05", "bound 0.8"]
     assert {special.kind for special in branch.special} == {SpecialKind.SW}
     assert len(branch.special) >= 4
@@ -174,12 +206,15 @@ def test_mirror_layers_switch_together():
     assert [str(end) for end in both.ends] == ["bound 0.05", "bound 0.8"]
     assert [special.kind for special in both.special] == [SpecialKind.SW] * 2
     low, high = (both.at(value)[0].signature for value in (0.1, 0.7))
-    assert (low.symmetric, len(low.events), low.impact_count) == (True, 1, 2)  # the events of half a period
+    # the events of half a period
+    assert (low.symmetric, len(low.events), low.impact_count) == (True, 1, 2)
     assert (high.symmetric, len(high.events), high.impact_count) == (True, 3, 4)
 
 
 def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
-    """A / abs(k - W^2 + i c W) = d; beside it the orbit hits both walls, and its branch goes on through the grazing."""
+    """A / abs(k - W^2 + i c W) = d; beside it the orbit hits both walls, and its branch goes on
+    through the grazing.
+    """
     A, k, c = 0.8, 0.2, 0.3
     W = math.sqrt(k - c * c / 2 + math.sqrt((k - c * c / 2) ** 2 - k * k + A * A))
     orbit = saltus.find_orbit(room(A, W + 0.2, stiffness=k, damping=c), x=0.1, velocity=0.0)
@@ -190,13 +225,19 @@ def test_a_grazing_is_where_the_linear_response_reaches_the_walls():
 
 
 def test_a_branch_ends_where_one_layer_is_at_its_contact_as_the_other_one_closes():
-    """There the gap has a minimum that no smooth motion has, as the impact turns the first one round as well."""
+    """There the gap has a minimum that no smooth motion has, as the impact turns the first one
+    round as well.
+    """
     system = System(
         model=TwoLayer(beta0=1.53514675339103, damping=0.1824851532866711, mass_ratio=0.3),
-        load=Load(frequency=1.7382488876331892, vertical=-0.5, horizontal=Harmonic(amplitude=0.297)),
+        load=Load(
+            frequency=1.7382488876331892, vertical=-0.5, horizontal=Harmonic(amplitude=0.297)
+        ),
         impact=NewtonImpact(e=0.6),
     )
-    branch = saltus.continue_orbit(saltus.find_orbit(system, theta_1=0.1, theta_2=0.0), H, (0.275, 0.298))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(system, theta_1=0.1, theta_2=0.0), H, (0.275, 0.298)
+    )
     assert 0.28 < branch.ends[0].parameter < 0.284
     assert branch.ends[0].reason is OrbitEnd.TWO_AT_ONCE
     assert max(orbit.defect for orbit in branch.orbits) < 1e-11
@@ -216,7 +257,9 @@ class ImpactAbsorber(saltus.ContactModel):
     @property
     def contacts(self):
         left = saltus.Contact(name="left", coordinate={"y": 1.0, "x": -1.0}, position=-self.b)
-        return left, saltus.Contact(name="right", coordinate={"x": 1.0, "y": -1.0}, position=-self.b)
+        return left, saltus.Contact(
+            name="right", coordinate={"x": 1.0, "y": -1.0}, position=-self.b
+        )
 
     def mass_matrix(self, theta):
         return (1.0, 0.0), (0.0, self.eps)
@@ -226,20 +269,26 @@ class ImpactAbsorber(saltus.ContactModel):
 
 
 def absorber(F):
-    return System(model=ImpactAbsorber(), load=Load(frequency=1.0, force=Harmonic(amplitude=F)), impact=NewtonImpact(e=0.65))
+    return System(
+        model=ImpactAbsorber(),
+        load=Load(frequency=1.0, force=Harmonic(amplitude=F)),
+        impact=NewtonImpact(e=0.65),
+    )
 
 
 def fold_of_absorber(zeta=0.02, eps=0.05, b=1.0, e=0.65):
     """The least F at which the ball hits each side once a period, half a period apart.
 
-    With x = X, x' = u and y = X + b just after one impact, the ball flies at w = -2 (X + b) / pi to the other side, and meets it
-    with all signs changed: these are three linear equations for X, u and F (cos, sin) of the phase, a line of solutions. The fold
-    is its point of least F.
+    With x = X, x' = u and y = X + b just after one impact, the ball flies at w = -2 (X + b) / pi to
+    the other side, and meets it with all signs changed: these are three linear equations for X, u
+    and F (cos, sin) of the phase, a line of solutions. The fold is its point of least F.
     """
     a, T = np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]), math.pi
     half = expm(a * T)
-    steady = np.array([[0.0, -0.5 / zeta], [0.5 / zeta, 0.0]])  # x and x' under F_c cos + F_s sin, at phase 0
-    # (x, x')(T) = half ((X, u) - p) - p, p = steady (F_c, F_s), is -(X, u + 2 eps w); and u - w = -e (u + 2 eps w + w)
+    # x and x' under F_c cos + F_s sin, at phase 0
+    steady = np.array([[0.0, -0.5 / zeta], [0.5 / zeta, 0.0]])
+    # (x, x')(T) = half ((X, u) - p) - p, p = steady (F_c, F_s), is -(X, u + 2 eps w); and u - w =
+    # -e (u + 2 eps w + w)
     w = np.array([-2.0 / T, 0.0, 0.0, 0.0]), -2.0 * b / T
     rows = np.hstack([half + np.eye(2), -(half + np.eye(2)) @ steady])
     rows[1] += 2.0 * eps * w[0]
@@ -251,7 +300,9 @@ def fold_of_absorber(zeta=0.02, eps=0.05, b=1.0, e=0.65):
 
 
 def test_the_branch_of_an_impact_absorber_folds_in_closed_form_and_ends_where_nothing_holds_the_ball():
-    """It is born at F = 2 zeta b, where the motion without impacts just fills the cavity; below, the ball may stand anywhere."""
+    """It is born at F = 2 zeta b, where the motion without impacts just fills the cavity; below,
+    the ball may stand anywhere.
+    """
     orbit = saltus.find_orbit(absorber(0.05), x=0.0, y=0.0, velocity=(0.0, 0.3))
     branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.01, 0.06))
     fold = next(s for s in branch.special if s.kind == SpecialKind.LP)
@@ -260,7 +311,8 @@ def test_the_branch_of_an_impact_absorber_folds_in_closed_form_and_ends_where_no
     assert born == pytest.approx(0.04, abs=1e-13)
     end = next(end for end in branch.ends if end.reason is not CurveEnd.BOUND)
     assert end.reason is OrbitEnd.NOT_ISOLATED
-    assert 0.035 < end.parameter < 0.04 + 1e-12  # for a while a ball that is only touched may be followed
+    # for a while a ball that is only touched may be followed
+    assert 0.035 < end.parameter < 0.04 + 1e-12
 
 
 def test_an_orbit_is_found_with_a_mass_that_nothing_holds_and_has_no_branch():
@@ -277,7 +329,9 @@ def test_an_orbit_is_found_with_a_mass_that_nothing_holds_and_has_no_branch():
 
 
 def test_an_orbit_survives_a_store():
-    """As a store of a diagram keeps it: the equations read back are those of several contacts, with equal solutions."""
+    """As a store of a diagram keeps it: the equations read back are those of several contacts, with
+    equal solutions.
+    """
     orbit = saltus.find_orbit(layers(H=0.2), theta_1=0.1, theta_2=0.0)
     again = from_json(as_json(orbit))
     np.testing.assert_array_equal(again.solution.unknowns, orbit.solution.unknowns)
@@ -292,7 +346,9 @@ def test_a_branch_and_its_orbits_survive_a_file(branch):
 
 
 def test_a_doubled_orbit_begins_at_a_period_doubling():
-    orbit = saltus.find_orbit(room(A=0.5, W=1.0, e=0.9, stiffness=0.0, damping=0.02), x=0.1, velocity=0.9)
+    orbit = saltus.find_orbit(
+        room(A=0.5, W=1.0, e=0.9, stiffness=0.0, damping=0.02), x=0.1, velocity=0.9
+    )
     symmetric = saltus.continue_orbit(orbit, "load.frequency", (0.3, 2.0))
     breaking = next(special for special in symmetric.special if special.kind == SpecialKind.BPC)
     branch = saltus.switch_branch(breaking, (0.3, 2.0))[0]
@@ -307,7 +363,9 @@ def test_a_doubled_orbit_begins_at_a_period_doubling():
     ("ask", "error", "words"),
     [
         (
-            lambda: saltus.find_orbit(layers(H=0.01, e=(0.3, 0.3)), theta_1=0.001, theta_2=0.0, settle=0, period=1),
+            lambda: saltus.find_orbit(
+                layers(H=0.01, e=(0.3, 0.3)), theta_1=0.001, theta_2=0.0, settle=0, period=1
+            ),
             MotionError,
             "held at contacts for good",
         ),
@@ -347,10 +405,14 @@ class Pair(saltus.ContactModel):
 
 
 def test_a_torus_is_born_where_a_complex_pair_leaves_the_circle_and_not_beside_grazings_or_at_real_pairs():
-    """With four multipliers the product of all a b - 1 jumps at a grazing, and vanishes where a real pair has the product 1."""
+    """With four multipliers the product of all a b - 1 jumps at a grazing, and vanishes where a
+    real pair has the product 1.
+    """
     load = Load(frequency=0.52, force=Harmonic(amplitude=0.05))
     system = System(model=Pair(), load=load, impact=NewtonImpact(e=0.7))
-    branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0, y=0.0), "load.frequency", (0.5, 0.7))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(system, x=0.0, y=0.0), "load.frequency", (0.5, 0.7)
+    )
     tori = [point for point in branch.special if point.kind == SpecialKind.NS]
     assert [point.parameter for point in tori] == [pytest.approx(0.62554293, abs=1e-6)]
     assert min(abs(abs(m) - 1.0) for m in tori[0].orbit.multipliers if m.imag) < 1e-9

@@ -1,5 +1,5 @@
-"""Orbits, branches and attractors of models with more gaps than coordinates, against the same models with one gap for each
-coordinate, closed forms and differences of motions."""
+"""Orbits, branches and attractors of models with more gaps than coordinates, against the same
+models with one gap for each coordinate, closed forms and differences of motions."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,16 @@ import saltus
 from saltus import Contact, ContactModel, NewtonImpact
 from saltus.flow import simulate
 from saltus.orbits import PeriodicOrbit, Signature, equations_of
-from saltus.systems import Harmonic, Load, System, arguments_of, before_impacts, initial_states, on_this_side, states_beside
+from saltus.systems import (
+    Harmonic,
+    Load,
+    System,
+    arguments_of,
+    before_impacts,
+    initial_states,
+    on_this_side,
+    states_beside,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,12 +53,17 @@ class Plain(Stops):
 
 
 def between(model, amplitude):
-    return System(model=model, load=Load(frequency=0.7, force=Harmonic(amplitude)), impact=NewtonImpact(e=0.8))
+    return System(
+        model=model, load=Load(frequency=0.7, force=Harmonic(amplitude)), impact=NewtonImpact(e=0.8)
+    )
 
 
 def test_an_orbit_has_the_multipliers_of_two_stops_of_one_coordinate():
     """Two of them, and none of the dependent gap."""
-    plain, orbit = (saltus.find_orbit(between(model, 0.68), x=0.9, velocity=-0.2) for model in (Plain(), Stops()))
+    plain, orbit = (
+        saltus.find_orbit(between(model, 0.68), x=0.9, velocity=-0.2)
+        for model in (Plain(), Stops())
+    )
     assert len(orbit.multipliers) == 2
     np.testing.assert_allclose(orbit.multipliers, plain.multipliers[:2], rtol=0, atol=1e-11)
 
@@ -60,7 +74,9 @@ def test_orbits_branches_and_special_points_are_those_of_two_stops_of_one_coordi
     found = []
     for model in (Plain(), Stops()):
         orbit = saltus.find_orbit(between(model, 0.68), x=0.9, velocity=-0.2)
-        found.append((orbit, saltus.continue_orbit(orbit, "load.force.amplitude", bounds=(0.665, 0.73))))
+        found.append(
+            (orbit, saltus.continue_orbit(orbit, "load.force.amplitude", bounds=(0.665, 0.73)))
+        )
     (plain, branch), (orbit, other) = found
     assert len(orbit.multipliers) == 2
     assert orbit.residual < 1e-13
@@ -75,12 +91,20 @@ def test_orbits_branches_and_special_points_are_those_of_two_stops_of_one_coordi
 def test_motions_of_a_window_end_on_the_attractors_of_two_stops_of_one_coordinate():
     plain, system = (between(model, 0.6) for model in (Plain(), Stops()))
     window = [(-1.0, 1.0), (-1.5, 1.5)]
-    for one, two in zip(*(saltus.find_attractors(each, window=window, starts=32) for each in (plain, system)), strict=True):
+    for one, two in zip(
+        *(saltus.find_attractors(each, window=window, starts=32) for each in (plain, system)),
+        strict=True,
+    ):
         assert one.starts == two.starts
-        assert abs(two.orbit.multipliers[0]) == pytest.approx(abs(one.orbit.multipliers[0]), abs=1e-9)
+        assert abs(two.orbit.multipliers[0]) == pytest.approx(
+            abs(one.orbit.multipliers[0]), abs=1e-9
+        )
     verdicts = [saltus.classify(each, x=0.3, velocity=0.2) for each in (plain, system)]
     assert [str(verdict.kind) for verdict in verdicts] == ["periodic", "periodic"]
-    sweeps = [saltus.frequency_sweep(each, [0.68, 0.7, 0.72], periods=200, x=0.1) for each in (plain, system)]
+    sweeps = [
+        saltus.frequency_sweep(each, [0.68, 0.7, 0.72], periods=200, x=0.1)
+        for each in (plain, system)
+    ]
     np.testing.assert_allclose(sweeps[1].amplitude, sweeps[0].amplitude, rtol=0, atol=1e-9)
     np.testing.assert_allclose(sweeps[1].x, sweeps[0].x, rtol=0, atol=1e-8)
 
@@ -105,11 +129,17 @@ class Ball(ContactModel):
 
 
 def thrown(frequency=2.0, amplitude=0.5, e=0.6):
-    return System(model=Ball(), load=Load(frequency=frequency, ground=Harmonic(amplitude)), impact=NewtonImpact(e=e))
+    return System(
+        model=Ball(),
+        load=Load(frequency=frequency, ground=Harmonic(amplitude)),
+        impact=NewtonImpact(e=e),
+    )
 
 
 def test_a_ball_that_hits_table_and_ceiling_once_a_period_follows_its_parabolas():
-    """Its impact times by their equations; the product of its multipliers is e^4, as each impact contracts areas by e^2."""
+    """Its impact times by their equations; the product of its multipliers is e^4, as each impact
+    contracts areas by e^2.
+    """
     system, e = thrown(), 0.6
     orbit = saltus.find_orbit(system, x=1.5, velocity=1.0)
 
@@ -119,11 +149,17 @@ def test_a_ball_that_hits_table_and_ceiling_once_a_period_follows_its_parabolas(
         back = -e * (speed - 0.3 * flight)
         fall = math.pi - flight
         landed = 2.5 + back * fall - 0.15 * fall**2 - x
-        return x + speed * flight - 0.15 * flight**2 - 2.5, landed, (1.0 + e) * w - e * (back - 0.3 * fall) - speed
+        return (
+            x + speed * flight - 0.15 * flight**2 - 2.5,
+            landed,
+            (1.0 + e) * w - e * (back - 0.3 * fall) - speed,
+        )
 
     table, ceiling = (orbit.motion().events[k].time for k in range(2))
     speed = float(orbit.motion().events[0].velocity_after[0])
-    exact, _, solved, _ = fsolve(apart, (table, ceiling - table, speed), xtol=1e-14, full_output=True)
+    exact, _, solved, _ = fsolve(
+        apart, (table, ceiling - table, speed), xtol=1e-14, full_output=True
+    )
     assert solved == 1
     np.testing.assert_allclose((table, ceiling - table, speed), exact, rtol=0, atol=1e-12)
     assert float(np.prod(orbit.multipliers).real) == pytest.approx(e**4, rel=1e-11)
@@ -134,18 +170,27 @@ def test_a_ball_that_hits_table_and_ceiling_once_a_period_follows_its_parabolas(
             x, v = orbit.section_state + sign * np.eye(2)[j]
             ends.append(simulate(system, x=x, velocity=v, periods=1, tol=1e-14).final_state)
         slope[:, j] = (ends[0] - ends[1]) / (2.0 * step)
-    np.testing.assert_allclose(np.sort(np.linalg.eigvals(slope)), np.sort(orbit.multipliers.real), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(
+        np.sort(np.linalg.eigvals(slope)), np.sort(orbit.multipliers.real), rtol=0, atol=1e-8
+    )
 
 
 def parabolas(amplitude, t, v):
-    """The next time at which a ball leaves the table, and its velocity then, with one impact at the ceiling in between."""
+    """The next time at which a ball leaves the table, and its velocity then, with one impact at the
+    ceiling in between.
+    """
     x = amplitude * math.sin(2.0 * t)
     rise = (v - math.sqrt(v**2 - 0.6 * (2.5 - x))) / 0.3
     back = -0.6 * (v - 0.3 * rise)
     later = (
         t
         + rise
-        + brentq(lambda s: 2.5 + back * s - 0.15 * s**2 - amplitude * math.sin(2.0 * (t + rise + s)), 0.5, 3.0, xtol=1e-15)
+        + brentq(
+            lambda s: 2.5 + back * s - 0.15 * s**2 - amplitude * math.sin(2.0 * (t + rise + s)),
+            0.5,
+            3.0,
+            xtol=1e-15,
+        )
     )
     w = 2.0 * amplitude * math.cos(2.0 * later)
     return later, 1.6 * w - 0.6 * (back - 0.3 * (later - t - rise))
@@ -159,9 +204,13 @@ def test_the_doubling_of_a_ball_between_table_and_ceiling_is_that_of_its_parabol
     begin = hit.time % math.pi, float(hit.velocity_after[0])
 
     def flips(amplitude):
-        fixed = fsolve(lambda y: np.subtract(parabolas(amplitude, *y), y) - (math.pi, 0.0), begin, xtol=1e-12)
+        fixed = fsolve(
+            lambda y: np.subtract(parabolas(amplitude, *y), y) - (math.pi, 0.0), begin, xtol=1e-12
+        )
         columns = [
-            np.subtract(parabolas(amplitude, *(fixed + s)), parabolas(amplitude, *(fixed - s))) / 2e-6 for s in 1e-6 * np.eye(2)
+            np.subtract(parabolas(amplitude, *(fixed + s)), parabolas(amplitude, *(fixed - s)))
+            / 2e-6
+            for s in 1e-6 * np.eye(2)
         ]
         return np.linalg.det(np.array(columns).T + np.eye(2))
 
@@ -172,14 +221,20 @@ def test_the_doubling_of_a_ball_between_table_and_ceiling_is_that_of_its_parabol
 def test_exponents_of_a_ball_under_a_ceiling_are_those_of_its_orbit():
     """Two, and none of the dependent gap."""
     orbit = saltus.find_orbit(thrown(), x=1.5, velocity=1.0)
-    found = saltus.lyapunov_spectrum(thrown(), **arguments_of(thrown(), orbit.section_state), periods=32, transient=0)
-    np.testing.assert_allclose(found.values, np.log(np.abs(orbit.multipliers)) / math.pi, rtol=0, atol=1e-5)
+    found = saltus.lyapunov_spectrum(
+        thrown(), **arguments_of(thrown(), orbit.section_state), periods=32, transient=0
+    )
+    np.testing.assert_allclose(
+        found.values, np.log(np.abs(orbit.multipliers)) / math.pi, rtol=0, atol=1e-5
+    )
     assert float(found.values.sum()) == pytest.approx(4.0 * math.log(0.6) / math.pi, rel=1e-8)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pair(ContactModel):
-    """Two masses on springs that are pressed together for a part of the time, between walls that neither of them reaches."""
+    """Two masses on springs that are pressed together for a part of the time, between walls that
+    neither of them reaches.
+    """
 
     length: float = 40.0
     mass: float = 2.0
@@ -214,30 +269,51 @@ class Free(Pair):
 
 
 def pair(model, e=0.3):
-    return System(model=model, load=Load(frequency=1.0, force=Harmonic(1.5)), impact=NewtonImpact(e=e))
+    return System(
+        model=model, load=Load(frequency=1.0, force=Harmonic(1.5)), impact=NewtonImpact(e=e)
+    )
 
 
 def test_an_orbit_whose_dependent_gap_is_closed_at_its_section_has_the_multipliers_of_one_without_walls():
-    free, orbit = (saltus.find_orbit(pair(model), x=-0.6, y=0.3, velocity=(0.0, 0.0)) for model in (Free(), Pair()))
+    free, orbit = (
+        saltus.find_orbit(pair(model), x=-0.6, y=0.3, velocity=(0.0, 0.0))
+        for model in (Free(), Pair())
+    )
     assert "held" in [str(event.kind) for event in orbit.motion().events]
     np.testing.assert_allclose(orbit.section_state, free.section_state, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers)), np.sort(np.abs(free.multipliers)), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        np.sort(np.abs(orbit.multipliers)), np.sort(np.abs(free.multipliers)), rtol=0, atol=1e-10
+    )
 
 
 @pytest.mark.parametrize(
     ("system", "paths", "start", "section"),
     [
-        (thrown(), ("load.frequency", "load.ground.amplitude", "model.height", "impact.e"), (1.5, 1.0), 0.7),
-        (pair(Pair()), ("load.frequency", "model.mass", "load.force.amplitude"), (-0.6, 0.3, 0.0, 0.0), 2.4),
+        (
+            thrown(),
+            ("load.frequency", "load.ground.amplitude", "model.height", "impact.e"),
+            (1.5, 1.0),
+            0.7,
+        ),
+        (
+            pair(Pair()),
+            ("load.frequency", "model.mass", "load.force.amplitude"),
+            (-0.6, 0.3, 0.0, 0.0),
+            2.4,
+        ),
     ],
     ids=["open", "closed"],
 )
-def test_derivatives_of_the_equations_of_an_orbit_are_those_of_differences(system, paths, start, section):
+def test_derivatives_of_the_equations_of_an_orbit_are_those_of_differences(
+    system, paths, start, section
+):
     """With the dependent gap open at the section, and with it closed there."""
     equations = equations_of(system, Signature((), 1, section=section), paths)
     motion = simulate(system, **arguments_of(system, np.array(start)), duration=40.0 * math.tau)
     q, v = motion.at((39.0 * math.tau + section) / equations.frequency(equations.values))
-    guess = np.concatenate(system.to_gaps(section / system.load.frequency, np.atleast_1d(q), np.atleast_1d(v)))
+    guess = np.concatenate(
+        system.to_gaps(section / system.load.frequency, np.atleast_1d(q), np.atleast_1d(v))
+    )
     orbit, step = PeriodicOrbit.near(equations, guess, equations.values, iterations=25), 1e-6
     unknowns, found = orbit.solution.unknowns, orbit.solution.evaluation
     closed = {*equations.held(unknowns, equations.system)} & {*equations.following}
@@ -247,7 +323,9 @@ def test_derivatives_of_the_equations_of_an_orbit_are_those_of_differences(syste
         for j, (moved, raised) in enumerate(shifts):
             places = [(unknowns + s * moved, equations.values + s * raised) for s in (step, -step)]
             ahead, behind = (equations.evaluate(*place).residual for place in places)
-            np.testing.assert_allclose(columns[:, j], (ahead - behind) / (2.0 * step), rtol=1e-7, atol=1e-8)
+            np.testing.assert_allclose(
+                columns[:, j], (ahead - behind) / (2.0 * step), rtol=1e-7, atol=1e-8
+            )
 
     compare(found.parameters, [(0.0 * unknowns, row) for row in np.eye(len(paths))])
     if not closed:  # a state off the surface of a closed contact is put onto it
@@ -256,14 +334,24 @@ def test_derivatives_of_the_equations_of_an_orbit_are_those_of_differences(syste
 
 
 def test_states_of_a_window_lie_on_this_side_of_dependent_gaps():
-    """Those beyond are reflected, those beside a closed one keep it closed, and those that hit it are moved back."""
+    """Those beyond are reflected, those beside a closed one keep it closed, and those that hit it
+    are moved back.
+    """
     system = pair(Pair(length=2.0))
-    window = saltus.systems.check_window([(-2.0, 2.0), (-2.0, 2.0), (-1.0, 1.0), (-1.0, 1.0)], system)
+    window = saltus.systems.check_window(
+        [(-2.0, 2.0), (-2.0, 2.0), (-1.0, 1.0), (-1.0, 1.0)], system
+    )
     states = initial_states(system, 200, window, seed=0)
     assert (states[:, 1] - states[:, 0] > -1e-12).all()
     assert (np.abs(states[:, :2]) <= 2.0 + 1e-12).all()
-    assert (np.abs(states[:, 1] - states[:, 0]) < 1e-12).any()  # some begin with the dependent contact closed
-    np.testing.assert_allclose(on_this_side(system, np.array([[1.0, 0.5, 0.3, 0.1]])), [[0.5, 1.0, 0.3, 0.1]], rtol=0, atol=1e-12)
+    # some begin with the dependent contact closed
+    assert (np.abs(states[:, 1] - states[:, 0]) < 1e-12).any()
+    np.testing.assert_allclose(
+        on_this_side(system, np.array([[1.0, 0.5, 0.3, 0.1]])),
+        [[0.5, 1.0, 0.3, 0.1]],
+        rtol=0,
+        atol=1e-12,
+    )
     beside = states_beside(system, np.array([0.5, 0.5, 0.2, 0.2]), np.array([0.1, 0.0, 0.1, 0.0]))
     np.testing.assert_allclose(beside, [0.55, 0.55, 0.25, 0.25], rtol=0, atol=1e-12)
     (moved,) = before_impacts(system, np.array([[0.5, 0.5, 0.4, 0.0]]))

@@ -16,22 +16,36 @@ def linear(model: Piezo, amplitude: float, frequency: Any) -> tuple[Any, Any]:
     """The complex amplitudes of x and of the voltage without impacts."""
     ratio = model.coupling * 1j * frequency / (1j * frequency + 1.0 / model.resistance)
     push = amplitude * frequency**2
-    return push / (1.0 - frequency**2 + 1j * frequency * model.damping + model.coupling * ratio), ratio
+    return push / (
+        1.0 - frequency**2 + 1j * frequency * model.damping + model.coupling * ratio
+    ), ratio
 
 
-def test_a_linear_harvester_has_the_amplitude_the_multipliers_and_the_power_of_its_closed_form() -> None:
+def test_a_linear_harvester_has_the_amplitude_the_multipliers_and_the_power_of_its_closed_form() -> (
+    None
+):
     model = Piezo()
     system, (x, ratio) = shaken(model, 0.05), linear(model, 0.05, 1.05)
     orbit = saltus.find_orbit(system, x=0.0, voltage=0.0)
     assert orbit.amplitude == pytest.approx(abs(x), abs=1e-13)
-    matrix = np.array([[0.0, 1.0, 0.0], [-1.0, -model.damping, -model.coupling], [0.0, model.coupling, -1.0 / model.resistance]])
+    matrix = np.array(
+        [
+            [0.0, 1.0, 0.0],
+            [-1.0, -model.damping, -model.coupling],
+            [0.0, model.coupling, -1.0 / model.resistance],
+        ]
+    )
     exact = np.exp(np.linalg.eigvals(matrix) * system.load.period)
     assert np.sort_complex(orbit.multipliers) == pytest.approx(np.sort_complex(exact), abs=1e-12)
     power = saltus.energies(orbit).power.sel(part="first_order.voltage")
     assert float(power) == pytest.approx(abs(ratio * x) ** 2 / (2.0 * model.resistance), rel=1e-10)
     motion = saltus.simulate(system, x=0.0, voltage=0.0, periods=300)
-    assert float(saltus.energies(motion).power.sel(part="first_order.voltage")) == pytest.approx(float(power), rel=1e-10)
-    exponents = saltus.lyapunov_spectrum(system, x=0.0, voltage=0.0, periods=40, transient=0, two_trajectories=False)
+    assert float(saltus.energies(motion).power.sel(part="first_order.voltage")) == pytest.approx(
+        float(power), rel=1e-10
+    )
+    exponents = saltus.lyapunov_spectrum(
+        system, x=0.0, voltage=0.0, periods=40, transient=0, two_trajectories=False
+    )
     assert exponents.values.sum() == pytest.approx(np.trace(matrix), abs=1e-9)
 
 
@@ -45,7 +59,9 @@ def test_an_orbit_with_an_impact_closes_by_dop853(model: Piezo) -> None:
     assert len(times) == 1
     assert end == pytest.approx([x, u, v], abs=1e-11)
     found = saltus.sensitivities(system, x=x, voltage=u, velocity=v, periods=1).state[:3, :3]
-    assert np.abs(np.linalg.eigvals(found)).max() == pytest.approx(abs(orbit.multipliers[0]), rel=1e-9)
+    assert np.abs(np.linalg.eigvals(found)).max() == pytest.approx(
+        abs(orbit.multipliers[0]), rel=1e-9
+    )
     balance = saltus.energies(orbit)
     assert abs(balance.defect) < 1e-12 * float(balance.energy.max())
 
@@ -85,7 +101,11 @@ def test_a_verdict_attractors_and_basins_of_a_harvester() -> None:
     (only,) = found
     assert only.orbit.impact_count == 1
     basins = saltus.basins_of_attraction(
-        system, x=np.linspace(-0.5, 0.5, 4), x_velocity=np.linspace(-0.5, 0.5, 4), voltage=0.0, found=found
+        system,
+        x=np.linspace(-0.5, 0.5, 4),
+        x_velocity=np.linspace(-0.5, 0.5, 4),
+        voltage=0.0,
+        found=found,
     )
     assert (basins.label.values == only.label).all()
     with pytest.raises(saltus.ParameterError, match="no state variable 'voltage_velocity'"):
@@ -94,7 +114,9 @@ def test_a_verdict_attractors_and_basins_of_a_harvester() -> None:
 
 def test_exponents_of_lorenz_sum_to_its_divergence() -> None:
     system = saltus.System(model=Lorenz())
-    found = saltus.lyapunov_spectrum(system, x=1.0, y=2.0, z=20.0, periods=32, transient=10, two_trajectories=False)
+    found = saltus.lyapunov_spectrum(
+        system, x=1.0, y=2.0, z=20.0, periods=32, transient=10, two_trajectories=False
+    )
     assert found.values.shape == (3,)
     assert found.values.sum() == pytest.approx(-(10.0 + 1.0 + 8.0 / 3.0), abs=1e-6)
 
@@ -128,7 +150,10 @@ def test_a_rectifier_conducts_beyond_a_surface_of_the_voltage() -> None:
     assert np.sort_complex(orbit.multipliers) == pytest.approx(np.sort_complex(exact), abs=1e-9)
     step, moved = 1e-6, []
     for name in ("x", "voltage", "velocity"):
-        ends = [saltus.simulate(system, **start | {name: start[name] + h}, periods=1).final_state for h in (step, -step)]
+        ends = [
+            saltus.simulate(system, **start | {name: start[name] + h}, periods=1).final_state
+            for h in (step, -step)
+        ]
         moved.append((ends[0] - ends[1])[:3] / (2.0 * step))
     assert np.transpose(moved) == pytest.approx(found, abs=1e-7)
     branch = saltus.continue_orbit(orbit, "load.frequency", (1.04, 1.06))
@@ -141,10 +166,16 @@ def test_a_symmetric_harvester_has_symmetric_orbits() -> None:
         @property
         def contacts(self) -> tuple[saltus.Contact, ...]:
             places = (("left", -1.0, 1), ("right", 1.0, -1))
-            return tuple(saltus.Contact(name=n, coordinate="x", position=s * self.stop, sign=d) for n, s, d in places)
+            return tuple(
+                saltus.Contact(name=n, coordinate="x", position=s * self.stop, sign=d)
+                for n, s, d in places
+            )
 
         def mirror(self, load: Any) -> Any:
-            return saltus.Load(frequency=load.frequency, ground=saltus.Harmonic(amplitude=-load.channels["ground"].amplitude))
+            return saltus.Load(
+                frequency=load.frequency,
+                ground=saltus.Harmonic(amplitude=-load.channels["ground"].amplitude),
+            )
 
     orbit = saltus.find_orbit(shaken(Both(), 0.3), x=0.0, voltage=0.0)
     assert orbit.symmetric
@@ -163,6 +194,10 @@ def test_a_sweep_gives_the_power_of_the_closed_form() -> None:
     def electric(motion: saltus.Motion) -> Any:
         return saltus.energies(motion).power.sel(part="first_order.voltage")
 
-    sweep = saltus.frequency_sweep(shaken(model, 0.05), values, x=0.0, voltage=0.0, functions={"electric": electric})
+    sweep = saltus.frequency_sweep(
+        shaken(model, 0.05), values, x=0.0, voltage=0.0, functions={"electric": electric}
+    )
     x, ratio = linear(model, 0.05, values)
-    assert sweep.electric.sel(direction="up").values == pytest.approx(np.abs(ratio * x) ** 2 / 2.8, rel=1e-7)
+    assert sweep.electric.sel(direction="up").values == pytest.approx(
+        np.abs(ratio * x) ** 2 / 2.8, rel=1e-7
+    )

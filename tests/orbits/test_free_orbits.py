@@ -1,4 +1,6 @@
-"""Free orbits and backbones against closed forms and against energy integrals in 40 digits; what has no free orbit is told."""
+"""Free orbits and backbones against closed forms and against energy integrals in 40 digits; what
+has no free orbit is told.
+"""
 
 from dataclasses import dataclass
 
@@ -36,11 +38,15 @@ def test_the_free_period_of_a_slender_block_is_housners():
 def test_the_free_period_of_a_rigid_block_is_the_elliptic_integral():
     system = System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
     angles = np.array([0.001, 0.1, 0.25, 0.29])
-    assert backbone(system, angles).period.values == pytest.approx(theory.rocking_period(angles, alpha=0.3), rel=1e-11)
+    assert backbone(system, angles).period.values == pytest.approx(
+        theory.rocking_period(angles, alpha=0.3), rel=1e-11
+    )
 
 
 def potential(theta, beta0, stiffness, vertical, horizontal):
-    """`pot_balance0`: k^P theta^2 / 2 + V [sin(beta0) - sin(beta0 + |theta|)] + s H [cos(beta0 + |theta|) - cos(beta0)]."""
+    """`pot_balance0`: k^P theta^2 / 2 + V [sin(beta0) - sin(beta0 + |theta|)] + s H [cos(beta0 +
+    |theta|) - cos(beta0)].
+    """
     size, sign = abs(theta), 1 if theta > 0 else -1
     spring = stiffness if theta > 0 else 1
     forces = (
@@ -54,8 +60,12 @@ def potential(theta, beta0, stiffness, vertical, horizontal):
     ("beta0", "stiffness", "mass", "vertical", "horizontal"),
     [(1.4, 1.0, 0.0, -0.5, 0.0), (1.4, 1.7, 0.4, -0.5, 0.03), (1.2, 0.6, 0.2, -0.1, 0.0)],
 )
-def test_the_backbone_of_the_metainterface_is_its_energy_integral(beta0, stiffness, mass, vertical, horizontal):
-    """T = 2 sum over both sides of the integral of dtheta / sqrt(2 (E - P(theta)) / (1 + m)^P), by Gauss in 40 digits."""
+def test_the_backbone_of_the_metainterface_is_its_energy_integral(
+    beta0, stiffness, mass, vertical, horizontal
+):
+    """T = 2 sum over both sides of the integral of dtheta / sqrt(2 (E - P(theta)) / (1 + m)^P), by
+    Gauss in 40 digits.
+    """
     system = System(
         model=saltus.Metainterface(beta0=beta0, stiffness_ratio=stiffness, mass_ratio=mass),
         load=saltus.Load(vertical=vertical, horizontal=horizontal),
@@ -66,7 +76,9 @@ def test_the_backbone_of_the_metainterface_is_its_energy_integral(beta0, stiffne
     assert (data.outcome == "periodic").all()
     with mpmath.workdps(40):
         numbers = [mpmath.mpf(float(x)) for x in (beta0, stiffness, vertical, horizontal)]
-        for amplitude, turning, period in zip(amplitudes, data.turning.values, data.period.values, strict=True):
+        for amplitude, turning, period in zip(
+            amplitudes, data.turning.values, data.period.values, strict=True
+        ):
             energy = potential(mpmath.mpf(float(amplitude)), *numbers)
             low = mpmath.findroot(lambda x, e=energy: potential(x, *numbers) - e, float(turning))
             assert float(low) == pytest.approx(turning, abs=1e-11)
@@ -76,7 +88,12 @@ def test_the_backbone_of_the_metainterface_is_its_energy_integral(beta0, stiffne
 
                 # theta = end (1 - u^2) takes the singularity of the turning point away
                 def time(u, e=energy, b=end, m=weight):
-                    return 2 * u * abs(b) / mpmath.sqrt(2 * (e - potential(b * (1 - u**2), *numbers)) / m)
+                    return (
+                        2
+                        * u
+                        * abs(b)
+                        / mpmath.sqrt(2 * (e - potential(b * (1 - u**2), *numbers)) / m)
+                    )
 
                 total += 2 * mpmath.quad(time, [0, 0.5, 1], method="gauss-legendre")
             assert period == pytest.approx(float(total), rel=1e-10)
@@ -94,17 +111,23 @@ def test_between_a_wall_and_a_spring():
 
 
 def test_one_free_orbit_is_a_motion_that_comes_back():
-    orbit = free_orbit(System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)), 0.1)
+    orbit = free_orbit(
+        System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)), 0.1
+    )
     motion = orbit.motion()
     assert (motion.theta, motion.velocity) == pytest.approx((0.1, 0.0), abs=1e-12)
     assert len(motion.impacts) == 2
-    assert orbit.frequency == pytest.approx(2 * np.pi / theory.rocking_period(0.1, alpha=0.3), rel=1e-11)
+    assert orbit.frequency == pytest.approx(
+        2 * np.pi / theory.rocking_period(0.1, alpha=0.3), rel=1e-11
+    )
 
 
 def test_what_has_no_free_orbit_is_told():
     unforced = saltus.Load(vertical=-0.5)
     damped = System(model=saltus.Metainterface(beta0=1.4, damping=0.1), load=unforced)
-    inelastic = System(model=saltus.Metainterface(beta0=1.4), load=unforced, impact=saltus.VelocityReduction(0.8))
+    inelastic = System(
+        model=saltus.Metainterface(beta0=1.4), load=unforced, impact=saltus.VelocityReduction(0.8)
+    )
     block = System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
     for system, start, outcome in (
         (damped, 0.4, "lost"),
@@ -113,9 +136,14 @@ def test_what_has_no_free_orbit_is_told():
         (block, 0.0, "equilibrium"),
     ):
         assert backbone(system, [start]).outcome.values.tolist() == [outcome]
-    with pytest.raises(MotionError, match=r"no free orbit begins at rest at theta = 0.4: .* energy is lost"):
+    with pytest.raises(
+        MotionError, match=r"no free orbit begins at rest at theta = 0.4: .* energy is lost"
+    ):
         free_orbit(damped, 0.4)
-    forced = System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.1)))
+    forced = System(
+        model=saltus.Metainterface(beta0=1.4),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.1)),
+    )
     with pytest.raises(ParameterError, match=r"load\.horizontal varies"):
         backbone(forced, [0.1])
     with pytest.raises(ParameterError, match="amplitudes must be finite numbers"):
@@ -123,7 +151,10 @@ def test_what_has_no_free_orbit_is_told():
 
 
 def test_the_picture_of_a_backbone_has_frequencies_and_amplitudes():
-    data = backbone(System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)), [0.05, 0.1, 0.2, 0.35])
+    data = backbone(
+        System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)),
+        [0.05, 0.1, 0.2, 0.35],
+    )
     (ax,) = figure_of(draw_backbone(data)).axes
     (line,) = ax.lines
     assert line.get_xdata()[:3] == pytest.approx(data.frequency.values[:3])

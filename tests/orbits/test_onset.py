@@ -1,4 +1,6 @@
-"""The onset of the non-trivial motion under a fast load (errata 28): the fold of the branch against the closed form."""
+"""The onset of the non-trivial motion under a fast load (errata 28): the fold of the branch against
+the closed form.
+"""
 
 import math
 from functools import cache
@@ -15,11 +17,15 @@ AMPLITUDE = "load.horizontal.amplitude"
 
 
 def closed_form(frequency, order=1):
-    return float(high_frequency_onset(frequency, beta0=BETA, vertical=VERTICAL, damping=DAMPING, order=order))
+    return float(
+        high_frequency_onset(frequency, beta0=BETA, vertical=VERTICAL, damping=DAMPING, order=order)
+    )
 
 
 def parabola(frequency, load):
-    """theta and theta' at tau = 0 of the leading-order motion, x = A u (pi - abs(u)) / 2, on its upper branch."""
+    """theta and theta' at tau = 0 of the leading-order motion, x = A u (pi - abs(u)) / 2, on its
+    upper branch.
+    """
     angle = math.pi - math.asin(closed_form(frequency) / load)
     closing = -VERTICAL * math.cos(BETA)
     theta = -closing * angle * (math.pi - angle) / 2 / frequency**2

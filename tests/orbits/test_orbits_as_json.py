@@ -1,4 +1,6 @@
-"""Orbits, special points and branches as JSON and arrays: what comes back is the same bit for bit, and nothing else is made."""
+"""Orbits, special points and branches as JSON and arrays: what comes back is the same bit for bit,
+and nothing else is made.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ FAMILIES = {"through folds and grazings": ({}, (0.25, 1.0)), "resting": (LOSSY, 
 
 def family(name):
     changes, bounds = FAMILIES[name]
-    return saltus.continue_orbit(saltus.find_orbit(forced().with_(changes), theta=0.3), FREQUENCY, bounds)
+    return saltus.continue_orbit(
+        saltus.find_orbit(forced().with_(changes), theta=0.3), FREQUENCY, bounds
+    )
 
 
 def assert_same(branch, back):
@@ -29,7 +33,9 @@ def assert_same(branch, back):
         np.testing.assert_array_equal(one.tangent, other.tangent)
         for name, values in vars(one.orbit.solution.evaluation).items():
             if not name.startswith("_"):
-                np.testing.assert_array_equal(values, getattr(other.orbit.solution.evaluation, name))
+                np.testing.assert_array_equal(
+                    values, getattr(other.orbit.solution.evaluation, name)
+                )
     joined = [[each.is_joined(i) for i in range(len(each.points) - 1)] for each in (branch, back)]
     assert joined[0] == joined[1]
     xr.testing.assert_identical(branch.to_xarray(), back.to_xarray())
@@ -47,7 +53,10 @@ def test_a_branch_comes_back_bit_for_bit(name):
 def test_what_is_born_at_a_special_point_that_came_back_is_the_same():
     branch = family("through folds and grazings")
     special = next(point for point in branch.special if point.kind == "BPC")
-    born, again = (switch_branch(point, (0.25, 1.0), both=False) for point in (special, from_json(as_json(special))))
+    born, again = (
+        switch_branch(point, (0.25, 1.0), both=False)
+        for point in (special, from_json(as_json(special)))
+    )
     for one, other in zip(born, again, strict=True):
         assert_same(one, other)
 

@@ -1,4 +1,6 @@
-"""Orbits, branches and verdicts are pickled and copied: to processes, to disk, to a colleague with the same models."""
+"""Orbits, branches and verdicts are pickled and copied: to processes, to disk, to a colleague with
+the same models.
+"""
 
 import copy
 import pickle
@@ -13,10 +15,16 @@ import saltus
 def orbit():
     load = saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5)
     model = saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1)
-    return saltus.find_orbit(saltus.System(model=model, load=load, impact=saltus.VelocityReduction(1.0)), theta=0.3)
+    return saltus.find_orbit(
+        saltus.System(model=model, load=load, impact=saltus.VelocityReduction(1.0)), theta=0.3
+    )
 
 
-@pytest.mark.parametrize("again", [lambda found: pickle.loads(pickle.dumps(found)), copy.deepcopy], ids=["pickle", "copy"])
+@pytest.mark.parametrize(
+    "again",
+    [lambda found: pickle.loads(pickle.dumps(found)), copy.deepcopy],
+    ids=["pickle", "copy"],
+)
 def test_a_branch_that_is_read_back_is_solved_as_before(orbit, again):
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.99, 1.01))
     (before,), (after,) = branch.at(1.003), again(branch).at(1.003)

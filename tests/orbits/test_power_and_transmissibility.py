@@ -1,4 +1,6 @@
-"""Transmissibility and mean dissipated power: of linear oscillators by their formulas, of orbits by the power of the load."""
+"""Transmissibility and mean dissipated power: of linear oscillators by their formulas, of orbits by
+the power of the load.
+"""
 
 import itertools
 
@@ -26,7 +28,9 @@ def gain(w):
 
 
 def test_of_a_linear_oscillator_the_force_on_the_ground_has_the_textbook_ratio():
-    """T = sqrt((k^2 + c^2 w^2) / ((k - w^2)^2 + c^2 w^2)); of the displacement 1 / sqrt((k - w^2)^2 + c^2 w^2)."""
+    """T = sqrt((k^2 + c^2 w^2) / ((k - w^2)^2 + c^2 w^2)); of the displacement 1 / sqrt((k - w^2)^2
+    + c^2 w^2).
+    """
     orbit = saltus.find_orbit(linear(), x=0.1)
     on_ground = transmissibility(orbit, "force", lambda t, x, v: K * x + C * v)
     assert on_ground == pytest.approx(np.hypot(K, C * W) * gain(W), rel=1e-12)
@@ -45,7 +49,9 @@ def test_of_a_linear_oscillator_the_power_is_that_of_its_dashpot():
 def mean_load_power(orbit, power):
     """(1/D) int power(t, q, v) dt over an orbit, by SciPy between its impacts."""
     motion = orbit.motion()
-    edges = np.unique(np.clip([motion.start, *motion.impacts.time, motion.time], motion.start, motion.time))
+    edges = np.unique(
+        np.clip([motion.start, *motion.impacts.time, motion.time], motion.start, motion.time)
+    )
     parts = [
         quad(lambda t: power(t, *motion.at(t)), a + 1e-12, b - 1e-12, epsabs=1e-12, limit=200)[0]
         for a, b in itertools.pairwise(edges)
@@ -73,7 +79,9 @@ def test_layers_of_different_masses_dissipate_what_the_load_gives():
 
     def power(t, theta, v):
         size, sign = abs(theta), 1 if theta > 0 else -1
-        return v * (np.sin(beta0 + size) * 0.35 * np.sin(1.1 * t) + sign * np.cos(beta0 + size) * vertical)
+        return v * (
+            np.sin(beta0 + size) * 0.35 * np.sin(1.1 * t) + sign * np.cos(beta0 + size) * vertical
+        )
 
     assert orbit.signature.impact_count > 0
     assert mean_dissipated_power(orbit) == pytest.approx(mean_load_power(orbit, power), rel=1e-7)
@@ -92,13 +100,19 @@ def test_between_two_walls_what_the_load_gives_is_dissipated():
 
 
 def test_a_free_orbit_dissipates_nothing():
-    block = saltus.System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0))
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(1.0)
+    )
     assert mean_dissipated_power(free_orbit(block, 0.1)) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_motion_that_loses_energy_in_its_impacts_has_lost_the_difference():
-    """Free rocking with e = 0.9: what is dissipated is the difference of T + P between the two ends."""
-    block = saltus.System(model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(0.9))
+    """Free rocking with e = 0.9: what is dissipated is the difference of T + P between the two
+    ends.
+    """
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.3), impact=saltus.VelocityReduction(0.9)
+    )
     motion = saltus.simulate(block, theta=0.2, duration=9.0)
 
     def energy(theta, v):

@@ -1,4 +1,6 @@
-"""find_orbit on random systems and starts: an orbit that holds, or a refusal in one sentence; nothing else, ever."""
+"""find_orbit on random systems and starts: an orbit that holds, or a refusal in one sentence;
+nothing else, ever.
+"""
 
 import math
 
@@ -14,7 +16,8 @@ from saltus import MotionError, ParameterError, Record, find_orbit, simulate
 pytestmark = pytest.mark.thorough  # many structures of their own
 
 FEW = settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-LEAST = 3  # orbits that a test of ten examples must have seen: one that finds nothing has shown nothing
+# orbits that a test of ten examples must have seen: one that finds nothing has shown nothing
+LEAST = 3
 numbers = {
     "beta0": st.floats(0.5, 2.2),
     "C": st.floats(0.03, 0.5),
@@ -40,7 +43,11 @@ def check(orbit):
     motion = simulate(orbit.system, **orbit.start(), periods=orbit.period, tol=1e-13)
     assert motion.side != 0  # it does not rest
     if len(orbit.impact_times):
-        inner = [t for t in motion.impacts.time if 1e-6 < t - orbit.impact_times[0] < orbit.duration - 1e-6]
+        inner = [
+            t
+            for t in motion.impacts.time
+            if 1e-6 < t - orbit.impact_times[0] < orbit.duration - 1e-6
+        ]
         assert len(inner) == len(orbit.impact_times) - 1
 
 
@@ -52,7 +59,9 @@ def outcome(system, **arguments):
         sentence = str(refusal)
         assert "\n" not in sentence
         assert 20 < len(sentence) < 500
-        assert any(word in sentence for word in ("try", "start", "reaches", "name", "choose", "give")), sentence
+        assert any(
+            word in sentence for word in ("try", "start", "reaches", "name", "choose", "give")
+        ), sentence
         return None
 
 
@@ -60,7 +69,11 @@ def test_settled_motions_of_random_systems():
     seen = []
 
     @FEW
-    @given(theta=st.floats(-2.0, 2.0), velocity=st.floats(-1.0, 1.0), system=st.builds(forced, **numbers))
+    @given(
+        theta=st.floats(-2.0, 2.0),
+        velocity=st.floats(-1.0, 1.0),
+        system=st.builds(forced, **numbers),
+    )
     def settled(system, theta, velocity):
         orbit = outcome(system, theta=theta, velocity=velocity, settle=60, max_period=3)
         if orbit is not None:
@@ -76,7 +89,9 @@ def test_orbits_near_random_states():
     seen = []
 
     @FEW
-    @given(st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.integers(1, 4), st.builds(forced, **numbers))
+    @given(
+        st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.integers(1, 4), st.builds(forced, **numbers)
+    )
     def near(theta, velocity, period, system):
         orbit = outcome(system, theta=theta, velocity=velocity, settle=0, period=period)
         if orbit is not None:
@@ -91,7 +106,11 @@ def test_orbits_near_random_states():
 def test_impact_oscillators():
     seen = []
     oscillators = st.builds(
-        walled, A=st.floats(0.05, 1.5), W=st.floats(0.4, 3.0), wall=st.floats(-0.4, 1.2), e=st.floats(0.3, 1.0)
+        walled,
+        A=st.floats(0.05, 1.5),
+        W=st.floats(0.4, 3.0),
+        wall=st.floats(-0.4, 1.2),
+        e=st.floats(0.3, 1.0),
     )
 
     @FEW
@@ -112,7 +131,9 @@ def test_chaos_is_refused_with_what_to_try():
 
 
 def test_rest_is_refused_with_what_to_try():
-    with pytest.raises(MotionError, match=r"the undeformed state, which is no orbit to follow.*start farther"):
+    with pytest.raises(
+        MotionError, match=r"the undeformed state, which is no orbit to follow.*start farther"
+    ):
         find_orbit(forced(H=0.03), theta=0.05, parameters=(FREQUENCY,))
 
 

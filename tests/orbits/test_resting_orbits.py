@@ -1,4 +1,6 @@
-"""Orbits that rest for a part of their period: released by the load alone, reached from anywhere, followed to where rest ends."""
+"""Orbits that rest for a part of their period: released by the load alone, reached from anywhere,
+followed to where rest ends.
+"""
 
 import functools
 import math
@@ -27,12 +29,19 @@ from saltus.errors import MotionError
 from saltus.flow import EventKind, contact_pull, load_releases
 from saltus.orbits import Branch, OrbitEnd
 
-HCR = 0.5 / math.tan(BETA80)  # abs(V / tan(beta0)), from which on a horizontal load releases the mass from rest
-HHAT, ZETA, AMPLITUDE = "load.horizontal.amplitude", "load.ground_horizontal.amplitude", "load.force.amplitude"
+# abs(V / tan(beta0)), from which on a horizontal load releases the mass from rest
+HCR = 0.5 / math.tan(BETA80)
+HHAT, ZETA, AMPLITUDE = (
+    "load.horizontal.amplitude",
+    "load.ground_horizontal.amplitude",
+    "load.force.amplitude",
+)
 
 
 def energetic():
-    """Unequal layers, whose impacts restitute a share of the energy; beta0 is small enough for slow impacts to be solvable."""
+    """Unequal layers, whose impacts restitute a share of the energy; beta0 is small enough for slow
+    impacts to be solvable.
+    """
     return System(
         model=Metainterface(beta0=BETA80, damping=0.1, mass_ratio=0.2),
         load=Load(frequency=0.2, horizontal=Harmonic(amplitude=0.15), vertical=-0.5),
@@ -52,14 +61,32 @@ def inelastic():
 CASES = {  # system, start, forcing periods, rests in a period of the orbit, own mirror image
     "metainterface": (forced(H=0.15, W=0.2, e=0.3), {"theta": 0.3}, 1, 2, True),
     "no bounce": (forced(H=0.15, W=0.2, e=0.0), {"theta": 0.3}, 1, 2, True),
-    "unequal layers, a mean load": (forced(H=0.15, mean=0.02, W=0.2, e=0.4, k=1.2, m=0.2, c=0.7), {"theta": 0.1}, 1, 2, False),
+    "unequal layers, a mean load": (
+        forced(H=0.15, mean=0.02, W=0.2, e=0.4, k=1.2, m=0.2, c=0.7),
+        {"theta": 0.1},
+        1,
+        2,
+        False,
+    ),
     "released to one side": (forced(H=0.12, mean=0.1, W=0.2, e=0.4), {"theta": 0.1}, 1, 1, False),
     "restitution of energy": (energetic(), {"theta": 0.1}, 1, 2, False),
     "inelastic": (inelastic(), {"theta": 0.1}, 1, 2, True),
     "rocking block": (rocking(a=1.2, W=3.0, alpha=0.6), {"theta": 0.01}, 1, 2, True),
     "on the wall": (walled(A=0.8, W=0.5, wall=0.5, e=0.3), {"x": 0.2}, 1, 1, False),
-    "on the wall, every other period": (walled(A=0.6, W=2.2, wall=0.2, e=0.05), {"x": 0.0}, 2, 1, False),
-    "on the wall, every sixth period": (walled(A=3.0, W=3.8, wall=-0.3, e=0.2), {"x": -0.5}, 6, 1, False),
+    "on the wall, every other period": (
+        walled(A=0.6, W=2.2, wall=0.2, e=0.05),
+        {"x": 0.0},
+        2,
+        1,
+        False,
+    ),
+    "on the wall, every sixth period": (
+        walled(A=3.0, W=3.8, wall=-0.3, e=0.2),
+        {"x": -0.5},
+        6,
+        1,
+        False,
+    ),
 }
 
 
@@ -77,7 +104,9 @@ def family_of(name, path, bounds):
 ELSEWHERE = ("restitution of energy", "inelastic", "rocking block")  # each compiles for itself
 
 
-@pytest.fixture(params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in CASES])
+@pytest.fixture(
+    params=[pytest.param(n, marks=[pytest.mark.thorough] * (n in ELSEWHERE)) for n in CASES]
+)
 def name(request):
     return request.param
 
@@ -104,13 +133,20 @@ def only(branch, kind):
     return point
 
 
-# --- releases ------------------------------------------------------------------------------------------------------------
+# --- releases ----------------------------------------------------------------
 
 
 @settings(deadline=None, max_examples=60)
-@given(beta0=st.floats(0.3, 1.5), V=st.floats(-2.0, -0.1), beyond=st.floats(1e-6, 20.0), W=st.floats(0.01, 20.0))
+@given(
+    beta0=st.floats(0.3, 1.5),
+    V=st.floats(-2.0, -0.1),
+    beyond=st.floats(1e-6, 20.0),
+    W=st.floats(0.01, 20.0),
+)
 def test_load_i_releases_where_it_passes_hcr(beta0, V, beyond, W):
-    """sin(Omega t) = Hcr / Hhat on side +1, half a period later on side -1; the pull grows to (Hhat - Hcr) sin(beta0)."""
+    """sin(Omega t) = Hcr / Hhat on side +1, half a period later on side -1; the pull grows to (Hhat
+    - Hcr) sin(beta0).
+    """
     Hcr = abs(V / math.tan(beta0))
     H = Hcr * (1.0 + beyond)
     lower, upper = load_releases(forced(beta0=beta0, V=V, H=H, W=W))
@@ -137,21 +173,29 @@ def test_the_wall_lets_go_where_the_force_falls_below_its_spring(A, W):
 
 
 def test_higher_harmonics_release_more_often_and_two_peaks_share_a_root():
-    """Under sin(t) + sin(5 t) the load passes Hcr upwards as often as sampling finely shows, on each side."""
+    """Under sin(t) + sin(5 t) the load passes Hcr upwards as often as sampling finely shows, on
+    each side.
+    """
     system = System(
         model=Metainterface(beta0=BETA80, damping=0.1),
-        load=Load(frequency=1.0, horizontal=Harmonic(amplitude=0.2) + Harmonic(amplitude=0.2, order=5), vertical=-0.5),
+        load=Load(
+            frequency=1.0,
+            horizontal=Harmonic(amplitude=0.2) + Harmonic(amplitude=0.2, order=5),
+            vertical=-0.5,
+        ),
     )
     t = np.linspace(0.0, 2.0 * math.pi, 200_001)
     found = load_releases(system)
     for side in (1, -1):
         beyond = side * (0.2 * np.sin(t) + 0.2 * np.sin(5 * t)) > HCR
         expected = t[1:][beyond[1:] & ~beyond[:-1]]
-        assert [r.time for r in found if r.side == side] == pytest.approx(expected.tolist(), abs=1e-4)
+        assert [r.time for r in found if r.side == side] == pytest.approx(
+            expected.tolist(), abs=1e-4
+        )
         assert all(abs(contact_pull(system, side)(r.time)) < 1e-14 for r in found if r.side == side)
 
 
-# --- orbits --------------------------------------------------------------------------------------------------------------
+# --- orbits ------------------------------------------------------------------
 
 
 def test_kind_of_each_orbit(name):
@@ -168,24 +212,33 @@ def test_kind_of_each_orbit(name):
 
 
 def test_its_impacts_solve_the_equations_of_smooth_segments(name):
-    """Another integration than the one that found them: at each impact the next is met, with its speed."""
+    """Another integration than the one that found them: at each impact the next is met, with its
+    speed.
+    """
     orbit = orbit_of(name)
     assert orbit.residual < 1e-13
     assert orbit.defect < 1e-12
 
 
 def test_motions_from_anywhere_become_it_and_stay_for_ever(name):
-    """From another state the motion is the orbit's after 72 of its periods, at 64 instants; from the orbit still after 200."""
+    """From another state the motion is the orbit's after 72 of its periods, at 64 instants; from
+    the orbit still after 200.
+    """
     system, start, *_ = CASES[name]
     orbit = orbit_of(name)
     (coordinate,) = start
-    away = {coordinate: start[coordinate] - (0.05 if coordinate == "x" else 0.4 * start[coordinate]), "velocity": 0.0}
+    away = {
+        coordinate: start[coordinate] - (0.05 if coordinate == "x" else 0.4 * start[coordinate]),
+        "velocity": 0.0,
+    }
     period = orbit.system.load.period
     times = orbit.start()["time"] + orbit.duration * (np.arange(64) + 0.5) / 64.0
     expected, distances = np.stack(orbit.motion().at(times)), []
     for turn in range(orbit.period):  # an orbit of q forcing periods may begin in any of them
         shift = (72 * orbit.period + turn) * period
-        settled = simulate(system, **away, duration=shift + 2.0 * orbit.duration, times=shift + times).kept
+        settled = simulate(
+            system, **away, duration=shift + 2.0 * orbit.duration, times=shift + times
+        ).kept
         found = np.stack([settled.position[0], settled.velocity[0]])
         distances.append(np.abs(found - expected).max())
     assert min(distances) < 1e-11
@@ -206,12 +259,18 @@ def test_it_does_not_come_back_earlier(name):
 
 
 def test_the_derivative_of_the_flow_over_its_period_is_0(name):
-    """The saltation of every impact, of rest and of release, from a state in flight: multipliers 0, exactly."""
+    """The saltation of every impact, of rest and of release, from a state in flight: multipliers 0,
+    exactly.
+    """
     orbit = orbit_of(name)
     flying = orbit.releases[0] + 0.5 * (orbit.impact_times[0] - orbit.releases[0]) + orbit.duration
     position, velocity = orbit.motion(2 * orbit.period).at(flying)
     found = sensitivities(
-        orbit.system, **{orbit.system.model.coordinates[0]: position}, velocity=velocity, time=flying, periods=orbit.period
+        orbit.system,
+        **{orbit.system.model.coordinates[0]: position},
+        velocity=velocity,
+        time=flying,
+        periods=orbit.period,
     )
     assert found.undefined is None
     assert np.abs(found.state).max() == 0.0
@@ -222,10 +281,17 @@ def test_it_is_released_where_the_load_alone_says(name):
     orbit = orbit_of(name)
     motion = orbit.motion(3 * orbit.period, tol=1e-14)
     events = [e for e in motion.events.of(EventKind.RELEASE) if e.time > motion.start + 1e-6]
-    period, known = orbit.system.load.period, {(r.side, r.time) for r in load_releases(orbit.system)}
+    period, known = (
+        orbit.system.load.period,
+        {(r.side, r.time) for r in load_releases(orbit.system)},
+    )
     assert len(events) >= 2 * len(orbit.releases)
     for event in events:
-        turned = [abs((event.time - t + period / 2) % period - period / 2) for side, t in known if side == event.side]
+        turned = [
+            abs((event.time - t + period / 2) % period - period / 2)
+            for side, t in known
+            if side == event.side
+        ]
         assert min(turned) < 1e-13 * max(1.0, event.time)
 
 
@@ -238,7 +304,9 @@ def test_a_symmetric_one_is_its_own_mirror_image_half_a_period_later(name):
     assert np.abs(np.asarray(motion.at(times + half)) + np.asarray(motion.at(times))).max() < 1e-13
     assert orbit.releases[1] - orbit.releases[0] == pytest.approx(half, rel=1e-14)
     assert orbit.lowest == -orbit.highest
-    second = (motion.impacts.time > orbit.releases[1]) & (motion.impacts.time < orbit.rests[1] + 1e-9)
+    second = (motion.impacts.time > orbit.releases[1]) & (
+        motion.impacts.time < orbit.rests[1] + 1e-9
+    )
     mirrored = orbit.impact_times[len(orbit.impact_times) // 2 :]
     assert motion.impacts.time[second][:3] == pytest.approx(mirrored[:3], rel=1e-13)
 
@@ -247,7 +315,12 @@ def test_without_bounce_it_rests_from_the_first_impact_under_pressure():
     """At e = 0 the motion starts anew from its impacts as well."""
     orbit = orbit_of("no bounce")
     assert orbit.rests == pytest.approx(orbit.impact_times, rel=1e-14)
-    share = sum(n - r for r, n in zip(orbit.rests, [*orbit.releases[1:], orbit.releases[0] + orbit.duration], strict=True))
+    share = sum(
+        n - r
+        for r, n in zip(
+            orbit.rests, [*orbit.releases[1:], orbit.releases[0] + orbit.duration], strict=True
+        )
+    )
     assert orbit.rest_share == pytest.approx(share / orbit.duration)
 
 
@@ -266,7 +339,7 @@ def test_extrema_and_margins_are_those_of_the_motion(name):
     assert orbit.validity.respected == all(least > 0.0 for least in orbit.margins.values())
 
 
-# --- families ------------------------------------------------------------------------------------------------------------
+# --- families ----------------------------------------------------------------
 
 
 def test_shrinks_to_rest_at_hcr_like_the_square_of_what_is_beyond():
@@ -287,23 +360,32 @@ def test_a_release_lost_on_one_side_and_born_on_it_is_the_same_point():
     """With a mean load the releases are lost one after the other, at Hcr + mean and at Hcr - mean."""
     both = family_of("unequal layers, a mean load", HHAT, (0.05, 0.25))
     assert [p.kind for p in both.special][:2] == ["RL", "RL"]
-    assert [p.parameter for p in both.special][:2] == pytest.approx([HCR - 0.02, HCR + 0.02], abs=1e-10)
+    assert [p.parameter for p in both.special][:2] == pytest.approx(
+        [HCR - 0.02, HCR + 0.02], abs=1e-10
+    )
     assert both.ends[0].reason is OrbitEnd.NO_PULL
     system = CASES["unequal layers, a mean load"][0].with_({HHAT: 0.09})
     one = continue_orbit(find_orbit(system, theta=0.1), HHAT, (0.03, 0.25))
     assert len(one.orbits[0].releases) == 1
     assert [p.kind for p in one.special][:2] == ["RL", "RL"]
-    assert [p.parameter for p in one.special][:2] == pytest.approx([HCR - 0.02, HCR + 0.02], abs=1e-10)
-    for value in (0.1, 0.15, 0.2):  # it goes on beyond the release that is born, and is then the same branch
+    assert [p.parameter for p in one.special][:2] == pytest.approx(
+        [HCR - 0.02, HCR + 0.02], abs=1e-10
+    )
+    # it goes on beyond the release that is born, and is then the same branch
+    for value in (0.1, 0.15, 0.2):
         assert one.at(value)[0].amplitude == pytest.approx(both.at(value)[0].amplitude, abs=1e-12)
 
 
 @pytest.mark.thorough
 def test_a_symmetric_orbit_goes_on_where_the_symmetry_ends():
-    """Along a mean load: as far either way, to where the releases of one side are lost, at Hhat - Hcr."""
+    """Along a mean load: as far either way, to where the releases of one side are lost, at Hhat -
+    Hcr.
+    """
     family = family_of("metainterface", "load.horizontal.mean", (-0.2, 0.2))
     assert [p.kind for p in family.special] == ["RL", "RL"]
-    assert [p.parameter for p in family.special] == pytest.approx([HCR - 0.15, 0.15 - HCR], abs=1e-10)
+    assert [p.parameter for p in family.special] == pytest.approx(
+        [HCR - 0.15, 0.15 - HCR], abs=1e-10
+    )
     assert not any(orbit.symmetric for orbit in family.orbits)
     for mean in (0.01, 0.05):
         (lower,), (upper,) = family.at(-mean), family.at(mean)
@@ -318,7 +400,9 @@ def test_ground_motion_releases_a_block_from_tan_alpha_on():
 
 
 def test_rest_vanishes_where_impacts_no_longer_die_away():
-    """CH: rest is there just before, not just after, where the orbit has many impacts and continues the family."""
+    """CH: rest is there just before, not just after, where the orbit has many impacts and continues
+    the family.
+    """
     family = family_of("metainterface", HHAT, (0.05, 0.5))
     point = only(family, "CH")
     assert point.evidence.bracket < 1e-10
@@ -331,11 +415,14 @@ def test_rest_vanishes_where_impacts_no_longer_die_away():
     assert len(simulate(after.system, **after.start(), periods=5).events.of(EventKind.REST)) == 0
     assert after.amplitude == pytest.approx(point.amplitude, abs=1e-4)
     assert np.abs(after.multipliers).max() < 1e-3
-    assert family.ends[1].parameter == 0.5  # beyond it the family goes on with orbits that do not rest
+    # beyond it the family goes on with orbits that do not rest
+    assert family.ends[1].parameter == 0.5
 
 
 def test_the_orbits_beyond_gather_grazings_and_folds_towards_the_end():
-    """The family without rest, followed back, grazes ever more often, and does not get past the point at which rest ends."""
+    """The family without rest, followed back, grazes ever more often, and does not get past the
+    point at which rest ends.
+    """
     point = only(family_of("metainterface", HHAT, (0.05, 0.5)), "CH")
     beyond = continue_orbit(find_orbit(forced(H=0.34, W=0.2, e=0.3), theta=0.3), HHAT, (0.3, 0.345))
     grazings = [p.parameter for p in beyond.special if p.kind == "GR"]
@@ -357,7 +444,11 @@ def wall_flight(A, W, wall, start, velocity):
 
     def position(t):
         s = t - start
-        return X * mp.cos(W * t) + Y * mp.sin(W * t) + mp.exp(-c * s / 2) * (a * mp.cos(w * s) + b * mp.sin(w * s))
+        return (
+            X * mp.cos(W * t)
+            + Y * mp.sin(W * t)
+            + mp.exp(-c * s / 2) * (a * mp.cos(w * s) + b * mp.sin(w * s))
+        )
 
     def speed(t):
         s = t - start
@@ -371,7 +462,9 @@ OTHER = "on the wall, every other period"  # A = 0.6, W = 2.2, wall = 0.2, e = 0
 
 
 def test_grazing_is_that_of_the_closed_form():
-    """The flight from the release touches the wall a period later: x = d, x' = 0 for A and the time, with 40 digits."""
+    """The flight from the release touches the wall a period later: x = d, x' = 0 for A and the
+    time, with 40 digits.
+    """
     point = only(family_of(OTHER, AMPLITUDE, (0.1, 3.0)), "GR")
     with mp.workdps(40):
         W, wall = mp.mpf("2.2"), mp.mpf("0.2")
@@ -383,15 +476,25 @@ def test_grazing_is_that_of_the_closed_form():
         guess = mp.mpf("0.606")
         position, _ = wall_flight(guess, W, wall, mp.acos(wall / guess) / W, 0)
         times = [mp.acos(wall / guess) / W + i * mp.mpf("0.01") for i in range(50, 500)]
-        nearest = next(b for a, b, c in zip(times, times[1:], times[2:], strict=False) if position(a) < position(b) > position(c))
+        nearest = next(
+            b
+            for a, b, c in zip(times, times[1:], times[2:], strict=False)
+            if position(a) < position(b) > position(c)
+        )
         A, _ = mp.findroot(touch, (guess, nearest))
     assert point.parameter == pytest.approx(float(A), abs=1e-10)
     assert point.orbit.clearance < 1e-9
 
 
 def test_the_end_of_rest_is_that_of_closed_form_flights():
-    """Impact after impact with 30 digits: the force at which they just fail to die away before the wall lets go."""
-    point = next(p for p in family_of(OTHER, AMPLITUDE, (0.1, 3.0)).special if p.kind == "CH" and p.parameter < 0.6)
+    """Impact after impact with 30 digits: the force at which they just fail to die away before the
+    wall lets go.
+    """
+    point = next(
+        p
+        for p in family_of(OTHER, AMPLITUDE, (0.1, 3.0)).special
+        if p.kind == "CH" and p.parameter < 0.6
+    )
     with mp.workdps(30):
         low, high = mp.mpf("0.58"), mp.mpf("0.59")
         assert not dies_away(low)
@@ -413,7 +516,11 @@ def dies_away(A):
         if abs(left) < 1e-2 * (end - t) and abs(velocity) < 1e-4 and end - t < 1:
             return True
         position, speed = wall_flight(A, W, wall, t, -velocity)
-        step = min(mp.mpf("0.05"), 2 * velocity / pressing / 8) if t > begin and pressing > 0 and velocity > 0 else mp.mpf("0.05")
+        step = (
+            min(mp.mpf("0.05"), 2 * velocity / pressing / 8)
+            if t > begin and pressing > 0 and velocity > 0
+            else mp.mpf("0.05")
+        )
         there = t + step
         while position(there) < wall:
             there += step
@@ -425,7 +532,10 @@ def dies_away(A):
 
 def test_the_wall_may_be_scaled_instead_of_the_force():
     """The oscillator is linear: every special point in A / d is one in d, found along another path."""
-    force, wall = family_of(OTHER, AMPLITUDE, (0.1, 3.0)), family_of(OTHER, "model.wall", (0.1, 0.5))
+    force, wall = (
+        family_of(OTHER, AMPLITUDE, (0.1, 3.0)),
+        family_of(OTHER, "model.wall", (0.1, 0.5)),
+    )
     assert [p.kind for p in at_rests(force)] == ["CH", "GR", "CH"]
     assert [p.kind for p in at_rests(wall)] == ["CH", "GR", "CH"]
     by_force = sorted(p.parameter / 0.2 for p in at_rests(force))
@@ -446,7 +556,11 @@ def test_a_family_goes_through_grazings_without_a_leap():
 
 @pytest.mark.parametrize(
     ("name", "path", "bounds"),
-    [("metainterface", HHAT, (0.05, 0.5)), ("metainterface", FREQUENCY, (0.05, 1.0)), (OTHER, FREQUENCY, (1.5, 3.0))],
+    [
+        ("metainterface", HHAT, (0.05, 0.5)),
+        ("metainterface", FREQUENCY, (0.05, 1.0)),
+        (OTHER, FREQUENCY, (1.5, 3.0)),
+    ],
 )
 def test_every_orbit_of_a_family_is_a_motion(name, path, bounds):
     family = family_of(name, path, bounds)
@@ -472,12 +586,16 @@ def test_a_family_ends_at_its_bounds_and_solves_between_its_points():
 def test_the_energy_restituted_is_continued_too():
     family = continue_orbit(orbit_of("restitution of energy"), "impact.r", (0.25, 0.35))
     assert [str(end) for end in family.ends] == ["bound 0.25", "bound 0.35"]
-    assert (np.diff([orbit.rest_share for orbit in family.orbits]) < 0.0).all()  # the longer impacts last, the shorter the rest
+    # the longer impacts last, the shorter the rest
+    assert (np.diff([orbit.rest_share for orbit in family.orbits]) < 0.0).all()
 
 
 def test_margins_and_functions_are_located():
     family = continue_orbit(
-        orbit_of("on the wall"), AMPLITUDE, (0.78, 1.0), functions={"wide": lambda orbit: orbit.amplitude - 1.5}
+        orbit_of("on the wall"),
+        AMPLITUDE,
+        (0.78, 1.0),
+        functions={"wide": lambda orbit: orbit.amplitude - 1.5},
     )
     (point,) = family.special
     assert point.kind == "wide"
@@ -497,13 +615,17 @@ def test_a_family_as_a_dataset():
     assert data.attrs["end_reasons"] == [end.reason.code for end in family.ends]
 
 
-# --- refusals ------------------------------------------------------------------------------------------------------------
+# --- refusals ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("system", "start", "sentence"),
     [
-        (forced(H=0.05, W=0.2, e=0.5), 0.01, "rest at contact for good, as the load never pulls it off"),
+        (
+            forced(H=0.05, W=0.2, e=0.5),
+            0.01,
+            "rest at contact for good, as the load never pulls it off",
+        ),
         (forced(H=0.05, W=0.2), 0.01, "impacts lose nothing and get ever smaller"),
         (forced(H=0.09, W=0.01, C=1.0), 0.01, "its phase is lost .* give the impacts a loss"),
     ],
@@ -519,10 +641,15 @@ def test_the_loss_that_the_refusal_asks_for_gives_an_orbit():
 
 
 @pytest.mark.parametrize(
-    ("beta0", "H", "W", "theta", "velocity"), [(0.5, 1.0, 2.0, 0.0, 1.0), (1.0, 0.5, 3.0, -1.8218389092393839, 0.0)]
+    ("beta0", "H", "W", "theta", "velocity"),
+    [(0.5, 1.0, 2.0, 0.0, 1.0), (1.0, 0.5, 3.0, -1.8218389092393839, 0.0)],
 )
-def test_what_rests_for_good_and_what_lies_beyond_its_contact_is_no_orbit(beta0, H, W, theta, velocity):
-    """Newton's method finds rest; once it found theta = -beta0, where only the other side has an equilibrium."""
+def test_what_rests_for_good_and_what_lies_beyond_its_contact_is_no_orbit(
+    beta0, H, W, theta, velocity
+):
+    """Newton's method finds rest; once it found theta = -beta0, where only the other side has an
+    equilibrium.
+    """
     system = forced(beta0=beta0, C=0.5, V=-1.0, H=H, W=W, e=0.5)
     with pytest.raises(MotionError, match=r"comes to rest .* start elsewhere"):
         find_orbit(system, theta=theta, velocity=velocity, settle=0, period=2)

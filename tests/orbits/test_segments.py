@@ -1,4 +1,6 @@
-"""The equations of a periodic orbit: their values against the event-driven flow, their derivatives against differences."""
+"""The equations of a periodic orbit: their values against the event-driven flow, their derivatives
+against differences.
+"""
 
 import math
 
@@ -15,7 +17,13 @@ from saltus.orbits.equations.one_contact import OneContactEquations, Segments
 from saltus.orbits.signature import Signature
 from saltus.systems import Harmonic, Load, System, VelocityReduction
 
-STARTS = {"forced": (0.6, 0.1), "shaken": (0.5, 0.2), "walled": (0.2, 0.9), "rocking": (0.01, 0.02), "hinged": (1.2, 0.3)}
+STARTS = {
+    "forced": (0.6, 0.1),
+    "shaken": (0.5, 0.2),
+    "walled": (0.2, 0.9),
+    "rocking": (0.01, 0.02),
+    "hinged": (1.2, 0.3),
+}
 
 
 def at_impacts(name):
@@ -28,7 +36,10 @@ def at_impacts(name):
     count = min(8, len(impacts) // 2 * 2)
     sides = tuple(int(s) for s in impacts.side[:count])
     problem = OneContactEquations(system, Signature(sides, 1), paths)
-    phases, speeds = impacts.time[:count] * system.load.frequency, np.abs(impacts.velocity_before[:count])
+    phases, speeds = (
+        impacts.time[:count] * system.load.frequency,
+        np.abs(impacts.velocity_before[:count]),
+    )
     return motion, problem, np.stack([phases, speeds], axis=1).ravel()
 
 
@@ -36,7 +47,8 @@ def at_impacts(name):
 def test_a_motion_solves_the_equation_of_each_of_its_segments(name):
     _, problem, unknowns = at_impacts(name)
     residual = problem.evaluate(unknowns, problem.values).residual.reshape(-1, 2)
-    assert np.abs(residual[:-1]).max() < 2e-12  # the last segment closes the period, which the motion does not
+    # the last segment closes the period, which the motion does not
+    assert np.abs(residual[:-1]).max() < 2e-12
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -62,14 +74,20 @@ def test_derivatives_of_the_equations_to_unknowns_and_parameters(name, impacts):
     jacobian = found.jacobian()
     for j in range(problem.size):
         expected = slope(lambda y: problem.evaluate(y, values).residual, unknowns, j)
-        assert np.abs(jacobian[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max()), f"unknown {j}"
+        assert np.abs(jacobian[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max()), (
+            f"unknown {j}"
+        )
     for j, path in enumerate(paths):
         expected = slope(lambda p: problem.evaluate(unknowns, p).residual, values, j, h=2e-3)
-        assert np.abs(found.parameters[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max()), path
+        assert np.abs(found.parameters[:, j] - expected).max() < 1e-8 * max(
+            1.0, np.abs(expected).max()
+        ), path
 
 
 def one_segment(name, begin, duration, speed=0.6):
-    """A problem of two segments, of which the first goes from phase `begin` over `duration`; the function of its length."""
+    """A problem of two segments, of which the first goes from phase `begin` over `duration`; the
+    function of its length.
+    """
     system, paths = CASES[name]
     both = len(system.model.sides) == 2
     problem = OneContactEquations(system, Signature((1, -1) if both else (1, 1), 1), paths)
@@ -83,21 +101,33 @@ def test_derivatives_of_short_segments_and_of_segments_backwards_in_time(name, d
     jacobian, values = problem.evaluate(unknowns, problem.values), problem.values
     for j in range(4):
         expected = slope(lambda y: problem.evaluate(y, values).residual, unknowns, j)
-        assert np.abs(jacobian.jacobian()[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
+        assert np.abs(jacobian.jacobian()[:, j] - expected).max() < 1e-8 * max(
+            1.0, np.abs(expected).max()
+        )
     for j in range(len(problem.paths)):
         expected = slope(lambda p: problem.evaluate(unknowns, p).residual, values, j)
-        assert np.abs(jacobian.parameters[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
+        assert np.abs(jacobian.parameters[:, j] - expected).max() < 1e-8 * max(
+            1.0, np.abs(expected).max()
+        )
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_segment_of_no_length_is_the_limit_of_its_neighbours(name):
-    """The quotient is even in smoothness: at duration 0 everything equals the mean of what it is a little before and after."""
+    """The quotient is even in smoothness: at duration 0 everything equals the mean of what it is a
+    little before and after.
+    """
     h = 1e-3
 
     def at_duration(duration):
         problem, unknowns = one_segment(name, 1.0, duration)
         equations = problem.evaluate(unknowns, problem.values)
-        return np.concatenate([equations.residual[:2], equations.jacobian()[:2].ravel(), equations.parameters[:2].ravel()])
+        return np.concatenate(
+            [
+                equations.residual[:2],
+                equations.jacobian()[:2].ravel(),
+                equations.parameters[:2].ravel(),
+            ]
+        )
 
     near, nearer = ((at_duration(d) + at_duration(-d)) / 2 for d in (h, h / 2))
     assert np.abs(at_duration(0.0) - (4 * nearer - near) / 3).max() < 1e-9
@@ -111,14 +141,23 @@ def test_derivatives_do_not_jump_where_the_short_segments_begin(name):
         return np.concatenate([equations.jacobian()[:2].ravel(), equations.parameters[:2].ravel()])
 
     limit, scale = at_duration(0.0), SHORT
-    for duration in (0.5 * scale, 0.999 * scale, 1.001 * scale, 5 * scale, -0.999 * scale, -1.001 * scale):
+    for duration in (
+        0.5 * scale,
+        0.999 * scale,
+        1.001 * scale,
+        5 * scale,
+        -0.999 * scale,
+        -1.001 * scale,
+    ):
         assert np.abs(at_duration(duration) - limit).max() < 20 * abs(duration) + 1e-9
 
 
 def test_a_segment_there_and_back_ends_where_it_began():
     """Backwards in time from the end of a smooth motion, on either side and through the contact."""
     system = hinged(edge=0.4)
-    problem = OneContactEquations(system, Signature((), 1, False, -1), ("load.frequency", "model.edge", "impact.e"))
+    problem = OneContactEquations(
+        system, Signature((), 1, False, -1), ("load.frequency", "model.edge", "impact.e")
+    )
     state = np.array([-0.7, 1.1])
     there = problem.carried(state, 0.5, 9.0, problem.values)
     back = problem.carried(there, 9.0, 0.5, problem.values)
@@ -141,17 +180,23 @@ def test_derivatives_of_shooting_without_impacts(name, periods):
     found, values = problem.evaluate(state, problem.values), problem.values
     for j in range(state.size):
         expected = slope(lambda y: problem.evaluate(y, values).residual, state, j)
-        assert np.abs(found.jacobian()[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max())
+        assert np.abs(found.jacobian()[:, j] - expected).max() < 1e-8 * max(
+            1.0, np.abs(expected).max()
+        )
     for j, path in enumerate(paths):
         if path != "impact.e":  # there is no impact: its column is 0 exactly
             expected = slope(lambda p: problem.evaluate(state, p).residual, values, j, h=1e-3)
-            assert np.abs(found.parameters[:, j] - expected).max() < 1e-8 * max(1.0, np.abs(expected).max()), path
+            assert np.abs(found.parameters[:, j] - expected).max() < 1e-8 * max(
+                1.0, np.abs(expected).max()
+            ), path
         else:
             assert (found.parameters[:, j] == 0.0).all()
 
 
 class SteepBelow(OneContactModel):
-    """x'' = force - 0.1 x' - x - push: 0.3 above the contact; below it the push turns round within 0.01 of x = -0.8."""
+    """x'' = force - 0.1 x' - x - push: 0.3 above the contact; below it the push turns round within
+    0.01 of x = -0.8.
+    """
 
     coordinates = ("x",)
     channels = ("force",)
@@ -166,7 +211,9 @@ class SteepBelow(OneContactModel):
 def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, start):
     """Of a force that bends too sharply for a series from afar, against DOP853 with short steps."""
     load = Load(frequency=1.0, force=Harmonic(0.2))
-    problem = OneContactEquations(System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1))
+    problem = OneContactEquations(
+        System(model=SteepBelow(), load=load, impact=VelocityReduction(0.9)), Signature((), 1)
+    )
     spans, sides = np.array([[0.0, 1.5, 0.0]]), np.array([[0, side]])
     followed = problem.follow_segments(Segments(spans, sides, np.array([start])), problem.values)
     model = problem.system.model
@@ -174,21 +221,33 @@ def test_steps_of_a_segment_are_checked_with_the_equation_of_its_own_side(side, 
     def rate(t, y):
         return [y[1], model.acceleration(t, y[0], y[1], side, load)]
 
-    expected = solve_ivp(rate, (0.0, 1.5), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3).y[:, -1]
-    assert followed.ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2] == pytest.approx(expected, abs=1e-9)
+    expected = solve_ivp(
+        rate, (0.0, 1.5), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3
+    ).y[:, -1]
+    assert followed.ends[
+        0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2
+    ] == pytest.approx(expected, abs=1e-9)
 
 
 def test_lowest_gap_inside_a_segment_and_its_instant():
-    """The oscillator's free response from an impact dips towards the wall: against the closed form on a fine grid."""
+    """The oscillator's free response from an impact dips towards the wall: against the closed form
+    on a fine grid.
+    """
     system = walled(A=0.0, W=1.0, c=0.02, wall=-0.05, e=0.8)
-    problem = OneContactEquations(system, Signature((1,), 2), ("load.frequency", "load.force.amplitude", "model.wall"))
+    problem = OneContactEquations(
+        system, Signature((1,), 2), ("load.frequency", "load.force.amplitude", "model.wall")
+    )
     speed = 0.5
-    extremes = problem.evaluate(np.array([0.3, speed]), problem.values, with_extremes=True).extremes[0]
+    extremes = problem.evaluate(
+        np.array([0.3, speed]), problem.values, with_extremes=True
+    ).extremes[0]
     # x'' + c x' + x = 0 from (wall, -e v)
     c, wall, v = 0.02, -0.05, -0.8 * speed
     w = math.sqrt(1 - c * c / 4)
     times = np.linspace(0.0, 4 * math.pi, 400_001)
-    x = np.exp(-c * times / 2) * (wall * np.cos(w * times) + (v + c * wall / 2) / w * np.sin(w * times))
+    x = np.exp(-c * times / 2) * (
+        wall * np.cos(w * times) + (v + c * wall / 2) / w * np.sin(w * times)
+    )
     tops = [i for i in range(1, len(x) - 1) if x[i - 1] < x[i] >= x[i + 1]]
     top = max(tops, key=lambda i: x[i])
     assert extremes[SegmentColumn.LOWEST_GAP] == pytest.approx(wall - x[top], abs=1e-9)
@@ -197,7 +256,9 @@ def test_lowest_gap_inside_a_segment_and_its_instant():
 
 
 def test_parameters_that_leave_the_model_its_meaning_are_refused_by_the_system_and_survive_the_equations():
-    """Newton's method may try any numbers; what it converges to is a system again, which refuses what has no meaning."""
+    """Newton's method may try any numbers; what it converges to is a system again, which refuses
+    what has no meaning.
+    """
     problem, unknowns = one_segment("forced", 1.0, 2.0)
     for bad in (np.nan, np.inf):
         values = problem.values.copy()

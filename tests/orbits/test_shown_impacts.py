@@ -1,4 +1,6 @@
-"""The impacts of an orbit whose impacts die away, in every way in which it is shown; and what beyond the end of its rests."""
+"""The impacts of an orbit whose impacts die away, in every way in which it is shown; and what
+beyond the end of its rests.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ FORCE = "load.force.amplitude"
 def bouncing() -> saltus.System:
     """A mass between two stops that it reaches twice a period, where it bounces and rests."""
     load = saltus.Load(frequency=0.3, force=saltus.Harmonic(amplitude=3.0))
-    return saltus.System(model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(0.5))
+    return saltus.System(
+        model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(0.5)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +28,18 @@ def orbit() -> saltus.PeriodicOrbit:
 
 @pytest.fixture(scope="module")
 def branch(orbit: saltus.PeriodicOrbit) -> saltus.Branch:
-    return saltus.continue_orbit(orbit, FORCE, (2.99, 3.01), functions={"wide": lambda other: other.system.get(FORCE) - 3.002})
+    return saltus.continue_orbit(
+        orbit,
+        FORCE,
+        (2.99, 3.01),
+        functions={"wide": lambda other: other.system.get(FORCE) - 3.002},
+    )
 
 
 def counted(orbit: saltus.PeriodicOrbit) -> int:
-    """The impacts of one period by direct simulation, down to the speed of 1e-5 below which they are not told one by one."""
+    """The impacts of one period by direct simulation, down to the speed of 1e-5 below which they
+    are not told one by one.
+    """
     motion = saltus.simulate(orbit.system, **orbit.start(), periods=orbit.period, tol=1e-13)
     return int((np.abs(motion.impacts.velocity_before) > 1e-5).sum())
 
@@ -50,7 +61,8 @@ def test_its_branch_says_so(branch: saltus.Branch) -> None:
     assert data["impact_count"].values.tolist() == [orbit.impact_count for orbit in branch.orbits]
     assert data["impact_count"].values.min() > 30
     for row in range(0, len(branch.orbits), 3):
-        assert abs(int(data["impact_count"][row]) - counted(branch.orbits[row])) <= 2  # the last of each of two accumulations
+        # the last of each of two accumulations
+        assert abs(int(data["impact_count"][row]) - counted(branch.orbits[row])) <= 2
 
 
 def test_its_special_points_say_so(branch: saltus.Branch) -> None:
@@ -62,10 +74,14 @@ def test_its_special_points_say_so(branch: saltus.Branch) -> None:
 
 def test_orbits_read_from_a_file_say_so(branch: saltus.Branch) -> None:
     again = saltus.orbits.orbits_of(branch.to_xarray())
-    assert [orbit.impact_count for orbit in again] == [orbit.impact_count for orbit in branch.orbits]
+    assert [orbit.impact_count for orbit in again] == [
+        orbit.impact_count for orbit in branch.orbits
+    ]
 
 
-def test_the_times_of_its_impacts_are_those_of_its_own_frequency(orbit: saltus.PeriodicOrbit) -> None:
+def test_the_times_of_its_impacts_are_those_of_its_own_frequency(
+    orbit: saltus.PeriodicOrbit,
+) -> None:
     """Along a branch in the frequency."""
     beside = saltus.continue_orbit(orbit, "load.frequency", (0.29, 0.3)).orbits[0]
     assert beside.frequency == 0.29
@@ -76,7 +92,9 @@ def test_the_times_of_its_impacts_are_those_of_its_own_frequency(orbit: saltus.P
 
 
 def test_a_branch_goes_on_beyond_the_end_of_a_rest_as_the_motion_does() -> None:
-    """Ahead the impacts no longer die away: orbits with impacts alone, which are the motions that settle there."""
+    """Ahead the impacts no longer die away: orbits with impacts alone, which are the motions that
+    settle there.
+    """
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.9, mean=1.0))
     model = saltus.TwoStops(left=-50.0, right=0.0, stiffness=0.2, damping=0.1)
     system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.4))
@@ -87,19 +105,32 @@ def test_a_branch_goes_on_beyond_the_end_of_a_rest_as_the_motion_does() -> None:
     assert found.ends[1].reason is not OrbitEnd.REST_VANISHES
     assert found.ends[1].parameter == 2.6
     rest_ends = found.special[0].parameter
-    assert all(orbit.signature.section is None for orbit in found.orbits if orbit.system.get(FORCE) > rest_ends + 1e-4)
+    assert all(
+        orbit.signature.section is None
+        for orbit in found.orbits
+        if orbit.system.get(FORCE) > rest_ends + 1e-4
+    )
     first = next(orbit for orbit in found.orbits if orbit.signature.section is None)
     settled = saltus.simulate(first.system, x=-0.5, periods=400, tol=1e-13, dense=False)
     assert first.stable
     assert first.state == pytest.approx((settled.x, settled.velocity), abs=1e-9)
-    assert max(saltus.orbits.defects([orbit for orbit in found.orbits if orbit.signature.section is None][::5])) < 1e-9
+    assert (
+        max(
+            saltus.orbits.defects(
+                [orbit for orbit in found.orbits if orbit.signature.section is None][::5]
+            )
+        )
+        < 1e-9
+    )
 
 
 def test_at_a_fold_and_at_a_doubling_an_orbit_is_not_stable() -> None:
     """Its multiplier is 1 or -1, up to rounding."""
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.9, mean=1.0))
     model = saltus.TwoStops(left=-50.0, right=0.0, stiffness=0.2, damping=0.1)
-    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.4)).with_({FORCE: 2.6})
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.4)).with_(
+        {FORCE: 2.6}
+    )
     found = saltus.continue_orbit(saltus.find_orbit(system, x=-0.5), FORCE, (2.2, 2.7))
     marked = [point for point in found.special if point.kind in ("LP", "PD")]
     assert {"LP", "PD"} <= {str(point.kind) for point in marked}

@@ -1,4 +1,6 @@
-"""Curves of special points in two parameters: against closed forms, against one-parameter branches, and through cusps."""
+"""Curves of special points in two parameters: against closed forms, against one-parameter branches,
+and through cusps.
+"""
 
 import math
 from dataclasses import replace
@@ -18,14 +20,21 @@ from saltus.orbits.branches.special_curve import SpecialCurvePoint
 from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.theory.impact_oscillator import wall_orbits
 
-FREQUENCY, AMPLITUDE, VERTICAL, FORCE = "load.frequency", "load.horizontal.amplitude", "load.vertical", "load.force.amplitude"
+FREQUENCY, AMPLITUDE, VERTICAL, FORCE = (
+    "load.frequency",
+    "load.horizontal.amplitude",
+    "load.vertical",
+    "load.force.amplitude",
+)
 FREE = math.sqrt(1.0 - 0.1**2 / 4)  # frequency of the free oscillator below
 
 
 def metainterface(frequency: float, amplitude: float, vertical: float = -0.5) -> saltus.System:
     return saltus.System(
         model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
-        load=saltus.Load(frequency=frequency, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=vertical),
+        load=saltus.Load(
+            frequency=frequency, horizontal=saltus.Harmonic(amplitude=amplitude), vertical=vertical
+        ),
     )
 
 
@@ -38,7 +47,9 @@ def wall_special(kind: str) -> SpecialPoint:
         speed = 1.3 * family.doubling_speed
         system = system.with_({FORCE: family.amplitude(speed)})
         state = family.orbit(speed).state(0.0)
-        orbit = saltus.find_orbit(system, x=float(state[0]), velocity=float(state[1]), settle=0, period=1)
+        orbit = saltus.find_orbit(
+            system, x=float(state[0]), velocity=float(state[1]), settle=0, period=1
+        )
     else:
         orbit = saltus.find_orbit(system, x=0.0, velocity=0.0)
     branch = saltus.continue_orbit(orbit, FORCE, (0.05, 0.9))
@@ -62,7 +73,9 @@ def resonance_fold() -> SpecialPoint:
 @cache
 def folds() -> SpecialCurve:
     """The curve of folds through it, in the load's frequency and amplitude."""
-    return saltus.continue_special(resonance_fold(), AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0))
+    return saltus.continue_special(
+        resonance_fold(), AMPLITUDE, (0.05, 1.2), first_bounds=(0.3, 2.0)
+    )
 
 
 @cache
@@ -75,7 +88,9 @@ def low_frequency_special(kind: str) -> SpecialPoint:
 @cache
 def low_frequency(kind: str) -> SpecialCurve:
     """Curves through the special points about the change from two to six crossings at Hhat = 0.5."""
-    return saltus.continue_special(low_frequency_special(kind), AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4))
+    return saltus.continue_special(
+        low_frequency_special(kind), AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4)
+    )
 
 
 def closed_form(point: SpecialCurvePoint, kind: str) -> float:
@@ -98,27 +113,38 @@ def test_curves_of_the_impact_oscillator_are_the_closed_forms(kind: str) -> None
 
 @pytest.mark.parametrize("kind", ["GR", "LP"])
 def test_folds_end_at_the_grazing_where_the_free_motion_takes_whole_half_periods(kind: str) -> None:
-    """There v+ = e v- cannot change where the linear motion touches: alpha of the closed form vanishes."""
+    """There v+ = e v- cannot change where the linear motion touches: alpha of the closed form
+    vanishes.
+    """
     found = {round(2 * FREE / s.parameters[1]): s for s in wall_locus(kind).special}
     assert set(found) >= ({2, 3} if kind == "GR" else {2})
     for halves, special in found.items():
         assert special.kind == ("LP-PD-GR" if kind == "GR" else "LP-GR")
         frequency = 2 * FREE / halves
         assert special.parameters[1] == pytest.approx(frequency, rel=1e-10)
-        assert special.parameters[0] == pytest.approx(abs(complex(1 - frequency**2, 0.1 * frequency)), rel=1e-10)
+        assert special.parameters[0] == pytest.approx(
+            abs(complex(1 - frequency**2, 0.1 * frequency)), rel=1e-10
+        )
         assert special.evidence.before * special.evidence.after < 0
 
 
 def test_both_folds_of_the_resonance_lie_on_one_curve_through_a_cusp() -> None:
     locus = folds()
     assert [s.kind for s in locus.special] == ["CP"]
-    for amplitude, known in ((0.5, [0.848485265597, 0.908810732539]), (1.0, [0.811772145949, 0.995113422444])):
-        assert sorted(o.frequency for o in locus.at(AMPLITUDE, amplitude)) == pytest.approx(known, abs=2e-12)
+    for amplitude, known in (
+        (0.5, [0.848485265597, 0.908810732539]),
+        (1.0, [0.811772145949, 0.995113422444]),
+    ):
+        assert sorted(o.frequency for o in locus.at(AMPLITUDE, amplitude)) == pytest.approx(
+            known, abs=2e-12
+        )
     assert [str(end) for end in locus.ends] == [f"bound {AMPLITUDE} = 1.2"] * 2
 
 
 @pytest.mark.parametrize(("beyond", "count"), [(0.004, 2), (-0.001, 0)])
-def test_a_branch_has_two_folds_on_one_side_of_the_cusp_and_none_on_the_other(beyond: float, count: int) -> None:
+def test_a_branch_has_two_folds_on_one_side_of_the_cusp_and_none_on_the_other(
+    beyond: float, count: int
+) -> None:
     cusp = folds().special[0]
     orbit = saltus.find_orbit(metainterface(0.9, cusp.parameters[1] + beyond), theta=0.3)
     branch = saltus.continue_orbit(orbit, FREQUENCY, (cusp.parameters[0] - 0.02, 0.91))
@@ -129,7 +155,9 @@ def test_a_branch_has_two_folds_on_one_side_of_the_cusp_and_none_on_the_other(be
 
 
 def test_onset_of_the_motion_follows_the_vertical_load() -> None:
-    """The curve of onsets in the vertical load, against a branch along that load at an amplitude a little larger."""
+    """The curve of onsets in the vertical load, against a branch along that load at an amplitude a
+    little larger.
+    """
     orbit = saltus.find_orbit(metainterface(1.0, 0.05), theta=0.1)
     branch = saltus.continue_orbit(orbit, AMPLITUDE, (0.015, 0.06))
     onset = next(s for s in branch.special if s.kind == "LP")
@@ -138,13 +166,17 @@ def test_onset_of_the_motion_follows_the_vertical_load() -> None:
     beside = saltus.continue_orbit(branch.at(0.0222)[0], VERTICAL, (-0.9, -0.4))
     folds_there = [s.parameter for s in beside.special if s.kind == "LP"]
     assert len(folds_there) == 1
-    assert [o.system.get(VERTICAL) for o in locus.at(AMPLITUDE, 0.0222)] == pytest.approx(folds_there, abs=1e-9)
+    assert [o.system.get(VERTICAL) for o in locus.at(AMPLITUDE, 0.0222)] == pytest.approx(
+        folds_there, abs=1e-9
+    )
     assert locus.at(AMPLITUDE, 0.0222)[0].defect < 1e-10
 
 
 @pytest.mark.parametrize(("curve", "multiplier"), [("folds", 1), ("BPC", 1), ("PD", -1), ("LP", 1)])
 def test_every_point_is_an_orbit_with_its_multiplier(curve: str, multiplier: int) -> None:
-    locus = folds() if curve == "folds" else wall_locus("PD") if curve == "PD" else low_frequency(curve)
+    locus = (
+        folds() if curve == "folds" else wall_locus("PD") if curve == "PD" else low_frequency(curve)
+    )
     last = len(locus.points) - 1
     for index, point in enumerate(locus.points):
         assert point.residual < 1e-10
@@ -162,24 +194,35 @@ def test_every_point_of_a_grazing_curve_touches() -> None:
         assert abs(orbit.slowest) < 1e-14
         assert np.ptp(point.solution.unknowns[::2][touching]) < 1e-12
         motion, when = orbit.motion(), orbit.impact_times[touching[0]]
-        theta, velocity = motion.at(when if when > orbit.impact_times[0] else when + 0.5 * orbit.duration)
+        theta, velocity = motion.at(
+            when if when > orbit.impact_times[0] else when + 0.5 * orbit.duration
+        )
         assert abs(theta) < 1e-10
         assert abs(velocity) < 1e-6
 
 
-def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_grazing_curve() -> None:
+def test_folds_and_symmetry_breakings_of_six_crossings_end_at_one_point_of_the_grazing_curve() -> (
+    None
+):
     known = [s for s in low_frequency("GR").special if s.kind == "LP-BPC-GR"]
     for kind in ("LP", "BPC"):
-        meeting = max((s for s in low_frequency(kind).special if s.kind == f"{kind}-GR"), key=lambda s: s.parameters[0])
+        meeting = max(
+            (s for s in low_frequency(kind).special if s.kind == f"{kind}-GR"),
+            key=lambda s: s.parameters[0],
+        )
         assert min(math.dist(meeting.parameters, s.parameters) for s in known) < 1e-11
 
 
 def shift_of_the_broken_family(point: SpecialCurvePoint, distance: float) -> float:
-    """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a symmetric one at its BPC."""
+    """How far in the first parameter the unsymmetric orbit lies that differs by a distance from a
+    symmetric one at its BPC.
+    """
     direction = point.condition_value.right / np.linalg.norm(point.condition_value.right)
     problem, unknowns = point.orbit.equations.over_full_period(point.solution.unknowns)
     direction = np.concatenate([direction, -direction])
-    curve = OrbitCurve(OneContactEquations(point.orbit.system, problem.signature, (FREQUENCY,)), (1.0,))
+    curve = OrbitCurve(
+        OneContactEquations(point.orbit.system, problem.signature, (FREQUENCY,)), (1.0,)
+    )
     guess = np.append(unknowns + distance * direction, point.solution.values[0])
     broken = curve.solve(guess, np.append(direction, 0.0))
     assert broken is not None
@@ -188,23 +231,38 @@ def shift_of_the_broken_family(point: SpecialCurvePoint, distance: float) -> flo
 
 def test_the_unsymmetric_orbits_change_sides_at_a_degenerate_symmetry_breaking() -> None:
     locus = low_frequency("BPC")
-    degenerate = min((s for s in locus.special if s.kind == "DBPC"), key=lambda s: abs(s.parameters[0] - 0.2421))
+    degenerate = min(
+        (s for s in locus.special if s.kind == "DBPC"), key=lambda s: abs(s.parameters[0] - 0.2421)
+    )
     place = int(np.argmin(np.abs(locus.parameters - degenerate.parameters).sum(axis=1)))
-    shifts = [[shift_of_the_broken_family(locus.points[place + k], d) / d**2 for d in (2e-3, 4e-3)] for k in (-2, 2)]
+    shifts = [
+        [shift_of_the_broken_family(locus.points[place + k], d) / d**2 for d in (2e-3, 4e-3)]
+        for k in (-2, 2)
+    ]
     assert np.sign(shifts[0]) == pytest.approx(-np.sign(shifts[1]))
     forms = [normal_form(locus.points[place + k]) for k in (-2, 2)]
     ratio = [form / shift[0] for form, shift in zip(forms, shifts, strict=True)]
     assert ratio[0] * ratio[1] > 0  # the sign of the normal form says the side
 
 
-def test_the_normal_form_does_not_depend_on_the_step_where_phases_respond_strongly(monkeypatch) -> None:
+def test_the_normal_form_does_not_depend_on_the_step_where_phases_respond_strongly(
+    monkeypatch,
+) -> None:
     """At Omega = 0.1 a small change of the speeds moves the phases of the impacts by radians."""
-    orbit = saltus.find_orbit(metainterface(0.1, 0.0324, -1.38), theta=-1.1171, velocity=-0.0569, settle=0)
-    flip = next(s for s in saltus.continue_orbit(orbit, AMPLITUDE, (0.0315, 0.035)).special if s.kind == "PD")
+    orbit = saltus.find_orbit(
+        metainterface(0.1, 0.0324, -1.38), theta=-1.1171, velocity=-0.0569, settle=0
+    )
+    flip = next(
+        s
+        for s in saltus.continue_orbit(orbit, AMPLITUDE, (0.0315, 0.035)).special
+        if s.kind == "PD"
+    )
     curve = saltus.continue_special(flip, VERTICAL, bounds=(-1.4, -1.36), first_bounds=(0.0, 0.035))
     assert not curve.special
     usual = np.array([normal_form(point) for point in curve.points])
-    monkeypatch.setattr(conditions, "SETTINGS", replace(conditions.SETTINGS, long_shift=1e-3, farthest=5e-4))
+    monkeypatch.setattr(
+        conditions, "SETTINGS", replace(conditions.SETTINGS, long_shift=1e-3, farthest=5e-4)
+    )
     shorter = np.array([normal_form(point) for point in curve.points])
     known = np.isfinite(shorter)
     assert np.abs(usual).max() > 1e4 * np.abs(usual).min()
@@ -213,10 +271,14 @@ def test_the_normal_form_does_not_depend_on_the_step_where_phases_respond_strong
 
 
 def test_there_is_no_normal_form_where_the_equations_are_singular() -> None:
-    """Exactly singular, as they are where a curve comes to loads of zero: no codimension-two point is looked for there."""
+    """Exactly singular, as they are where a curve comes to loads of zero: no codimension-two point
+    is looked for there.
+    """
     point = low_frequency("BPC").points[3]
     evaluation = point.evaluation
-    singular = replace(evaluation, here=np.zeros_like(evaluation.here), there=np.zeros_like(evaluation.there))
+    singular = replace(
+        evaluation, here=np.zeros_like(evaluation.here), there=np.zeros_like(evaluation.there)
+    )
     assert math.isfinite(normal_form(point))
     assert math.isnan(normal_form(replace(point, evaluation=singular)))
 
@@ -225,9 +287,13 @@ def test_there_is_no_normal_form_where_the_equations_are_singular() -> None:
 def test_a_fold_of_symmetric_orbits_goes_on_without_the_symmetry() -> None:
     fold = resonance_fold()
     assert fold.orbit.symmetric
-    locus = saltus.continue_special(fold, "model.stiffness_ratio", (0.98, 1.02), first_bounds=(0.5, 1.5))
+    locus = saltus.continue_special(
+        fold, "model.stiffness_ratio", (0.98, 1.02), first_bounds=(0.5, 1.5)
+    )
     assert [end.parameter for end in locus.ends] == [0.98, 1.02]
-    assert [o.frequency for o in locus.at("model.stiffness_ratio", 1.0)] == pytest.approx([fold.parameter], abs=1e-11)
+    assert [o.frequency for o in locus.at("model.stiffness_ratio", 1.0)] == pytest.approx(
+        [fold.parameter], abs=1e-11
+    )
     assert not locus.orbits[0].symmetric
 
 

@@ -1,4 +1,6 @@
-"""Results know what they are of: another equation, another version or damaged numbers are refused, with what differs."""
+"""Results know what they are of: another equation, another version or damaged numbers are refused,
+with what differs.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -46,7 +48,9 @@ def test_what_is_as_it_was_is_read_back(branch):
 
 def test_a_changed_constant_of_the_module_is_seen(branch, monkeypatch):
     monkeypatch.setitem(globals(), "STIFFNESS", 1.1)
-    with pytest.raises(ParameterError, match=r"the acceleration of Hinged has changed since; compute it again"):
+    with pytest.raises(
+        ParameterError, match=r"the acceleration of Hinged has changed since; compute it again"
+    ):
         orbits_of(branch)
 
 
@@ -76,14 +80,19 @@ def test_another_class_of_the_same_name_is_seen(branch, monkeypatch):
 
 def test_another_version_of_the_results_is_seen(branch, monkeypatch):
     monkeypatch.setattr(results, "RESULT_VERSION", results.RESULT_VERSION + 1)
-    with pytest.raises(ParameterError, match=r"it is by saltus [\d.]+, whose results are of version \d+, and here of \d+"):
+    with pytest.raises(
+        ParameterError,
+        match=r"it is by saltus [\d.]+, whose results are of version \d+, and here of \d+",
+    ):
         orbits_of(branch)
 
 
 def test_numbers_that_are_no_orbit_are_refused(branch):
     damaged = branch.copy(deep=True)
     damaged["unknowns"][2, 0] += 1e-6
-    with pytest.raises(ParameterError, match=r"what is kept at load.frequency = .* is no orbit \(its residual is"):
+    with pytest.raises(
+        ParameterError, match=r"what is kept at load.frequency = .* is no orbit \(its residual is"
+    ):
         orbits_of(damaged)
 
 
@@ -96,4 +105,6 @@ def test_a_digest_names_the_part_that_differs():
 
     assert not differ(impact=VelocityReduction(0.9))  # a number, which the system's JSON has
     assert differ(load=Load(frequency=1.5)) == {"acceleration"}
-    assert differ(model=WallOscillator(), load=Load(frequency=1.5, force=Harmonic(amplitude=1.0))) > {"acceleration", "reset"}
+    assert differ(
+        model=WallOscillator(), load=Load(frequency=1.5, force=Harmonic(amplitude=1.0))
+    ) > {"acceleration", "reset"}

@@ -1,4 +1,6 @@
-"""Orbits and branches of structures that are given by matrices, beside harmonic balance, closed forms and an own integration."""
+"""Orbits and branches of structures that are given by matrices, beside harmonic balance, closed
+forms and an own integration.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from saltus.orbits.equations.whole_motion import WholeMotionEquations
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
 SQUARES, SHAPES = np.linalg.eigh(STIFFNESS)
 FORCE, SPRING, HARMONICS = 0.02, 0.3, 15
-WAVES = np.exp(1j * np.outer(np.arange(HARMONICS + 1), np.linspace(0.0, 2.0 * np.pi, 1024, endpoint=False)))
+WAVES = np.exp(
+    1j * np.outer(np.arange(HARMONICS + 1), np.linspace(0.0, 2.0 * np.pi, 1024, endpoint=False))
+)
 
 
 def receptance(frequency):
@@ -26,8 +30,8 @@ def amplitude(frequency: float) -> float:
 
 
 def unbalanced(unknowns, size):
-    """Harmonic balance of the second mass on a spring beyond 1, with a first harmonic of `size`; the last unknown is the
-    frequency."""
+    """Harmonic balance of the second mass on a spring beyond 1, with a first harmonic of `size`;
+    the last unknown is the frequency."""
     z, frequency = unknowns[:-1], unknowns[-1]
     x, k = z[: HARMONICS + 1] + 1j * np.append(0.0, z[HARMONICS + 1 :]), np.arange(HARMONICS + 1)
     second = (x @ WAVES).real
@@ -46,17 +50,27 @@ def balanced(size: float, near: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def soft() -> saltus.Branch:
     stop = saltus.Surface(name="stop", coordinate=1, position=1.0, stiffness=SPRING)
-    pair = saltus.Structure(mass=np.eye(2), damping=0.05 * STIFFNESS, stiffness=STIFFNESS, surfaces=[stop], forces={"f": 1})
+    pair = saltus.Structure(
+        mass=np.eye(2),
+        damping=0.05 * STIFFNESS,
+        stiffness=STIFFNESS,
+        surfaces=[stop],
+        forces={"f": 1},
+    )
     load = saltus.Load(frequency=0.5, f=saltus.Harmonic(FORCE, phase=np.pi / 2))
     system = saltus.System(model=pair, load=load)
-    return saltus.continue_orbit(saltus.find_orbit(system, **pair.start()), "load.frequency", (0.45, 0.85))
+    return saltus.continue_orbit(
+        saltus.find_orbit(system, **pair.start()), "load.frequency", (0.45, 0.85)
+    )
 
 
 def test_an_orbit_is_as_far_from_a_soft_stop_as_its_amplitude_says(soft: saltus.Branch) -> None:
     free = [point for point in soft.points if not point.orbit.motion().events]
     assert len(free) > 20
     for point in free[::4]:
-        assert point.evaluation.events.distance == pytest.approx(1.0 - amplitude(point.parameter), abs=1e-11)
+        assert point.evaluation.events.distance == pytest.approx(
+            1.0 - amplitude(point.parameter), abs=1e-11
+        )
 
 
 def test_a_branch_meets_a_soft_stop_where_the_linear_amplitude_does_and_folds_where_harmonic_balance_does(
@@ -66,32 +80,54 @@ def test_a_branch_meets_a_soft_stop_where_the_linear_amplitude_does_and_folds_wh
     assert not soft.missed
     assert all(str(end).startswith("bound") for end in soft.ends)
     (meets, upper, lower, leaves) = (point.parameter for point in soft.special)
-    assert meets == pytest.approx(brentq(lambda f: amplitude(f) - 1.0, 0.60, 0.618, xtol=1e-15), abs=1e-11)
-    assert leaves == pytest.approx(brentq(lambda f: amplitude(f) - 1.0, 0.619, 0.63, xtol=1e-15), abs=1e-11)
+    assert meets == pytest.approx(
+        brentq(lambda f: amplitude(f) - 1.0, 0.60, 0.618, xtol=1e-15), abs=1e-11
+    )
+    assert leaves == pytest.approx(
+        brentq(lambda f: amplitude(f) - 1.0, 0.619, 0.63, xtol=1e-15), abs=1e-11
+    )
     linear = np.zeros(2 * HARMONICS + 2)
     linear[-1], second = leaves, FORCE * receptance(leaves)
     linear[1], linear[HARMONICS + 1] = second.real, second.imag
-    known = [linear]  # from the linear motion on, with a larger first harmonic: through the lower fold to the upper one
+    # from the linear motion on, with a larger first harmonic: through the lower fold to the upper
+    # one
+    known = [linear]
 
     def at(size: float, sign: float) -> float:
-        known.append(balanced(size, min(known, key=lambda z: abs(np.hypot(z[1], z[HARMONICS + 1]) - size))))
+        known.append(
+            balanced(size, min(known, key=lambda z: abs(np.hypot(z[1], z[HARMONICS + 1]) - size)))
+        )
         return sign * known[-1][-1]
 
     for fold, sign, around in ((lower, 1.0, (1.001, 1.05)), (upper, -1.0, (1.15, 1.2))):
         for size in np.linspace(1.0, around[0], 3):
             at(size, sign)
-        found = minimize_scalar(at, bounds=around, args=(sign,), method="bounded", options={"xatol": 1e-4})
+        found = minimize_scalar(
+            at, bounds=around, args=(sign,), method="bounded", options={"xatol": 1e-4}
+        )
         assert sign * found.fun == pytest.approx(fold, abs=1e-6)
 
 
-def test_orbits_of_many_coordinates_are_approached_without_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Derivatives take as long as so many motions as there are unknowns: most orbits of a branch need them once."""
+def test_orbits_of_many_coordinates_are_approached_without_derivatives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Derivatives take as long as so many motions as there are unknowns: most orbits of a branch
+    need them once.
+    """
     asked = []
     derived = WholeMotionEquations._evaluated
-    monkeypatch.setattr(WholeMotionEquations, "_evaluated", lambda *given: asked.append(0) or derived(*given))
+    monkeypatch.setattr(
+        WholeMotionEquations, "_evaluated", lambda *given: asked.append(0) or derived(*given)
+    )
     stiffness = 2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1)
     stop = saltus.Surface(name="stop", coordinate=4, position=0.1, stiffness=0.3)
-    chain = saltus.Structure(mass=np.eye(5), damping=0.1 * stiffness, stiffness=stiffness, surfaces=[stop], forces={"f": 0})
+    chain = saltus.Structure(
+        mass=np.eye(5),
+        damping=0.1 * stiffness,
+        stiffness=stiffness,
+        surfaces=[stop],
+        forces={"f": 0},
+    )
     system = saltus.System(model=chain, load=saltus.Load(frequency=0.51, f=saltus.Harmonic(0.03)))
     orbit = saltus.find_orbit(system, **chain.start())
     assert len(orbit.motion().events) == 2
@@ -102,12 +138,20 @@ def test_orbits_of_many_coordinates_are_approached_without_derivatives(monkeypat
         assert point.residual < 1e-13
         assert point.orbit.defect < 1e-12
         beside = point.place + 1e-3
-        assert point.curve.residual(beside) == pytest.approx(point.curve.evaluate(beside, True).residual, abs=1e-12)
+        assert point.curve.residual(beside) == pytest.approx(
+            point.curve.evaluate(beside, True).residual, abs=1e-12
+        )
 
 
 def test_a_sweep_has_the_extrema_of_each_coordinate() -> None:
     far = saltus.Contact(name="far", coordinate=1, position=50.0, sign=-1)
-    pair = saltus.Structure(mass=np.eye(2), damping=0.05 * STIFFNESS, stiffness=STIFFNESS, contacts=[far], forces={"f": 1})
+    pair = saltus.Structure(
+        mass=np.eye(2),
+        damping=0.05 * STIFFNESS,
+        stiffness=STIFFNESS,
+        contacts=[far],
+        forces={"f": 1},
+    )
     system = saltus.System(model=pair, load=saltus.Load(frequency=0.5, f=saltus.Harmonic(FORCE)))
     sweep = saltus.frequency_sweep(system, [0.5, 0.55], x1=0.0, mode_1=0.0)
     held = abs(np.linalg.solve(pair.displacements(np.eye(2)), np.linalg.solve(
@@ -133,28 +177,44 @@ GAP, LOSS, PUSH = 0.2, 0.6, 0.05
 def impacting_chain(frequency: float) -> saltus.System:
     """Ten masses in a row, of which the last one has a hard stop."""
     stop = saltus.Contact(name="stop", coordinate=9, position=GAP, sign=-1)
-    chain = saltus.Structure(mass=np.eye(10), damping=0.05 * CHAIN, stiffness=CHAIN, contacts=[stop], forces={"f": 0})
+    chain = saltus.Structure(
+        mass=np.eye(10), damping=0.05 * CHAIN, stiffness=CHAIN, contacts=[stop], forces={"f": 0}
+    )
     load = saltus.Load(frequency=frequency, f=saltus.Harmonic(PUSH))
     return saltus.System(model=chain, load=load, impact=saltus.NewtonImpact(e=LOSS))
 
 
 def monodromy(orbit: saltus.PeriodicOrbit) -> np.ndarray:
-    """The derivatives of the displacements and velocities over a period, by matrix exponentials between the impacts and
+    """The derivatives of the displacements and velocities over a period, by matrix exponentials
+    between the impacts and
 
         S = R + (f+ - R f-) n' / (n' f-)
 
-    at each of them, with the rates f of the state before and after, the reflection R and the direction n of the stop.
+    at each of them, with the rates f of the state before and after, the reflection R and the
+    direction n of the stop.
     """
     start, chain, frequency = orbit.start(), orbit.system.model, orbit.frequency
     between = np.block([[np.zeros((10, 10)), np.eye(10)], [-CHAIN, -0.05 * CHAIN]])
     pushed = np.zeros((22, 22))  # and sin and cos of the load
-    pushed[:20, :20], pushed[10, 20], pushed[20, 21], pushed[21, 20] = between, PUSH, frequency, -frequency
+    pushed[:20, :20], pushed[10, 20], pushed[20, 21], pushed[21, 20] = (
+        between,
+        PUSH,
+        frequency,
+        -frequency,
+    )
     names, time = chain.coordinates, start.get("time", 0.0)
-    place, rates = (chain.displacements(x) for x in ([start[name] for name in names], np.array(start["velocity"])))
+    place, rates = (
+        chain.displacements(x)
+        for x in ([start[name] for name in names], np.array(start["velocity"]))
+    )
     state = np.concatenate([place, rates, [np.sin(frequency * time), np.cos(frequency * time)]])
     end, found, reflection = time + orbit.duration, np.eye(20), np.diag([1.0] * 19 + [-LOSS])
     for impact in [*(event.time for event in orbit.motion().events), end]:
-        state, found, time = expm((impact - time) * pushed) @ state, expm((impact - time) * between) @ found, impact
+        state, found, time = (
+            expm((impact - time) * pushed) @ state,
+            expm((impact - time) * between) @ found,
+            impact,
+        )
         if impact < end:
             assert state[9] == pytest.approx(GAP, abs=1e-9)
             before = (pushed @ state)[:20]

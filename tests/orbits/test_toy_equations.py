@@ -1,4 +1,6 @@
-"""A dry run: a kind of equations of orbits that is made here, by the contract alone, from `find_orbit` to a plot."""
+"""A dry run: a kind of equations of orbits that is made here, by the contract alone, from
+`find_orbit` to a plot.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from scipy.linalg import expm
 
 import saltus
 from saltus.continuation import CurveEnd, Cut, End
-from saltus.continuation import TestFunction as Function  # whose name pytest would take for that of a test
+
+# whose name pytest would take for that of a test
+from saltus.continuation import TestFunction as Function
 from saltus.flow import SegmentColumn
 from saltus.orbits import PeriodicOrbit, Signature, orbits_of
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
@@ -36,7 +40,9 @@ class Spring(saltus.Model):
 
 
 def spring(frequency: float = 0.7) -> saltus.System:
-    return saltus.System(model=Spring(), load=saltus.Load(frequency=frequency, force=saltus.Harmonic(amplitude=0.5)))
+    return saltus.System(
+        model=Spring(), load=saltus.Load(frequency=frequency, force=saltus.Harmonic(amplitude=0.5))
+    )
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,9 @@ class BalanceEvaluation(OrbitEvaluation):
 
 
 class HarmonicBalance(OrbitEquations):
-    """x = a cos(Omega t) + b sin(Omega t): the balance of both harmonics, whose coefficients are the unknowns."""
+    """x = a cos(Omega t) + b sin(Omega t): the balance of both harmonics, whose coefficients are
+    the unknowns.
+    """
 
     size = 2
 
@@ -59,7 +67,9 @@ class HarmonicBalance(OrbitEquations):
         return isinstance(system.model, Spring)
 
     @classmethod
-    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
         if not isinstance(base, cls):
             return None
         quarter = motion.duration / (4.0 * motion.periods)
@@ -69,27 +79,47 @@ class HarmonicBalance(OrbitEquations):
     def _residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray:
         system = self.system_at(values)
         (a, b), w, c = unknowns, self.frequency(values), system.model.damping
-        return np.array([(1.0 - w**2) * a + c * w * b, (1.0 - w**2) * b - c * w * a - system.parameters["load.force.amplitude"]])
+        return np.array(
+            [
+                (1.0 - w**2) * a + c * w * b,
+                (1.0 - w**2) * b - c * w * a - system.parameters["load.force.amplitude"],
+            ]
+        )
 
     def evaluate(
-        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+        self,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool = False,
+        *,
+        later: np.ndarray | None = None,
     ) -> BalanceEvaluation | None:
         w, c = self.frequency(values), self.system_at(values).model.damping
         here = np.array([[1.0 - w**2, c * w], [-c * w, 1.0 - w**2]])[None]
         columns = [
-            (self._residual(unknowns, values + h) - self._residual(unknowns, values - h)) / (2.0 * STEP)
+            (self._residual(unknowns, values + h) - self._residual(unknowns, values - h))
+            / (2.0 * STEP)
             for h in STEP * np.eye(len(self.paths))
         ]
         parameters = np.array(columns).T.reshape(2, len(self.paths))
         extremes = np.full((int(with_extremes), SegmentColumn.LEAST_MARGIN + 1), np.inf)
         amplitude = math.hypot(*unknowns)
-        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST, SegmentColumn.CROSSINGS]] = amplitude, -amplitude, 0.0
+        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST, SegmentColumn.CROSSINGS]] = (
+            amplitude,
+            -amplitude,
+            0.0,
+        )
         flow = expm(2.0 * math.pi * self.signature.span / w * np.array([[0.0, 1.0], [-1.0, -c]]))
         residual = self._residual(unknowns, values)
-        return BalanceEvaluation(residual, here, np.zeros_like(here), parameters, np.empty((0, 0)), extremes, flow)
+        return BalanceEvaluation(
+            residual, here, np.zeros_like(here), parameters, np.empty((0, 0)), extremes, flow
+        )
 
     def start(self, solution: Solution) -> dict[str, Any]:
-        return {"x": float(solution.unknowns[0]), "velocity": float(solution.unknowns[1] * self.frequency(solution.values))}
+        return {
+            "x": float(solution.unknowns[0]),
+            "velocity": float(solution.unknowns[1] * self.frequency(solution.values)),
+        }
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         return np.empty(0), np.empty(0)
@@ -112,7 +142,9 @@ class HarmonicBalance(OrbitEquations):
 
 @pytest.fixture(autouse=True)
 def registered() -> Iterator[None]:
-    """The one entry that a new kind needs; models of one's own are registered so that files with them can be read."""
+    """The one entry that a new kind needs; models of one's own are registered so that files with
+    them can be read.
+    """
     KINDS.insert(0, HarmonicBalance)
     saltus.register(Spring)
     yield
@@ -131,13 +163,21 @@ def test_it_is_found_followed_written_read_and_drawn(tmp_path: Any) -> None:
     assert isinstance(orbit.equations, HarmonicBalance)
     assert orbit.amplitude == pytest.approx(exact(0.7), rel=1e-13)
     assert orbit.defect < 1e-12  # by direct simulation
-    assert np.abs(orbit.multipliers) == pytest.approx([math.exp(-0.1 * math.pi / 0.7)] * 2, rel=1e-12)
+    assert np.abs(orbit.multipliers) == pytest.approx(
+        [math.exp(-0.1 * math.pi / 0.7)] * 2, rel=1e-12
+    )
     assert orbit.stable
-    branch = saltus.continue_orbit(orbit, FREQUENCY, (0.4, 1.6), functions={"half": lambda found: found.amplitude - 1.0})
+    branch = saltus.continue_orbit(
+        orbit, FREQUENCY, (0.4, 1.6), functions={"half": lambda found: found.amplitude - 1.0}
+    )
     assert [end.parameter for end in branch.ends] == [0.4, 1.6]
-    assert branch.amplitudes == pytest.approx([exact(value) for value in branch.parameters], rel=1e-12)
+    assert branch.amplitudes == pytest.approx(
+        [exact(value) for value in branch.parameters], rel=1e-12
+    )
     assert [str(point.kind) for point in branch.special] == ["half", "half"]
-    assert [exact(point.parameter) for point in branch.special] == pytest.approx([1.0, 1.0], abs=1e-10)
+    assert [exact(point.parameter) for point in branch.special] == pytest.approx(
+        [1.0, 1.0], abs=1e-10
+    )
     data = branch.to_xarray()
     again = orbits_of(data)
     assert [found.amplitude for found in again] == [found.amplitude for found in branch.orbits]
@@ -155,7 +195,9 @@ def test_it_says_the_same_as_the_equations_of_saltus() -> None:
     KINDS.insert(0, HarmonicBalance)
     assert type(usual.equations) is not type(own.equations)
     assert own.state == pytest.approx(usual.state, abs=1e-12)
-    assert np.sort_complex(own.multipliers) == pytest.approx(np.sort_complex(usual.multipliers), abs=1e-11)
+    assert np.sort_complex(own.multipliers) == pytest.approx(
+        np.sort_complex(usual.multipliers), abs=1e-11
+    )
 
 
 def test_it_can_be_pickled_and_solved_at_other_parameters() -> None:

@@ -1,15 +1,16 @@
-"""The one engine that runs what pages and docstrings show, and compares what is printed with what they say.
+"""The one engine that runs what pages and docstrings show, and compares what is printed with what
+they say.
 
 A page is read from top to bottom, in a folder of its own:
 
-    ```python    runs with the names of the blocks above; what it prints stands in a ```text block right below it
-    ```console   each line after `$ ` is a command `saltus ...`, what it prints stands below it
-    ```toml, ```python or ```text whose first line is `# name.ext`, a file's name: the file that is then there
-    ```toml      else must be a table that TOML knows
-    ```text, ```sh  are not run: trees, formulas, commands of other programs
+    ```python    runs with the names of the blocks above; what it prints stands in a ```text block
+    right below it ```console   each line after `$ ` is a command `saltus ...`, what it prints
+    stands below it ```toml, ```python or ```text whose first line is `# name.ext`, a file's name:
+    the file that is then there ```toml      else must be a table that TOML knows ```text, ```sh
+    are not run: trees, formulas, commands of other programs
 
-In what is printed, `...` stands for anything, and a number agrees within one unit of the last digit that is shown (and within
-ROUNDING, since residuals and brackets differ from machine to machine).
+In what is printed, `...` stands for anything, and a number agrees within one unit of the last digit
+that is shown (and within ROUNDING, since residuals and brackets differ from machine to machine).
 """
 
 import contextlib
@@ -30,12 +31,23 @@ KINDS = ("python", "console", "toml", "text", "sh")
 
 
 def blocks(text):
-    """(kind, code, what is printed or None, line) of each block; what a block prints is no block of its own."""
+    """(kind, code, what is printed or None, line) of each block; what a block prints is no block of
+    its own.
+    """
     found = list(FENCE.finditer(text))
-    printed = {a: b for a, b in pairwise(found) if a[1] == "python" and b[1] == "text" and not text[a.end() : b.start()].strip()}
+    printed = {
+        a: b
+        for a, b in pairwise(found)
+        if a[1] == "python" and b[1] == "text" and not text[a.end() : b.start()].strip()
+    }
     for block in found:
         if block not in printed.values():
-            yield block[1], block[2], printed[block][2] if block in printed else None, text.count("\n", 0, block.start()) + 1
+            yield (
+                block[1],
+                block[2],
+                printed[block][2] if block in printed else None,
+                text.count("\n", 0, block.start()) + 1,
+            )
 
 
 def agrees(shown, printed):
@@ -43,7 +55,10 @@ def agrees(shown, printed):
     shown, printed = (re.sub(r"\s+", " ", text).strip() for text in (shown, printed))
     places = list(NUMBER.finditer(shown))
     starts, ends = [0, *(n.end() for n in places)], [*(n.start() for n in places), len(shown)]
-    between = [re.escape(shown[a:b]).replace(re.escape("..."), ".*?") for a, b in zip(starts, ends, strict=True)]
+    between = [
+        re.escape(shown[a:b]).replace(re.escape("..."), ".*?")
+        for a, b in zip(starts, ends, strict=True)
+    ]
     found = re.fullmatch(f"({NUMBER.pattern})".join(between), printed)
     return bool(found) and all(
         abs(float(got) - float(number[0])) <= max(ROUNDING, 1.001 * _unit(number[0]))
@@ -81,7 +96,9 @@ class Page:
         """Run all blocks."""
         for kind, code, shown, line in blocks(self.path.read_text(encoding="utf-8")):
             where = f"{self.path.name}:{line}"
-            assert kind in KINDS or kind.startswith("{"), f"{where}: {kind!r} is none of {', '.join(KINDS)}"
+            assert kind in KINDS or kind.startswith("{"), (
+                f"{where}: {kind!r} is none of {', '.join(KINDS)}"
+            )
             if named := FILE.match(code):
                 Path(named[1]).write_text(code, encoding="utf-8")
             elif kind == "python":
@@ -95,13 +112,21 @@ class Page:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(compile(code, where, "exec"), vars(self.module))
-        assert shown is not None or not printed.getvalue(), f"{where} prints what the page does not show:\n{printed.getvalue()}"
-        assert agrees(shown or "", printed.getvalue()), f"{where} shows\n{shown}\nand prints\n{printed.getvalue()}"
+        assert shown is not None or not printed.getvalue(), (
+            f"{where} prints what the page does not show:\n{printed.getvalue()}"
+        )
+        assert agrees(shown or "", printed.getvalue()), (
+            f"{where} shows\n{shown}\nand prints\n{printed.getvalue()}"
+        )
 
     def _console(self, code, where):
         for said in re.split(r"^\$ ", code, flags=re.MULTILINE)[1:]:
             line, _, shown = said.partition("\n")
             program, *arguments = line.partition("#")[0].split()
-            assert program == "saltus", f"{where}: {line!r} is no command of saltus; use a block of kind sh"
+            assert program == "saltus", (
+                f"{where}: {line!r} is no command of saltus; use a block of kind sh"
+            )
             printed = self.command(*arguments).output
-            assert not shown.strip() or agrees(shown, printed), f"{where}: {line} shows\n{shown}\nand prints\n{printed}"
+            assert not shown.strip() or agrees(shown, printed), (
+                f"{where}: {line} shows\n{shown}\nand prints\n{printed}"
+            )

@@ -1,4 +1,6 @@
-"""Every block of code on every page runs, and prints what the page says; the pages that take longest in `make thorough`."""
+"""Every block of code on every page runs, and prints what the page says; the pages that take
+longest in `make thorough`.
+"""
 
 from pathlib import Path
 
@@ -10,14 +12,17 @@ ROOT = Path(__file__).parents[2]
 GENERATED = {"_build", "api", "gallery"}
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = [page for page in PAGES if not GENERATED & set(page.relative_to(ROOT).parts)]
-LONGEST = {"charts.md", "spectra.md", "fit.md", "experiments.md", "contact_orbits.md"}  # three to six seconds each
+# three to six seconds each
+LONGEST = {"charts.md", "spectra.md", "fit.md", "experiments.md", "contact_orbits.md"}
 
 
 def command(*arguments):
     """`saltus` in this process; a traceback fails the test."""
     from saltus.cli.app import app
 
-    result = CliRunner().invoke(app, list(arguments), prog_name="saltus", env={"COLUMNS": "100", "NO_COLOR": "1"})
+    result = CliRunner().invoke(
+        app, list(arguments), prog_name="saltus", env={"COLUMNS": "100", "NO_COLOR": "1"}
+    )
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
@@ -25,7 +30,10 @@ def command(*arguments):
 
 @pytest.mark.parametrize(
     "page",
-    [pytest.param(page, marks=pytest.mark.thorough if page.name in LONGEST else ()) for page in PAGES],
+    [
+        pytest.param(page, marks=pytest.mark.thorough if page.name in LONGEST else ())
+        for page in PAGES
+    ],
     ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_a_page_prints_what_it_says(page, tmp_path, monkeypatch):

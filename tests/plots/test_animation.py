@@ -38,9 +38,13 @@ def test_the_last_picture_shows_the_end_of_the_motion(motion):
     film._draw_was_started = True  # it is not shown here
     shown = film._func(4)
     dots = [
-        artist for artist in shown if artist.get_zorder() == 3 and hasattr(artist, "get_xdata") and artist.get_marker() == "o"
+        artist
+        for artist in shown
+        if artist.get_zorder() == 3 and hasattr(artist, "get_xdata") and artist.get_marker() == "o"
     ]
-    assert [(float(dot.get_xdata()[0]), float(dot.get_ydata()[0])) for dot in dots] == [(motion.theta, motion.velocity)]
+    assert [(float(dot.get_xdata()[0]), float(dot.get_ydata()[0])) for dot in dots] == [
+        (motion.theta, motion.velocity)
+    ]
 
 
 def test_an_orbit_is_shown_for_a_period_as_a_page(tmp_path):
@@ -53,7 +57,10 @@ def test_what_is_no_film_is_refused(motion, tmp_path, monkeypatch):
     from matplotlib import animation
 
     monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
-    with pytest.raises(ParameterError, match=r"an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html"):
+    with pytest.raises(
+        ParameterError,
+        match=r"an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html",
+    ):
         saltus.animate(motion, tmp_path / "film.mp4")
     with pytest.raises(ParameterError, match=r"a film is a .gif, .html or .mp4, got 'film.avi'"):
         saltus.animate(motion, tmp_path / "film.avi")
@@ -72,5 +79,8 @@ def test_a_picture_is_that_of_a_whole_drawing(motion):
     for artist in page.moving:
         artist.set_animated(False)
     page.canvas.print_rgba(pictures[1])
-    quick, whole = (np.frombuffer(picture.getvalue()[-page.canvas.buffer_rgba().nbytes :], np.uint8) for picture in pictures)
+    quick, whole = (
+        np.frombuffer(picture.getvalue()[-page.canvas.buffer_rgba().nbytes :], np.uint8)
+        for picture in pictures
+    )
     np.testing.assert_array_equal(quick, whole)

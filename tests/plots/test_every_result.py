@@ -1,6 +1,8 @@
-"""Every result has a picture, a table, a MATLAB file, a file that is read back and a table of facts in a notebook.
+"""Every result has a picture, a table, a MATLAB file, a file that is read back and a table of facts
+in a notebook.
 
-Which functions there are is read from the public face: of a new one the first test asks for its result, or why it has none.
+Which functions there are is read from the public face: of a new one the first test asks for its
+result, or why it has none.
 """
 
 import inspect
@@ -26,12 +28,22 @@ from saltus.plots.any_result import DRAWINGS, _by_content
 from saltus.plots.curves import draw_special_curve
 from saltus.result import Result
 
-PANELS = ("saltus.simulate", "saltus.find_orbit", "saltus.free_orbit", "saltus.doubling_cascade", "saltus.chaotic_bands")
+PANELS = (
+    "saltus.simulate",
+    "saltus.find_orbit",
+    "saltus.free_orbit",
+    "saltus.doubling_cascade",
+    "saltus.chaotic_bands",
+)
 PANELS += ("saltus.response_spectrum", "saltus.bifurcation_diagram")
 # Of the same class as another one that is drawn and written here.
 SIBLINGS = ("saltus.bifurcation_diagram", "saltus.switch_branch", "attractors.unstable_manifold")
 every_result = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.thorough if name in SIBLINGS else ()) for name in RESULTS]
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.thorough if name in SIBLINGS else ())
+        for name in RESULTS
+    ],
 )
 
 
@@ -63,7 +75,9 @@ def pictures(results):
 
 
 def test_every_public_function_has_a_result_here_or_a_reason():
-    functions = {name for name in public() if name.partition(".")[0] != "theory" and not name[0].isupper()}
+    functions = {
+        name for name in public() if name.partition(".")[0] != "theory" and not name[0].isupper()
+    }
     checked = {"theory"}  # formulas, which give numbers
     assert functions == {*RESULTS, *WITHOUT}, checked
 
@@ -86,7 +100,9 @@ def test_a_result_is_drawn_into_axes_that_are_given(name, results):
     plt.close(figure)
 
 
-def test_a_diagram_is_drawn_into_one_panel_or_into_a_plain_figure_whose_legend_covers_nothing(results):
+def test_a_diagram_is_drawn_into_one_panel_or_into_a_plain_figure_whose_legend_covers_nothing(
+    results,
+):
     tree = results("saltus.response_spectrum")
     figure, ax = plt.subplots()
     assert saltus.plot(tree, ax=ax) is ax
@@ -109,8 +125,11 @@ def test_an_option_that_a_picture_does_not_take_is_refused_with_those_that_it_do
 def numbers_on(axis):
     """The labels of the ticks of an axis that are to be seen."""
     low, high = sorted(axis.get_view_interval())
-    ticks = zip(axis.get_majorticklocs(), axis.get_majorticklabels(), strict=False)  # shared axes hide some
-    return [label for place, label in ticks if low <= place <= high and label.get_window_extent().width]
+    # shared axes hide some
+    ticks = zip(axis.get_majorticklocs(), axis.get_majorticklabels(), strict=False)
+    return [
+        label for place, label in ticks if low <= place <= high and label.get_window_extent().width
+    ]
 
 
 @every_result
@@ -119,15 +138,27 @@ def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(na
     figure = plots.figure_of(axes)
     assert isinstance(figure, Figure)
     panels = np.ravel(axes).tolist()
-    below = panels[-1] if "chaotic" in name or "diagram" in name else None  # panels that share the axis below them
-    assert all(ax.get_ylabel() and (ax.get_xlabel() or ax is not below or below is None) for ax in panels)
-    if name not in ("saltus.sensitivities", "saltus.lyapunov_spectrum"):  # whose entries are named each
+    # panels that share the axis below them
+    below = panels[-1] if "chaotic" in name or "diagram" in name else None
+    assert all(
+        ax.get_ylabel() and (ax.get_xlabel() or ax is not below or below is None) for ax in panels
+    )
+    # whose entries are named each
+    if name not in ("saltus.sensitivities", "saltus.lyapunov_spectrum"):
         assert panels[-1].get_xlabel()
-    angles = [label for ax in panels for label in (ax.get_xlabel(), ax.get_ylabel()) if "theta" in label]
+    angles = [
+        label for ax in panels for label in (ax.get_xlabel(), ax.get_ylabel()) if "theta" in label
+    ]
     assert all("(rad)" in label for label in angles), angles
     width, height = figure.get_size_inches() * figure.dpi
     for ax in panels:
-        for text in (ax.xaxis.label, ax.yaxis.label, ax.title, *numbers_on(ax.xaxis), *numbers_on(ax.yaxis)):
+        for text in (
+            ax.xaxis.label,
+            ax.yaxis.label,
+            ax.title,
+            *numbers_on(ax.xaxis),
+            *numbers_on(ax.yaxis),
+        ):
             box = text.get_window_extent()
             if text.get_text() and box.width:
                 assert box.x0 > -1.0, text
@@ -150,12 +181,16 @@ def each(result):
 
 @every_result
 def test_a_result_becomes_files_and_tables(name, results, tmp_path):
-    """What is read back is what was written, with its kind; MATLAB's file has every variable; and a table has rows."""
+    """What is read back is what was written, with its kind; MATLAB's file has every variable; and a
+    table has rows.
+    """
     for result in each(results(name)):
         data = result.to_xarray() if isinstance(result, Result) else result
         assert isinstance(data, (xarray.Dataset, xarray.DataTree))
         assert data.attrs.get("saltus_version") or isinstance(data, xarray.DataTree)
-        assert "<table>" in result._repr_html_() if isinstance(result, Result) else data._repr_html_()
+        assert (
+            "<table>" in result._repr_html_() if isinstance(result, Result) else data._repr_html_()
+        )
         path = write_dataset(tmp_path / "result.nc", data)
         back = saltus.load(path)
         assert back.equals(data)
@@ -172,9 +207,18 @@ def test_a_result_becomes_files_and_tables(name, results, tmp_path):
 
 def test_a_result_that_is_an_object_is_a_result():
     """So it has a table for pandas and one for notebooks."""
-    functions = (getattr(saltus, name) for name in saltus.__all__ if name in {key.partition(".")[2] for key in RESULTS})
+    functions = (
+        getattr(saltus, name)
+        for name in saltus.__all__
+        if name in {key.partition(".")[2] for key in RESULTS}
+    )
     gives = {inspect.signature(function).return_annotation for function in functions}
-    for name in gives - {"xarray.Dataset", "xarray.DataTree", "tuple[Separatrix, ...]", "tuple[Branch, ...]"}:
+    for name in gives - {
+        "xarray.Dataset",
+        "xarray.DataTree",
+        "tuple[Separatrix, ...]",
+        "tuple[Branch, ...]",
+    }:
         rooms = (saltus.attractors, saltus.flow, saltus.orbits, saltus.studies)
         found = next((getattr(room, name) for room in rooms if hasattr(room, name)), None)
         assert found is None or issubclass(found, Result), name
@@ -185,7 +229,9 @@ def test_samples_are_even_and_include_both_ends():
     samples = motion.samples(5)
     assert samples.time == pytest.approx(np.linspace(0.0, motion.time, 5))
     assert samples.position[0, -1] == motion.theta
-    assert list(motion.to_pandas(samples.time)["theta"]) == pytest.approx(samples.position[0].tolist())
+    assert list(motion.to_pandas(samples.time)["theta"]) == pytest.approx(
+        samples.position[0].tolist()
+    )
 
 
 def test_what_has_no_picture_is_told():
@@ -208,7 +254,10 @@ def test_exponents_over_two_dimensions_are_a_map():
 
 
 def test_a_free_orbit_and_a_chart_keep_what_they_are():
-    assert saltus.free_orbit(FREE, 0.2).to_xarray().attrs["period"] == saltus.free_orbit(FREE, 0.2).period
+    assert (
+        saltus.free_orbit(FREE, 0.2).to_xarray().attrs["period"]
+        == saltus.free_orbit(FREE, 0.2).period
+    )
     assert chart().attrs["kind"] == "stability_chart"
 
 
@@ -224,7 +273,11 @@ def test_a_picture_stands_below_the_cell_of_a_notebook_and_one_in_own_axes_does_
     motion = saltus.simulate(SYSTEM, theta=0.3, periods=1)
     ax = Figure().subplots()
     with monkeypatch.context() as notebook:
-        notebook.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell, display=display, version_info=(9, 0)))
+        notebook.setitem(
+            sys.modules,
+            "IPython",
+            SimpleNamespace(get_ipython=lambda: shell, display=display, version_info=(9, 0)),
+        )
         saltus.plot(motion)
         assert len(pictures) == 1
         assert pictures[0].startswith(b"\x89PNG")
@@ -249,8 +302,11 @@ def drawn(results):
 def test_every_argument_of_what_draws_answers_every_value(results):
     """As the public functions do: a picture, or one sentence."""
     functions, wrong = drawn(results), []
-    named = {getattr(plots, name) for name in plots.__all__ if hasattr(getattr(plots, name), "answers")}
-    assert named - set(functions) <= {saltus.plot, saltus.animate}  # tests/test_public_face.py asks these
+    named = {
+        getattr(plots, name) for name in plots.__all__ if hasattr(getattr(plots, name), "answers")
+    }
+    # tests/test_public_face.py asks these
+    assert named - set(functions) <= {saltus.plot, saltus.animate}
     for draw, data in functions.items():
         first, *others = inspect.signature(draw).parameters.values()
         for parameter, value in ((p, value) for p in others for value in values_of(p)):
@@ -264,7 +320,9 @@ def test_every_argument_of_what_draws_answers_every_value(results):
         with pytest.raises(ParameterError, match="did you mean") as misspelt:
             draw(data, **{[first, *others][-1].name + "_": 1})
         assert misspelt.value.parameter.endswith("_")
-    assert not wrong, "\n".join(f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong)
+    assert not wrong, "\n".join(
+        f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong
+    )
 
 
 def test_a_diagram_made_in_python_says_of_what_kind_it_is_and_a_curve_shows_no_raw_arrays(results):

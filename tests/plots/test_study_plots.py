@@ -19,22 +19,35 @@ from saltus.systems import Load, Metainterface, System
 
 @functools.cache
 def portrait(starts=None, H=0.05):
-    system = System(model=Metainterface(beta0=np.deg2rad(80), damping=0.1), load=Load(horizontal=H, vertical=-1.5))
-    return phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), starts=starts, duration=20.0, samples=500)
+    system = System(
+        model=Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=Load(horizontal=H, vertical=-1.5),
+    )
+    return phase_portrait(
+        system, window=((-2.5, 2.5), (-1.5, 1.5)), starts=starts, duration=20.0, samples=500
+    )
 
 
 def drawn(figure, color, marker="None"):
     """The lines of the first axes in a colour, with a marker or without."""
-    return [line for line in figure.axes[0].lines if line.get_marker() == marker and same_color(line.get_color(), color)]
+    return [
+        line
+        for line in figure.axes[0].lines
+        if line.get_marker() == marker and same_color(line.get_color(), color)
+    ]
 
 
 def marks(figure, face):
     """The places of the round marks with a face of some colour."""
-    round_ = [line for line in figure.axes[0].lines if line.get_marker() == "o" and same_color(line.get_markerfacecolor(), face)]
+    round_ = [
+        line
+        for line in figure.axes[0].lines
+        if line.get_marker() == "o" and same_color(line.get_markerfacecolor(), face)
+    ]
     return np.concatenate([line.get_xdata() for line in round_])
 
 
-# --- the phase plane ---------------------------------------------------------------------------------------------------------
+# --- the phase plane ---------------------------------------------------------
 
 
 def test_stable_equilibria_are_filled_and_unstable_ones_open():
@@ -51,7 +64,9 @@ def test_stable_equilibria_are_filled_and_unstable_ones_open():
 
 
 def test_motions_that_were_spread_stay_apart():
-    """No two of them run on beside one another: few of their points are as near to another motion as lines are wide."""
+    """No two of them run on beside one another: few of their points are as near to another motion
+    as lines are wide.
+    """
     figure = figure_of(draw_plane(portrait()))
     lines = [np.stack(line.get_data(), axis=1) / [5.0, 3.0] for line in drawn(figure, LOOK.stable)]
     assert 8 < len(lines) <= portrait().sizes["motion"]
@@ -74,7 +89,9 @@ def test_given_motions_are_drawn_whole():
 
 def test_a_closed_motion_is_drawn_closed():
     system = System(model=Metainterface(beta0=np.deg2rad(80)), load=Load(vertical=-1.5))
-    figure = figure_of(draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0)))
+    figure = figure_of(
+        draw_plane(phase_portrait(system, window=((-2.5, 2.5), (-1.5, 1.5)), duration=30.0))
+    )
     closed = 0
     for line in drawn(figure, LOOK.stable):
         points = np.stack(line.get_data(), axis=1) / [5.0, 3.0]
@@ -94,7 +111,7 @@ def test_arrows_point_along_the_motion():
         assert (x1 - x0) * v > 0
 
 
-# --- diagrams ----------------------------------------------------------------------------------------------------------------
+# --- diagrams ----------------------------------------------------------------
 
 
 def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
@@ -111,9 +128,16 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
         }
     )
     empty = np.empty(0)
-    bands = xarray.Dataset(dict.fromkeys(("low", "high"), ("band", empty)) | {"kind": ("band", np.empty(0, dtype="U2"))})
+    bands = xarray.Dataset(
+        dict.fromkeys(("low", "high"), ("band", empty))
+        | {"kind": ("band", np.empty(0, dtype="U2"))}
+    )
     dots = xarray.Dataset({"parameter": ("dot", empty), "amplitude": ("dot", empty)})
-    columns = {"position": np.full(6, 0.3), "peak": np.full(6, 0.5), "value": np.repeat([0.6, 0.9], 3)}
+    columns = {
+        "position": np.full(6, 0.3),
+        "peak": np.full(6, 0.5),
+        "value": np.repeat([0.6, 0.9], 3),
+    }
     strobes = xarray.Dataset({name: ("dot", values) for name, values in columns.items()})
     attrs = {
         "bounds": [0.5, 1.0],
@@ -132,7 +156,10 @@ def diagram(amplitudes=(0.5, 1.0), limits=(1.74, 3.48), parameters=(0.5, 1.0)):
     )
 
 
-@pytest.mark.parametrize(("limits", "top", "number"), [((1.74, 3.48), 1.0, 0), ((0.74, 1.48), 1.0, 1), ((0.74, 1.48), 2.0, 2)])
+@pytest.mark.parametrize(
+    ("limits", "top", "number"),
+    [((1.74, 3.48), 1.0, 0), ((0.74, 1.48), 1.0, 1), ((0.74, 1.48), 2.0, 2)],
+)
 def test_the_limits_of_the_mechanism_are_drawn_where_they_are_reached(limits, top, number):
     figure = figure_of(draw_diagram(diagram((0.5, top), limits)))
     places = sorted({float(line.get_ydata()[0]) for line in drawn(figure, LOOK.limit)})
@@ -163,7 +190,7 @@ def test_stroboscopic_points_of_motions_stand_at_their_values():
     np.testing.assert_allclose(points.get_ydata(), 0.3)
 
 
-# --- attractors --------------------------------------------------------------------------------------------------------------
+# --- attractors --------------------------------------------------------------
 
 
 def found(load="periodic", undecided=0.25):
@@ -179,7 +206,11 @@ def found(load="periodic", undecided=0.25):
         "start_velocity": ("start", [1.0, 1.0, 1.0, 1.0]),
         "end": ("start", [0, 1, 1, -1]),
     }
-    return xarray.Dataset(columns, {"attractor": [0, 1]}, {"load": load, "undecided": undecided, "plane": ["theta", "velocity"]})
+    return xarray.Dataset(
+        columns,
+        {"attractor": [0, 1]},
+        {"load": load, "undecided": undecided, "plane": ["theta", "velocity"]},
+    )
 
 
 def test_attractors_are_named_with_their_shares_and_errors():
@@ -214,5 +245,7 @@ def test_where_the_amplitude_is_flat_the_lowest_values_can_be_drawn():
     assert axes.get_ylabel().startswith(r"$\min_\tau")
     assert axes.get_ylim()[0] < -2.0
     assert axes.get_ylim()[1] > -1.0
-    with pytest.raises(ParameterError, match="quantity must be one of amplitude, lowest, got 'speed'"):
+    with pytest.raises(
+        ParameterError, match="quantity must be one of amplitude, lowest, got 'speed'"
+    ):
         draw_diagram(tree, "speed")

@@ -1,4 +1,6 @@
-"""Small diagrams with a store, of one contact and of two, as a script of its own that is killed when it writes a chunk."""
+"""Small diagrams with a store, of one contact and of two, as a script of its own that is killed
+when it writes a chunk.
+"""
 
 import math
 import os
@@ -19,7 +21,10 @@ def diagram(**options):
     """The diagram; of few values, starts and samples, but with all that a search does."""
     values = options.pop("values", np.linspace(*BOUNDS, 3))
     return response_spectrum(
-        forced(2.0), FREQUENCY, BOUNDS, **{"effort": "quick", "max_period": 2, "values": values, "starts": 4} | options
+        forced(2.0),
+        FREQUENCY,
+        BOUNDS,
+        **{"effort": "quick", "max_period": 2, "values": values, "starts": 4} | options,
     )
 
 
@@ -27,7 +32,14 @@ def contact_diagram(**options):
     """Of a mass between two stops."""
     load = Load(frequency=1.0, force=Harmonic(amplitude=0.8, phase=math.pi / 2))
     stops = System(model=TwoStops(stiffness=0.0), load=load, impact=NewtonImpact(e=0.7))
-    few = {"effort": "quick", "max_period": 1, "values": [0.62], "starts": 4, "repelling": 0, "switch": False}
+    few = {
+        "effort": "quick",
+        "max_period": 1,
+        "values": [0.62],
+        "starts": 4,
+        "repelling": 0,
+        "switch": False,
+    }
     return bifurcation_diagram(stops, "load.force.amplitude", (0.6, 0.65), **few | options)
 
 
@@ -35,7 +47,9 @@ DIAGRAMS = {"one": diagram, "several": contact_diagram}  # by how many contacts 
 
 
 def killed_at(count):
-    """Kill this process when it writes so many chunks of its memo: before some, after others, as the number is even or odd."""
+    """Kill this process when it writes so many chunks of its memo: before some, after others, as
+    the number is even or odd.
+    """
     write, written = Memo._write, []
 
     def struck(self, name, *found):

@@ -1,4 +1,6 @@
-"""What happens at the edges of a band of chaos, from the branches beside it; each kind where theory says what it must be."""
+"""What happens at the edges of a band of chaos, from the branches beside it; each kind where theory
+says what it must be.
+"""
 
 from dataclasses import replace
 
@@ -19,7 +21,9 @@ FREQUENCY, BOUNDS = "load.frequency", (0.36, 0.402)
 
 @pytest.fixture(scope="module")
 def branches():
-    """At Hhat = 0.2: the orbits of one forcing period, unsymmetric ones among them, and those of two and four."""
+    """At Hhat = 0.2: the orbits of one forcing period, unsymmetric ones among them, and those of
+    two and four.
+    """
     orbit = find_orbit(forced(0.2, 0.361), theta=0.05, velocity=0.0, period=1)
     found = [continue_orbit(orbit, FREQUENCY, BOUNDS)]
     for kind in (SpecialKind.BPC, SpecialKind.PD, SpecialKind.PD):
@@ -40,7 +44,9 @@ def bands(branches):
 
 
 def test_the_branches_turn_where_the_cascade_of_period_doublings_begins(branches):
-    doublings = sorted(point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD)
+    doublings = sorted(
+        point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD
+    )
     ratio = (doublings[-1] - doublings[-2]) / (doublings[-2] - doublings[-3])
     assert len(doublings) >= 3
     assert 2.0 < ratio < 20.0  # towards 4.669 (Feigenbaum)
@@ -48,8 +54,12 @@ def test_the_branches_turn_where_the_cascade_of_period_doublings_begins(branches
 
 @pytest.mark.thorough
 def test_chaos_begins_where_the_stable_orbit_grazes(branches, bands):
-    """Below the grazing, which continuation locates to 1e-10, the motion has period 1; above it is chaotic at once."""
-    grazing = min(point.parameter for point in turning_points(branches) if point.kind == SpecialKind.GR)
+    """Below the grazing, which continuation locates to 1e-10, the motion has period 1; above it is
+    chaotic at once.
+    """
+    grazing = min(
+        point.parameter for point in turning_points(branches) if point.kind == SpecialKind.GR
+    )
     lower = bands[0].lower
     assert lower.kind is EdgeKind.GRAZING
     assert lower.special == grazing
@@ -59,7 +69,9 @@ def test_chaos_begins_where_the_stable_orbit_grazes(branches, bands):
 @pytest.mark.thorough
 def test_the_other_end_of_the_chaos_is_a_cascade(branches, bands):
     upper = max(bands, key=lambda band: band.high - band.low).upper
-    doublings = [point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD]
+    doublings = [
+        point.parameter for point in turning_points(branches) if point.kind == SpecialKind.PD
+    ]
     assert upper.kind is EdgeKind.CASCADE
     assert upper.special in doublings
     assert upper.special > upper.inner

@@ -1,4 +1,6 @@
-"""The exact borders of stability charts: curves of folds, doublings and symmetry breakings that chart and theory agree with."""
+"""The exact borders of stability charts: curves of folds, doublings and symmetry breakings that
+chart and theory agree with.
+"""
 
 import functools
 import importlib.util
@@ -26,7 +28,9 @@ H, V = "load.horizontal.amplitude", "load.vertical"
 @functools.cache
 def chart():
     """A coarse chart about the corner where the onset meets the fold of deformed equilibria."""
-    return stability_chart(forced(1.0), horizontal=np.linspace(0, 0.12, 9), vertical=np.linspace(-1.5, -0.5, 9), rows=9)
+    return stability_chart(
+        forced(1.0), horizontal=np.linspace(0, 0.12, 9), vertical=np.linspace(-1.5, -0.5, 9), rows=9
+    )
 
 
 @functools.cache
@@ -41,18 +45,27 @@ def borders():
 def at(curve, vertical):
     """The horizontal load on a curve at a vertical one."""
     order = np.argsort(curve["vertical"].values)
-    return float(np.interp(vertical, curve["vertical"].values[order], curve["horizontal"].values[order]))
+    return float(
+        np.interp(vertical, curve["vertical"].values[order], curve["horizontal"].values[order])
+    )
 
 
 def of(kind, crossings, curves):
-    found = [c for c in curves if c.attrs["kind"] == kind and c.attrs["impact_count"] == crossings and c.attrs["period"] == 1]
+    found = [
+        c
+        for c in curves
+        if c.attrs["kind"] == kind
+        and c.attrs["impact_count"] == crossings
+        and c.attrs["period"] == 1
+    ]
     assert found
     return found[0]
 
 
 def test_the_onset_is_the_known_fold():
     onset = of("LP", 2, borders().curves)
-    assert at(onset, -0.5) == pytest.approx(0.0219879514, rel=1e-4)  # issue 5, between two points of the curve
+    # issue 5, between two points of the curve
+    assert at(onset, -0.5) == pytest.approx(0.0219879514, rel=1e-4)
     assert onset["residual"].values.max() < 1e-9
 
 
@@ -70,18 +83,25 @@ def test_chart_and_curves_agree():
     left = disagreements(whole, found)
     assert left.attrs["changes"] > 20
     assert left.sizes["change"] == 0
-    assert left.attrs["located"] + left.attrs["harmless"] == left.attrs["changes"]  # all were looked into
+    # all were looked into
+    assert left.attrs["located"] + left.attrs["harmless"] == left.attrs["changes"]
 
 
 def test_what_nothing_explains_is_a_disagreement():
-    """Without what simulation knows of the changes, those at the onset are explained by its curve, and by nothing without it."""
+    """Without what simulation knows of the changes, those at the onset are explained by its curve,
+    and by nothing without it.
+    """
     whole, found = completed()
     onset = of("LP", 2, found.curves)
     with_it, without = (
-        disagreements(whole, Borders(curves)) for curves in ([onset], [c for c in found.curves if c is not onset])
+        disagreements(whole, Borders(curves))
+        for curves in ([onset], [c for c in found.curves if c is not onset])
     )
     assert without.sizes["change"] > 5
-    near = [abs(float(x) - at(onset, float(y))) for x, y in zip(without["horizontal"], without["vertical"], strict=True)]
+    near = [
+        abs(float(x) - at(onset, float(y)))
+        for x, y in zip(without["horizontal"], without["vertical"], strict=True)
+    ]
     assert min(near) < float(chart()["horizontal"][1])
     assert with_it.attrs["on_curves"] > 5
     assert with_it.sizes["change"] == with_it.attrs["changes"] - with_it.attrs["on_curves"]
@@ -109,10 +129,16 @@ def test_a_motion_that_the_chart_lacks_is_a_disagreement():
 @pytest.mark.parametrize("W", [4.0, 6.0])
 def test_the_onset_at_high_frequency_is_the_closed_form(W):
     system = forced(H=0.02, W=W)
-    here = stability_chart(system, horizontal=[0.0005, 0.02], vertical=[-0.6, -0.5, -0.4], starts=6, least=1e-4)
+    here = stability_chart(
+        system, horizontal=[0.0005, 0.02], vertical=[-0.6, -0.5, -0.4], starts=6, least=1e-4
+    )
     onset = of("LP", 2, with_borders(system, here, curves=1)[1].curves)
-    for horizontal, vertical in zip(onset["horizontal"].values, onset["vertical"].values, strict=True):
-        closed = high_frequency_onset(W, beta0=np.deg2rad(80), vertical=float(vertical), damping=0.1, order=2)
+    for horizontal, vertical in zip(
+        onset["horizontal"].values, onset["vertical"].values, strict=True
+    ):
+        closed = high_frequency_onset(
+            W, beta0=np.deg2rad(80), vertical=float(vertical), damping=0.1, order=2
+        )
         assert horizontal == pytest.approx(closed, rel=3 * W**-4)
 
 
@@ -122,9 +148,18 @@ def test_borders_are_kept_as_they_are():
     tree = found.to_xarray(cells)
     kept = tree["ends"].to_dataset()
     assert [tuple(key) for key in kept["key"].values] == keys_of(cells, changes_of(cells))
-    meanings = dict(zip(kept["outcome"].attrs["flag_values"], kept["outcome"].attrs["flag_meanings"].split(), strict=True))
+    meanings = dict(
+        zip(
+            kept["outcome"].attrs["flag_values"],
+            kept["outcome"].attrs["flag_meanings"].split(),
+            strict=True,
+        )
+    )
     for key, outcome in zip(kept["key"].values, kept["outcome"].values, strict=True):
-        assert meanings[int(outcome)] == ChangeOutcome(int(found.endings[tuple(key)]["outcome"])).name.lower()
+        assert (
+            meanings[int(outcome)]
+            == ChangeOutcome(int(found.endings[tuple(key)]["outcome"])).name.lower()
+        )
     for i, curve in enumerate(found.curves):
         xr.testing.assert_identical(tree[f"curve_{i:02d}"].to_dataset(), curve)
 
@@ -144,21 +179,30 @@ def test_the_point_where_stability_is_lost_is_found_from_its_stable_end():
     assert special.kind == "LP"
     assert special.parameter == pytest.approx(0.0219879514, abs=1e-10)
     unstable = towards_the_onset().points[-1].orbit
-    assert stability_loss(follow_stable(unstable, H, 0.023)) == "the orbit is not stable to its multipliers"
+    assert (
+        stability_loss(follow_stable(unstable, H, 0.023))
+        == "the orbit is not stable to its multipliers"
+    )
 
 
 def test_the_stable_part_of_a_branch_is_that_of_the_whole_one():
-    """Its last point but one is stable; no special point of the whole branch lies before the one that it ends at."""
+    """Its last point but one is stable; no special point of the whole branch lies before the one
+    that it ends at.
+    """
     part = towards_the_onset()
     whole = continue_orbit(find_orbit(forced(H=0.04), theta=0.3), H, (0.0215, 0.04))
     assert not part.points[-1].orbit.stable
     assert all(point.orbit.stable for point in part.points[:-2])
     assert [s.kind for s in part.special] == ["LP"]
-    assert part.special[0].parameter == pytest.approx(next(s.parameter for s in whole.special if s.kind == "LP"), rel=1e-12)
+    assert part.special[0].parameter == pytest.approx(
+        next(s.parameter for s in whole.special if s.kind == "LP"), rel=1e-12
+    )
 
 
 def test_the_ends_that_simulation_finds_are_those_of_continuation():
-    """Every end is enclosed between its two cells; a sample of them, solved for as orbits, lies in the enclosures."""
+    """Every end is enclosed between its two cells; a sample of them, solved for as orbits, lies in
+    the enclosures.
+    """
     whole, found = completed()
     cells = read_chart(whole)
     ends = found.to_xarray(cells)["ends"].to_dataset()
@@ -169,11 +213,19 @@ def test_the_ends_that_simulation_finds_are_those_of_continuation():
         row, column, _, to_row, to_column = ends["key"].values[i]
         place = [float(ends[name][i]) for name in ("horizontal", "vertical")]
         for value, axis, ends_at in zip(
-            place, (cells.horizontal, cells.vertical), ((column, to_column), (row, to_row)), strict=True
+            place,
+            (cells.horizontal, cells.vertical),
+            ((column, to_column), (row, to_row)),
+            strict=True,
         ):
             low, high = sorted(axis[list(ends_at)])
             assert low - 1e-12 <= value <= high + 1e-12
-        if row == to_row and place[1] > -1.1 and float(ends["amplitude"][i]) > 0.15 and place[0] < 0.05:
+        if (
+            row == to_row
+            and place[1] > -1.1
+            and float(ends["amplitude"][i]) > 0.15
+            and place[0] < 0.05
+        ):
             near += 1
             off = (float(ends["uncertainty"][i]) + 0.02) * float(cells.horizontal[1])
             assert place[0] == pytest.approx(at(onset, place[1]), abs=off)
@@ -184,7 +236,9 @@ def test_the_ends_that_simulation_finds_are_those_of_continuation():
 
 
 def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
-    """A chart that has lost some of its motions gets them back, in order, from those of their neighbours."""
+    """A chart that has lost some of its motions gets them back, in order, from those of their
+    neighbours.
+    """
     poor, inside = chart().copy(deep=True), (chart()["count"] > 0).values
     inside[:, :5], inside[:, 6:] = False, False  # one column of cells
     for name in poor.data_vars:
@@ -195,7 +249,9 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
     assert whole.attrs["added_by_continuation"] >= inside.sum()
     both = (whole["count"].values > 0) & (chart()["count"].values > 0)
     assert both[inside].mean() > 0.8
-    np.testing.assert_allclose(whole["amplitude"].values[both], chart()["amplitude"].values[both], rtol=1e-4)
+    np.testing.assert_allclose(
+        whole["amplitude"].values[both], chart()["amplitude"].values[both], rtol=1e-4
+    )
     sizes = whole["motion_amplitude"].values
     assert (np.diff(np.where(np.isfinite(sizes), sizes, -1.0), axis=2) <= 0).all()
     np.testing.assert_array_equal(np.isfinite(sizes).sum(axis=2), whole["count"].values)
@@ -204,7 +260,13 @@ def test_what_continuation_adds_to_a_chart_are_motions_that_repeat():
         system = forced(1.0).with_({H: float(cell["horizontal"]), V: float(cell["vertical"])})
         for i in range(int(cell["count"])):
             theta, velocity = (float(cell[f"motion_{name}"][i]) for name in ("theta", "velocity"))
-            end = saltus.simulate(system, theta=theta, velocity=velocity, periods=int(cell["motion_period"][i]), dense=False)
+            end = saltus.simulate(
+                system,
+                theta=theta,
+                velocity=velocity,
+                periods=int(cell["motion_period"][i]),
+                dense=False,
+            )
             assert end.theta == pytest.approx(theta, abs=1e-7)
 
 
@@ -228,7 +290,8 @@ def test_the_end_of_a_motion_is_enclosed_about_the_fold():
 
 def test_a_motion_that_goes_on_is_told_with_its_state():
     (found,) = trace(way(0.06, 0.09), 1e-3)
-    assert ChangeOutcome(found["outcome"]) is ChangeOutcome.MISSED  # whether the neighbour has it is not for simulation to say
+    # whether the neighbour has it is not for simulation to say
+    assert ChangeOutcome(found["outcome"]) is ChangeOutcome.MISSED
     theta, velocity = found["last"]["state"]
     orbit = find_orbit(forced(H=0.09), theta=theta, velocity=velocity, settle=0)
     assert orbit.stable
@@ -255,7 +318,8 @@ def test_a_motion_that_goes_on_into_a_cell_that_has_it_changes_nothing():
     whole, found = completed()
     kinds = {ChangeOutcome(int(ending["outcome"])) for ending in found.endings.values()}
     assert ChangeOutcome.MISSED not in {
-        ChangeOutcome(int(outcome)) for outcome in found.to_xarray(read_chart(whole))["ends"]["outcome"].values
+        ChangeOutcome(int(outcome))
+        for outcome in found.to_xarray(read_chart(whole))["ends"]["outcome"].values
     }
     assert kinds >= {ChangeOutcome.JUMP}
 
@@ -275,7 +339,9 @@ def test_a_curve_explains_only_what_ends_on_it():
 
 
 def test_a_curve_is_told_in_the_order_of_the_charts_axes():
-    locus = continue_special(stability_loss(towards_the_onset()), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04))
+    locus = continue_special(
+        stability_loss(towards_the_onset()), V, bounds=(-0.6, -0.4), first_bounds=(0.02, 0.04)
+    )
     told = curve_dataset(locus, [H, V])
     turned = curve_dataset(locus, [V, H])
     np.testing.assert_array_equal(told["vertical"], turned["horizontal"])
@@ -287,7 +353,10 @@ def test_a_chart_is_read_in_any_order_of_its_dimensions():
     one, other = read_chart(chart()), read_chart(turned)
     for name in ("motions", "family", "monostable"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-    assert disagreements(turned, borders()).sizes["change"] == disagreements(chart(), borders()).sizes["change"]
+    assert (
+        disagreements(turned, borders()).sizes["change"]
+        == disagreements(chart(), borders()).sizes["change"]
+    )
 
 
 def test_a_chart_read_lazily_gets_its_motions_too():
@@ -315,7 +384,12 @@ def test_a_number_of_curves_without_meaning_is_refused(curves):
 )
 def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(changes, there):
     tree = bordered_chart(
-        forced(1.0).with_(changes), curves=0, horizontal=[0.001, 0.002], vertical=[-0.3, -0.2], starts=1, periods=3
+        forced(1.0).with_(changes),
+        curves=0,
+        horizontal=[0.001, 0.002],
+        vertical=[-0.3, -0.2],
+        starts=1,
+        periods=3,
     )
     assert ("static" in tree.children) is there
     assert {"chart", "borders", "disagreements"} <= set(tree.children)
@@ -325,7 +399,9 @@ def test_the_quasi_static_border_is_there_only_where_its_closed_form_holds(chang
 def test_motions_that_rest_in_each_period_are_followed_too():
     """Impacts with loss: the motions are held for a part of each period, and end all the same."""
     system = System(model=forced(1.0).model, load=forced(1.0).load, impact=VelocityReduction(0.6))
-    here = stability_chart(system, horizontal=np.linspace(0.02, 0.5, 9), vertical=[-0.4, -0.2], starts=6)
+    here = stability_chart(
+        system, horizontal=np.linspace(0.02, 0.5, 9), vertical=[-0.4, -0.2], starts=6
+    )
     whole, found = with_borders(system, here, curves=0)
     left = disagreements(whole, found)
     assert left.attrs["located"] > 2
@@ -333,8 +409,15 @@ def test_motions_that_rest_in_each_period_are_followed_too():
 
 
 def test_borders_that_were_interrupted_go_on_to_the_same_bytes(tmp_path):
-    """The work on borders is in the chart's store: what is there is not computed again, and what is lost is."""
-    options = {"horizontal": np.linspace(0, 0.06, 5), "vertical": np.linspace(-0.9, -0.5, 3), "starts": 6, "curves": 2}
+    """The work on borders is in the chart's store: what is there is not computed again, and what is
+    lost is.
+    """
+    options = {
+        "horizontal": np.linspace(0, 0.06, 5),
+        "vertical": np.linspace(-0.9, -0.5, 3),
+        "starts": 6,
+        "curves": 2,
+    }
     whole = bordered_chart(forced(1.0), **options, store=tmp_path / "chart.zarr")
     files = sorted((tmp_path / "chart.zarr" / "parts").iterdir())
     assert {file.name.split("_")[0] for file in files} == {"ends", "curves"}
@@ -346,11 +429,15 @@ def test_borders_that_were_interrupted_go_on_to_the_same_bytes(tmp_path):
     assert {file: file.read_bytes() for file in files} == kept
     assert all(file.stat().st_mtime_ns == when for file, when in untouched.items())
     xr.testing.assert_identical(whole["borders"].to_dataset(), again["borders"].to_dataset())
-    xr.testing.assert_identical(whole["disagreements"].to_dataset(), again["disagreements"].to_dataset())
+    xr.testing.assert_identical(
+        whole["disagreements"].to_dataset(), again["disagreements"].to_dataset()
+    )
 
 
 def test_a_chart_that_has_lost_its_motions_is_wrong_where_there_are_some():
-    """By more and other starts on a finer grid: few cells of a whole chart, and of an emptied one all that had motions."""
+    """By more and other starts on a finer grid: few cells of a whole chart, and of an emptied one
+    all that had motions.
+    """
     whole = completed()[0]
     good = wrong_cells(forced(1.0), whole, cells=30)
     assert good["checked_cells"] == 30

@@ -1,4 +1,6 @@
-"""All branches of a diagram in few tables: each comes back as it was, from memory, from a file, and by plain xarray or pandas."""
+"""All branches of a diagram in few tables: each comes back as it was, from memory, from a file, and
+by plain xarray or pandas.
+"""
 
 import numpy as np
 import pytest
@@ -15,11 +17,17 @@ from saltus.orbits import orbits_of
 
 @pytest.fixture(scope="module")
 def branches():
-    """Two branches with special points, of orbits with different numbers of impacts, and one whose orbits rest."""
+    """Two branches with special points, of orbits with different numbers of impacts, and one whose
+    orbits rest.
+    """
     system = forced()
-    lossy = system.with_({"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3})
+    lossy = system.with_(
+        {"load.horizontal.amplitude": 0.15, "load.frequency": 0.2, "impact.e": 0.3}
+    )
     wide = saltus.continue_orbit(saltus.find_orbit(system, theta=0.3), FREQUENCY, (0.25, 1.1))
-    narrow = saltus.continue_orbit(saltus.find_orbit(system.with_({FREQUENCY: 1.05}), theta=0.3), FREQUENCY, (1.04, 1.06))
+    narrow = saltus.continue_orbit(
+        saltus.find_orbit(system.with_({FREQUENCY: 1.05}), theta=0.3), FREQUENCY, (1.04, 1.06)
+    )
     resting = saltus.continue_orbit(saltus.find_orbit(lossy, theta=0.3), FREQUENCY, (0.19, 0.21))
     return [branch.to_xarray() for branch in (wide, narrow, resting)]
 
@@ -30,7 +38,9 @@ def tree(branches):
 
 
 def assert_same(back, branch):
-    """The same variables, in any order, and the same that is said of a branch; the system is that of the first one."""
+    """The same variables, in any order, and the same that is said of a branch; the system is that
+    of the first one.
+    """
     xr.testing.assert_equal(back, branch)
     assert {name: variable.attrs for name, variable in back.variables.items()} == {
         name: variable.attrs for name, variable in branch.variables.items()

@@ -1,4 +1,6 @@
-"""Stability charts: their cells hold the stable motions that theory, Newton's method and the search for orbits know."""
+"""Stability charts: their cells hold the stable motions that theory, Newton's method and the search
+for orbits know.
+"""
 
 import functools
 
@@ -24,14 +26,18 @@ ONSET = 0.0219879514  # Hhat of the fold at V = -0.5, Omega = 1 (issue 5)
 def row(W=1.0):
     """A row of cells at V = -0.5, closely about the onset at Omega = 1."""
     return stability_chart(
-        forced(1.0, W=W), horizontal=[0.02, ONSET - 2e-4, ONSET + 2e-4, 0.024, 0.03, 0.04, 0.07, 0.2], vertical=[-0.5]
+        forced(1.0, W=W),
+        horizontal=[0.02, ONSET - 2e-4, ONSET + 2e-4, 0.024, 0.03, 0.04, 0.07, 0.2],
+        vertical=[-0.5],
     )
 
 
 def motions(cell):
     """Amplitude, period and state of each motion of a cell."""
     names = ("amplitude", "period", "theta", "velocity")
-    return list(zip(*(cell[f"motion_{name}"].values[: int(cell["count"])] for name in names), strict=True))
+    return list(
+        zip(*(cell[f"motion_{name}"].values[: int(cell["count"])] for name in names), strict=True)
+    )
 
 
 def test_motions_begin_at_the_fold():
@@ -58,9 +64,18 @@ def test_every_motion_is_a_stable_orbit_to_newtons_method(W):
 def test_a_cell_has_what_a_search_from_other_states_finds(W, horizontal):
     here = row(W).sel(horizontal=horizontal, vertical=-0.5)
     found = search_orbits(
-        forced(H=horizontal, W=W), V, [-0.5], max_period=6, starts=60, window=((-2.0, 2.0), (-2.0, 2.0)), seed=7, repelling=0
+        forced(H=horizontal, W=W),
+        V,
+        [-0.5],
+        max_period=6,
+        starts=60,
+        window=((-2.0, 2.0), (-2.0, 2.0)),
+        seed=7,
+        repelling=0,
     )
-    known = sorted(orbit.amplitude for orbit in found.orbits if orbit.stable and orbit.amplitude >= 1e-3)
+    known = sorted(
+        orbit.amplitude for orbit in found.orbits if orbit.stable and orbit.amplitude >= 1e-3
+    )
     assert known
     own = [amplitude for amplitude, *_ in motions(here)]
     assert all(np.isclose(own, amplitude, rtol=1e-6).any() for amplitude in known)
@@ -74,8 +89,11 @@ def test_without_a_horizontal_load_motions_are_the_deformed_equilibria():
         still = forced(1.0).with_({H: 0.0, V: load})
         still = type(still)(model=still.model, load=Load(vertical=load))
         known = [e.theta for e in equilibria(still) if e.stable and e.theta > 0]
-        assert here["count"].values[i, 0] == len(known)  # and not twice as many: mirror images count once
-        np.testing.assert_allclose(here["motion_amplitude"].values[i, 0, : len(known)], known, rtol=1e-7)
+        # and not twice as many: mirror images count once
+        assert here["count"].values[i, 0] == len(known)
+        np.testing.assert_allclose(
+            here["motion_amplitude"].values[i, 0, : len(known)], known, rtol=1e-7
+        )
         assert (here["motion_impact_count"].values[i] == 0).all()
 
 
@@ -83,7 +101,10 @@ def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them
     horizontal = np.linspace(0.02, 0.1, 17)
     captured = ((-0.02, 0.02), (-0.02, 0.02))  # states that are captured below Hcr = 0.088
     options = {"vertical": [-0.5], "starts": 1, "window": captured}
-    alone = [int(stability_chart(forced(1.0), horizontal=[value], **options)["count"][0, 0]) for value in horizontal[:6]]
+    alone = [
+        int(stability_chart(forced(1.0), horizontal=[value], **options)["count"][0, 0])
+        for value in horizontal[:6]
+    ]
     assert sum(alone) == 0
     together = stability_chart(forced(1.0), horizontal=horizontal, **options)
     assert ((together["count"].values[0] > 0) == (horizontal > ONSET)).all()
@@ -92,7 +113,11 @@ def test_motions_are_followed_from_cell_to_cell_where_nothing_else_leads_to_them
 def test_a_motion_that_rests_for_a_part_of_each_period_is_a_motion():
     """At phase 0 it is held at the contact, but the load pulls it off again: it is no capture."""
     load = Load(frequency=0.1, horizontal=Harmonic(0.24), vertical=-0.8)
-    system = System(model=Metainterface(beta0=np.radians(80.0), damping=0.5), load=load, impact=VelocityReduction(0.3))
+    system = System(
+        model=Metainterface(beta0=np.radians(80.0), damping=0.5),
+        load=load,
+        impact=VelocityReduction(0.3),
+    )
     orbit = find_orbit(system, theta=0.5)
     assert orbit.rest_share > 0.2
     chart = stability_chart(system, horizontal=[0.24], vertical=[-0.8], starts=4)
@@ -113,7 +138,8 @@ def test_smaller_motions_than_asked_for_do_not_count():
 
 
 def test_chaos_is_not_a_motion_that_counts():
-    here = stability_chart(forced(1.0, W=0.38), horizontal=[0.2], vertical=[-0.5])  # the exponent is +0.03 there (issue 5)
+    # the exponent is +0.03 there (issue 5)
+    here = stability_chart(forced(1.0, W=0.38), horizontal=[0.2], vertical=[-0.5])
     assert here["unsettled"].values[0, 0] > 0
     assert not monostable(here).values.any()
     assert not here["rest"].values.any()
@@ -133,7 +159,11 @@ def test_chunks_stores_and_threads_change_nothing(tmp_path):
 
 def test_any_two_parameters_make_a_plane():
     here = stability_chart(
-        forced(H=0.03), horizontal=[0.05, 0.1, 0.2], vertical=[1.0, 1.2], paths=("model.damping", "load.frequency"), starts=8
+        forced(H=0.03),
+        horizontal=[0.05, 0.1, 0.2],
+        vertical=[1.0, 1.2],
+        paths=("model.damping", "load.frequency"),
+        starts=8,
     )
     known = [find_orbit(forced(H=0.03).with_({"model.damping": 0.05}), theta=0.3).amplitude]
     assert here["amplitude"].values[0, 0] == pytest.approx(known[0], rel=1e-6)
@@ -147,19 +177,33 @@ def test_limits_of_the_mechanism():
     assert here["beyond_line"].values[:, 0].tolist() == [True, False]
     assert not here["beyond_kinematic"].values.any()
     far = np.array([np.nan, 1.8, 3.4, 3.5])
-    assert beyond_limits(forced(1.0), {H: np.arange(4.0)}, far)["beyond_kinematic"].tolist() == [False, False, False, True]
+    assert beyond_limits(forced(1.0), {H: np.arange(4.0)}, far)["beyond_kinematic"].tolist() == [
+        False,
+        False,
+        False,
+        True,
+    ]
     flags = beyond_limits(forced(1.0), {"model.beta0": np.deg2rad([80.0, 80.0, 60.0, 90.0])}, far)
     assert flags["beyond_line"].tolist() == [False, True, True, True]
 
 
 def some(*rows):
     """Motions from (cell, period, impact_count, amplitude, other)."""
-    return np.array([(cell, 1, *row, 0.0, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)], dtype=motion_type(2))
+    return np.array(
+        [(cell, 1, *row, 0.0, (0.0, float(i))) for i, (cell, *row) in enumerate(rows)],
+        dtype=motion_type(2),
+    )
 
 
 def test_a_motion_and_its_mirror_image_are_one():
     found = distinct(
-        some((1, 1, 2, 0.5, 0.4), (0, 1, 2, 0.5, 0.4), (1, 1, 2, 0.5 + 1e-6, 0.4), (1, 1, 2, 0.5, 0.3), (1, 2, 4, 0.5, 0.4))
+        some(
+            (1, 1, 2, 0.5, 0.4),
+            (0, 1, 2, 0.5, 0.4),
+            (1, 1, 2, 0.5 + 1e-6, 0.4),
+            (1, 1, 2, 0.5, 0.3),
+            (1, 2, 4, 0.5, 0.4),
+        )
     )
     assert found["cell"].tolist() == [0, 1, 1, 1]
     assert sorted(found["other"][1:]) == pytest.approx([0.3, 0.4, 0.4], abs=1e-5)
@@ -169,9 +213,14 @@ def test_a_motion_and_its_mirror_image_are_one():
 def test_seeds_are_what_the_neighbours_have_and_the_cell_has_not():
     known = distinct(some((0, 1, 2, 0.5, 0.5), (1, 1, 2, 0.49, 0.49), (1, 1, 6, 0.1, 0.1)))
     cell, states = seeds(forced(), known, known, (2, 2))
-    assert sorted(cell.tolist()) == [0, 2, 3, 3]  # the six impacts to the left and up, both motions up
+    # the six impacts to the left and up, both motions up
+    assert sorted(cell.tolist()) == [0, 2, 3, 3]
     assert sorted(states[:, 1].tolist()) == [0.0, 1.0, 2.0, 2.0]
-    assert has_alike(known, np.array([0, 0, 1]), known[[1, 2, 2]], 0.1).tolist() == [True, False, True]
+    assert has_alike(known, np.array([0, 0, 1]), known[[1, 2, 2]], 0.1).tolist() == [
+        True,
+        False,
+        True,
+    ]
 
 
 def test_a_seed_heads_on_in_a_straight_line_from_two_cells():

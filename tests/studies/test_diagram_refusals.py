@@ -1,4 +1,6 @@
-"""A diagram that cannot be made is refused in a sentence, before anything is computed; an interrupted one leaves no file."""
+"""A diagram that cannot be made is refused in a sentence, before anything is computed; an
+interrupted one leaves no file.
+"""
 
 import math
 import os
@@ -61,7 +63,9 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
     ],
 )
 def test_a_diagram_without_meaning_is_refused_in_a_sentence(changes, sentence, monkeypatch):
-    monkeypatch.setattr(DiagramSearch, "simulate", lambda *args, **options: pytest.fail("it began to compute"))
+    monkeypatch.setattr(
+        DiagramSearch, "simulate", lambda *args, **options: pytest.fail("it began to compute")
+    )
     with pytest.raises(ParameterError, match=sentence) as refusal:
         response_spectrum(forced(1.0), **{**GOOD, **changes})
     assert "\n" not in str(refusal.value)
@@ -88,7 +92,9 @@ def test_an_error_in_the_progress_ends_the_diagram():
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        bifurcation_diagram(forced(1.0), AMPLITUDE, (0.4, 0.6), max_period=1, values=[0.5], starts=2, progress=fail)
+        bifurcation_diagram(
+            forced(1.0), AMPLITUDE, (0.4, 0.6), max_period=1, values=[0.5], starts=2, progress=fail
+        )
 
 
 PROGRAM = """
@@ -112,12 +118,18 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("when", ["searching", pytest.param("following", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "when", ["searching", pytest.param("following", marks=pytest.mark.thorough)]
+)
 def test_ctrl_c_leaves_nothing_half_written(when, tmp_path):
     program = PROGRAM.format(
-        tests=[str(Path(__file__).parent), str(Path(__file__).parents[1])], when=when, path=str(tmp_path / "spectrum.nc")
+        tests=[str(Path(__file__).parent), str(Path(__file__).parents[1])],
+        when=when,
+        path=str(tmp_path / "spectrum.nc"),
     )
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+    ) as process:
         patience = threading.Timer(200.0, process.kill)
         patience.start()
         try:

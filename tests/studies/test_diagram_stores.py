@@ -1,4 +1,6 @@
-"""Diagrams kept in parts: killed and gone on with, extended, computed by several processes and by a cluster, always the same."""
+"""Diagrams kept in parts: killed and gone on with, extended, computed by several processes and by a
+cluster, always the same.
+"""
 
 import os
 import re
@@ -44,12 +46,18 @@ def kept(tmp_path_factory):
 
 
 def computed(folder, **options):
-    write_dataset(folder / "diagram.nc", diagram(store=folder / "diagram.zarr", **{"workers": 1} | options))
+    write_dataset(
+        folder / "diagram.nc", diagram(store=folder / "diagram.zarr", **{"workers": 1} | options)
+    )
     return folder
 
 
 def files(folder):
-    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file()
+    }
 
 
 def counts(store):
@@ -64,14 +72,18 @@ def counts(store):
 def test_a_store_changes_no_number_and_remembers_all_of_them(alone, kept, monkeypatch):
     store = kept / "diagram.zarr"
     assert status(store).complete
-    assert min(counts(store)[kind] for kind in ("motions", "branches", "judgements", "distances")) > 0
+    assert (
+        min(counts(store)[kind] for kind in ("motions", "branches", "judgements", "distances")) > 0
+    )
     monkeypatch.setattr(memo, "outcomes", None)  # nothing is left to compute
     xr.testing.assert_identical(diagram(store=store), alone)
 
 
 @pytest.mark.thorough
 def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_reason(monkeypatch):
-    """Without branches of such motions there are fewer, and each of these motions is a dot; none of a wide range is left."""
+    """Without branches of such motions there are fewer, and each of these motions is a dot; none of
+    a wide range is left.
+    """
     few = {"max_period": 6}
     quick = EFFORTS[Effort.QUICK]
     every = diagram(**few)
@@ -83,15 +95,25 @@ def test_what_an_effort_does_not_follow_in_windows_of_chaos_is_listed_with_its_r
     assert len(left) > 0  # how many depends on the rounding of chaotic motions
     assert not np.isin(left, some["search"]["searched"].values).any()
     assert "the effort follows no more of such" in reasons.attrs["left"]
-    assert some["branches"].sizes["branch"] < every["branches"].sizes["branch"] <= some["branches"].sizes["branch"] + quick.narrow
+    assert (
+        some["branches"].sizes["branch"]
+        < every["branches"].sizes["branch"]
+        <= some["branches"].sizes["branch"] + quick.narrow
+    )
 
 
-@pytest.mark.parametrize("moments", [(1 / 3,), pytest.param((0.05, 0.2, 1 / 3, 2 / 3), marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "moments", [(1 / 3,), pytest.param((0.05, 0.2, 1 / 3, 2 / 3), marks=pytest.mark.thorough)]
+)
 def test_killed_at_several_moments_a_search_goes_on_to_the_same_bytes(kept, tmp_path, moments):
     """After such shares of its parts: each run before or after it has written a part."""
     chunks = sum(status(kept / "diagram.zarr").remembered.values())
     for share in moments:
-        left = chunks - (sum(status(store).remembered.values()) if (store := tmp_path / "diagram.zarr").exists() else 0)
+        left = chunks - (
+            sum(status(store).remembered.values())
+            if (store := tmp_path / "diagram.zarr").exists()
+            else 0
+        )
         kill("one", store, 1 + int(share * left))
     assert files(computed(tmp_path)) == files(kept)
 
@@ -134,7 +156,11 @@ def test_a_cluster_of_which_a_worker_dies_gives_the_same_diagram(alone, tmp_path
     distributed = pytest.importorskip("distributed")
     store, struck = tmp_path / "diagram.zarr", []
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address="127.0.0.1:0",
+        host="127.0.0.1",
     ) as cluster:
 
         def kill(_, what):
@@ -158,22 +184,31 @@ def test_more_values_and_starts_extend_a_store_and_equal_a_fresh_search(kept, tm
     fresh = tmp_path / "fresh.zarr"
     xr.testing.assert_identical(extended, diagram(store=fresh, **more))
     assert all(after[kind] <= before[kind] + number for kind, number in counts(fresh).items())
-    assert after["motions"] <= before["motions"] + counts(fresh)["motions"] - 3 * 4  # 3 values with 4 starts are the same
+    # 3 values with 4 starts are the same
+    assert after["motions"] <= before["motions"] + counts(fresh)["motions"] - 3 * 4
 
 
 def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
     system, values = forced(2.0), np.array([1.3, 1.35, 1.45, 1.6])
     states = np.array([[0.3, 0.0], [1.0, 0.2], [0.3, 0.0], [-1.0, 0.0]])
     common = {"system": system.to_json(), "path": FREQUENCY, **identity(system)}
-    work, direct = (diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Memo(common), None))
+    work, direct = (
+        diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Memo(common), None)
+    )
     work.simulate(values, states, 200)
-    rows = [(given[3], one["outcome"]) for given, one in work.memo.remembered(diagram_work.kinds()["motions"])]
+    rows = [
+        (given[3], one["outcome"])
+        for given, one in work.memo.remembered(diagram_work.kinds()["motions"])
+    ]
     moving = sum(outcome == Ending.UNDECIDED for time, outcome in rows if time == 200)
     assert 0 < moving < len(values)
     longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
     for field in fields(fresh):
         np.testing.assert_array_equal(getattr(longer, field.name), getattr(fresh, field.name))
-    assert sum(given[3] == 400 for given, _ in work.memo.remembered(diagram_work.kinds()["motions"])) == moving
+    assert (
+        sum(given[3] == 400 for given, _ in work.memo.remembered(diagram_work.kinds()["motions"]))
+        == moving
+    )
 
 
 @pytest.mark.parametrize(
@@ -213,7 +248,9 @@ def test_an_interrupt_says_what_is_kept(tmp_path):
         if "following" in what:
             raise KeyboardInterrupt
 
-    with pytest.raises(SweepInterrupted, match=r"diagram.zarr keeps its parts: run the same again to go on"):
+    with pytest.raises(
+        SweepInterrupted, match=r"diagram.zarr keeps its parts: run the same again to go on"
+    ):
         diagram(store=tmp_path / "diagram.zarr", progress=stop)
 
 

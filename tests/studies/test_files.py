@@ -1,4 +1,6 @@
-"""A diagram is saved and comes back without loss, its orbits too: bit for bit, and ready to be continued."""
+"""A diagram is saved and comes back without loss, its orbits too: bit for bit, and ready to be
+continued.
+"""
 
 import numpy as np
 import pytest
@@ -42,7 +44,9 @@ def through_a_grazing():
 
 def from_none_to_one_impact():
     """An oscillator that comes to touch its wall: points without sides beside others with one."""
-    return saltus.continue_orbit(saltus.find_orbit(walled(wall=0.7), x=0.2), "load.force.amplitude", (0.1, 0.8))
+    return saltus.continue_orbit(
+        saltus.find_orbit(walled(wall=0.7), x=0.2), "load.force.amplitude", (0.1, 0.8)
+    )
 
 
 def test_a_tree_comes_back_from_netcdf_as_it_was(spectrum, tmp_path):
@@ -61,7 +65,9 @@ def test_orbits_come_back_bit_for_bit(make, tmp_path):
     for orbit, other in zip(branch.orbits, back, strict=True):
         assert orbit.signature == other.signature
         assert orbit.system == other.system
-        assert {name: getattr(orbit, name) for name in FACTS} == {name: getattr(other, name) for name in FACTS}
+        assert {name: getattr(orbit, name) for name in FACTS} == {
+            name: getattr(other, name) for name in FACTS
+        }
         assert np.array_equal(orbit.solution.unknowns, other.solution.unknowns)
         assert np.array_equal(orbit.multipliers, other.multipliers, equal_nan=True)
         assert np.array_equal(orbit.impact_times, other.impact_times)
@@ -69,7 +75,9 @@ def test_orbits_come_back_bit_for_bit(make, tmp_path):
 
 
 def test_a_branch_goes_on_from_a_file(tmp_path):
-    branch = saltus.continue_orbit(saltus.find_orbit(forced(H=0.5), theta=0.3), FREQUENCY, (0.95, 1.1))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(forced(H=0.5), theta=0.3), FREQUENCY, (0.95, 1.1)
+    )
     last = orbits_of(reloaded(branch.to_xarray(), tmp_path))[0]
     further = saltus.continue_orbit(last, FREQUENCY, (0.7, 1.1))
     folds = [point.parameter for point in further.special if point.kind == "LP"]
@@ -77,7 +85,9 @@ def test_a_branch_goes_on_from_a_file(tmp_path):
 
 
 def test_the_orbits_of_a_curve_come_back_too(tmp_path):
-    branch = saltus.continue_orbit(saltus.find_orbit(forced(H=0.5), theta=0.3), FREQUENCY, (0.8, 1.1))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(forced(H=0.5), theta=0.3), FREQUENCY, (0.8, 1.1)
+    )
     fold = next(point for point in branch.special if point.kind == "LP")
     curve = saltus.continue_special(fold, "load.horizontal.amplitude", (0.45, 0.55))
     back = orbits_of(reloaded(curve.to_xarray(), tmp_path))
@@ -90,7 +100,9 @@ def test_the_orbits_of_a_curve_come_back_too(tmp_path):
 
 
 def test_what_is_no_branch_is_refused(spectrum):
-    with pytest.raises(ParameterError, match=r"dataset must be the dataset of a branch.*lacks 'unknowns'"):
+    with pytest.raises(
+        ParameterError, match=r"dataset must be the dataset of a branch.*lacks 'unknowns'"
+    ):
         orbits_of(spectrum["attractors"].to_dataset())
     branch = saltus.branch_of(spectrum, 0)
     with pytest.raises(ParameterError, match="lacks 'system'"):

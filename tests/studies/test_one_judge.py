@@ -1,4 +1,6 @@
-"""One motion gets one verdict from all four doors: `classify`, `find_attractors`, a chart and a diagram."""
+"""One motion gets one verdict from all four doors: `classify`, `find_attractors`, a chart and a
+diagram.
+"""
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ AMPLITUDE = "load.horizontal.amplitude"
 MOTIONS = {
     Ending.PERIODIC: (forced(0.5, 1.0), 2.0),
     Ending.CHAOTIC: (forced(3.0, 1.6), 2.0),
-    Ending.TRANSIENT: (forced(7.2, 4.0), 2.0),  # numerics.md: chaos that settles after some thousand periods
+    # numerics.md: chaos that settles after some thousand periods
+    Ending.TRANSIENT: (forced(7.2, 4.0), 2.0),
     Ending.QUASI_PERIODIC: (
         forced(0.002, 1.0, C=0.0, V=0.5),
         0.02,
@@ -54,15 +57,25 @@ def by_diagram(system, window):
     return Ending(search.tried().verdict[0])
 
 
-LONG = {Ending.QUASI_PERIODIC, Ending.CHAOTIC}  # as they settle on no orbit, all starts are followed to the end of each patience
-CASES = [pytest.param(kind, marks=pytest.mark.thorough if kind in LONG else (), id=str(kind)) for kind in MOTIONS]
+# as they settle on no orbit, all starts are followed to the end of each patience
+LONG = {Ending.QUASI_PERIODIC, Ending.CHAOTIC}
+CASES = [
+    pytest.param(kind, marks=pytest.mark.thorough if kind in LONG else (), id=str(kind))
+    for kind in MOTIONS
+]
 
 
 @pytest.mark.parametrize("expected", CASES)
 def test_four_doors_have_one_judge(expected):
-    """A transient ends on an orbit: the motion of `classify` and those of `find_attractors` are given the time to come there."""
+    """A transient ends on an orbit: the motion of `classify` and those of `find_attractors` are
+    given the time to come there.
+    """
     system, window = MOTIONS[expected]
-    verdict, found, cell = by_classify(system, window), by_attractors(system, window), by_chart(system, window)
+    verdict, found, cell = (
+        by_classify(system, window),
+        by_attractors(system, window),
+        by_chart(system, window),
+    )
     assert by_diagram(system, window) is expected
     kinds = {member.kind for member in found} - {Ending.REST}
     if expected is Ending.TRANSIENT:
@@ -82,4 +95,6 @@ def test_four_doors_have_one_judge(expected):
             assert kinds == {expected}
         else:  # nothing attracts without damping
             assert not kinds
-            assert all("quasi-periodic, but areas do not shrink" in reason for reason in found.reasons)
+            assert all(
+                "quasi-periodic, but areas do not shrink" in reason for reason in found.reasons
+            )

@@ -1,4 +1,6 @@
-"""Overturning: borders against closed forms of the slender, linear block and DOP853 for the nonlinear one, and fragility."""
+"""Overturning: borders against closed forms of the slender, linear block and DOP853 for the
+nonlinear one, and fragility.
+"""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +22,9 @@ E = 0.9
 
 @dataclass(frozen=True, kw_only=True)
 class LinearBlock(OneContactModel):
-    """A slender rocking block for small angles over its slenderness: theta'' = -zeta'' - s (1 - s theta)."""
+    """A slender rocking block for small angles over its slenderness: theta'' = -zeta'' - s (1 - s
+    theta).
+    """
 
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal",)
     stops: ClassVar[tuple[str, ...]] = ("overturned",)
@@ -34,19 +38,26 @@ class LinearBlock(OneContactModel):
 
 def shaken(pulse=HalfSine, model=None, **more):
     signal = pulse(amplitude=1.0, frequency=1.0, quantity="acceleration", **more)
-    return System(model=model or LinearBlock(), load=Load(ground_horizontal=signal), impact=VelocityReduction(E))
+    return System(
+        model=model or LinearBlock(),
+        load=Load(ground_horizontal=signal),
+        impact=VelocityReduction(E),
+    )
 
 
 def growth(A, w, impacts, halves):
-    """(theta - s) + theta' after `impacts`, when the sine is over: the part of the linear motion that grows as exp(tau).
+    """(theta - s) + theta' after `impacts`, when the sine is over: the part of the linear motion
+    that grows as exp(tau).
 
-    On the side s the motion is s + C exp(tau) + D exp(-tau) + A / (1 + w^2) sin(w tau) during the pulse, from theta = theta' = 0
-    where A sin(w tau) = 1, with s = -1.
+    On the side s the motion is s + C exp(tau) + D exp(-tau) + A / (1 + w^2) sin(w tau) during the
+    pulse, from theta = theta' = 0 where A sin(w tau) = 1, with s = -1.
     """
     end, force = halves * math.pi / w, A / (1 + w * w)
 
     def go(state, since, to, side, on):
-        f, rate = (force * math.sin(w * since), force * w * math.cos(w * since)) if on else (0.0, 0.0)
+        f, rate = (
+            (force * math.sin(w * since), force * w * math.cos(w * since)) if on else (0.0, 0.0)
+        )
         x, v = state[0] - side - f, state[1] - rate
         plus, minus = 0.5 * (x + v) * math.exp(to - since), 0.5 * (x - v) * math.exp(since - to)
         g, gate = (force * math.sin(w * to), force * w * math.cos(w * to)) if on else (0.0, 0.0)
@@ -64,7 +75,13 @@ def growth(A, w, impacts, halves):
             values = [side * go(state, since, t, side, on)[0] for t in times]
             below = next((i for i in range(1, len(times)) if values[i - 1] > 0 >= values[i]), None)
             if below is not None:
-                at = brentq(height, times[below - 1], times[below], args=(state, since, side, on), xtol=1e-15)
+                at = brentq(
+                    height,
+                    times[below - 1],
+                    times[below],
+                    args=(state, since, side, on),
+                    xtol=1e-15,
+                )
                 state, since, side = (0.0, E * go(state, since, at, side, on)[1]), at, -side
                 break
             state, since = go(state, since, last, side, on), last
@@ -77,36 +94,50 @@ def growth(A, w, impacts, halves):
 
 @cache
 def linear(pulse):
-    return saltus.overturning_spectrum(shaken(pulse), amplitude=np.linspace(1.0, 6.0, 11), frequency=np.linspace(1.5, 4.0, 6))
+    return saltus.overturning_spectrum(
+        shaken(pulse), amplitude=np.linspace(1.0, 6.0, 11), frequency=np.linspace(1.5, 4.0, 6)
+    )
 
 
 @pytest.mark.parametrize(
-    ("pulse", "impacts"), [(HalfSine, 0), pytest.param(OneSine, 0, marks=pytest.mark.thorough), (OneSine, 1)]
+    ("pulse", "impacts"),
+    [(HalfSine, 0), pytest.param(OneSine, 0, marks=pytest.mark.thorough), (OneSine, 1)],
 )
 def test_borders_of_the_linear_block_are_those_of_the_closed_form(pulse, impacts):
-    """Zhang and Makris (2001), Dimitrakopoulos and DeJong (2012): overturning without an impact and after one."""
+    """Zhang and Makris (2001), Dimitrakopoulos and DeJong (2012): overturning without an impact and
+    after one.
+    """
     data = linear(pulse)
     own = data.border_impacts.values == impacts
     w, found = data.border_frequency.values[own], data.border_amplitude.values[own]
     assert own.sum() > 10
     for i in range(0, own.sum(), 5):
         near = found[i] * (1 - 1e-6), found[i] * (1 + 1e-6)
-        exact = brentq(lambda A, i=i: growth(A, w[i], impacts, 1 if pulse is HalfSine else 2), *near, xtol=1e-14)
+        exact = brentq(
+            lambda A, i=i: growth(A, w[i], impacts, 1 if pulse is HalfSine else 2),
+            *near,
+            xtol=1e-14,
+        )
         assert found[i] == pytest.approx(exact, rel=1e-8)
-    if pulse is HalfSine:  # in closed form: w sin(psi) = cos(psi) + exp(-(pi - psi) / w), sin(psi) = 1 / A
+    # in closed form: w sin(psi) = cos(psi) + exp(-(pi - psi) / w), sin(psi) = 1 / A
+    if pulse is HalfSine:
         psi = np.arcsin(1 / found)
         assert w * np.sin(psi) == pytest.approx(np.cos(psi) + np.exp(-(np.pi - psi) / w), abs=1e-9)
 
 
 def test_the_map_changes_across_the_borders_alone():
-    """Along each column, what overturns and what does not are parted by as many borders as the map has changes, or more."""
+    """Along each column, what overturns and what does not are parted by as many borders as the map
+    has changes, or more.
+    """
     data = linear(OneSine)
     for i, w in enumerate(data.frequency.values):
         changes = np.flatnonzero(np.diff((data.overturned[i] != 0).astype(int)))
         for k in changes:
             low, high = data.amplitude.values[k], data.amplitude.values[k + 1]
             near = np.abs(data.border_frequency - w) < 0.25
-            crossing = data.border_amplitude[near & (data.border_amplitude > low - 0.5) & (data.border_amplitude < high + 0.5)]
+            crossing = data.border_amplitude[
+                near & (data.border_amplitude > low - 0.5) & (data.border_amplitude < high + 0.5)
+            ]
             assert crossing.size > 0
 
 
@@ -114,17 +145,27 @@ def test_the_map_changes_across_the_borders_alone():
 def test_a_border_of_the_nonlinear_block_is_where_dop853_changes_its_mind():
     alpha = 0.3
     system = shaken(OneSine, RockingBlock(alpha=alpha))
-    data = saltus.overturning_spectrum(system, amplitude=np.linspace(0.2, 2.0, 10), frequency=np.linspace(1.0, 4.0, 7))
+    data = saltus.overturning_spectrum(
+        system, amplitude=np.linspace(0.2, 2.0, 10), frequency=np.linspace(1.0, 4.0, 7)
+    )
     assert set(data.border_impacts.values.tolist()) >= {0, 1}
 
     def falls(A, w):
         """The side to which the block falls, by DOP853 and the impact law, or 0."""
-        length, begin, side, state = 2 * math.pi / w, math.asin(math.tan(alpha) / A) / w, -1, [0.0, 0.0]
+        length, begin, side, state = (
+            2 * math.pi / w,
+            math.asin(math.tan(alpha) / A) / w,
+            -1,
+            [0.0, 0.0],
+        )
         while begin < length + 25.0:
 
             def rates(t, x, side=side):
                 ground = A * math.sin(w * t) if t < length else 0.0
-                return [x[1], -ground * math.cos(alpha - side * x[0]) - side * math.sin(alpha - side * x[0])]
+                return [
+                    x[1],
+                    -ground * math.cos(alpha - side * x[0]) - side * math.sin(alpha - side * x[0]),
+                ]
 
             def contact(t, x, side=side, begin=begin):
                 return side * x[0] if t > begin + 1e-5 else 1.0
@@ -134,7 +175,15 @@ def test_a_border_of_the_nonlinear_block_is_where_dop853_changes_its_mind():
 
             contact.terminal = down.terminal = True
             last = length if begin < length else length + 25.0
-            found = solve_ivp(rates, (begin, last), state, "DOP853", rtol=1e-11, atol=1e-12, events=(contact, down))
+            found = solve_ivp(
+                rates,
+                (begin, last),
+                state,
+                "DOP853",
+                rtol=1e-11,
+                atol=1e-12,
+                events=(contact, down),
+            )
             begin, state = found.t[-1], list(found.y[:, -1])
             if found.t_events[1].size:
                 return side
@@ -154,23 +203,37 @@ def test_a_border_of_the_nonlinear_block_is_where_dop853_changes_its_mind():
 
 
 def test_a_record_of_the_same_shape_has_nearly_the_same_borders():
-    """A half sine in 400 linear pieces: its thresholds are those of the pulse to the square of the step."""
+    """A half sine in 400 linear pieces: its thresholds are those of the pulse to the square of the
+    step.
+    """
     time = np.linspace(0.0, np.pi, 401)
     record = Record(time, np.sin(time), quantity="acceleration")
-    system = System(model=LinearBlock(), load=Load(ground_horizontal=record), impact=VelocityReduction(E))
-    data = saltus.overturning_spectrum(system, amplitude=np.linspace(1.0, 9.0, 9), frequency=[1.0, 2.0])
+    system = System(
+        model=LinearBlock(), load=Load(ground_horizontal=record), impact=VelocityReduction(E)
+    )
+    data = saltus.overturning_spectrum(
+        system, amplitude=np.linspace(1.0, 9.0, 9), frequency=[1.0, 2.0]
+    )
     for w in (1.0, 2.0):
         own = (data.border_frequency == w) & (data.border_impacts == 0)
-        psi = brentq(lambda psi, w=w: w * np.sin(psi) - np.cos(psi) - np.exp(-(np.pi - psi) / w), 1e-6, np.pi / 2)
+        psi = brentq(
+            lambda psi, w=w: w * np.sin(psi) - np.cos(psi) - np.exp(-(np.pi - psi) / w),
+            1e-6,
+            np.pi / 2,
+        )
         assert data.border_amplitude[own].values.max() == pytest.approx(1 / np.sin(psi), rel=2e-5)
 
 
 def test_fragility_is_the_share_of_loads_with_its_interval():
-    """Pulses whose thresholds are known: the share is that of the thresholds below each scale, the interval Wilson's."""
+    """Pulses whose thresholds are known: the share is that of the thresholds below each scale, the
+    interval Wilson's.
+    """
     rates = np.array([1.0, 2.0, 3.0, 4.0])
 
     def threshold(w):
-        psi = brentq(lambda psi: w * np.sin(psi) - np.cos(psi) - np.exp(-(np.pi - psi) / w), 1e-6, np.pi / 2)
+        psi = brentq(
+            lambda psi: w * np.sin(psi) - np.cos(psi) - np.exp(-(np.pi - psi) / w), 1e-6, np.pi / 2
+        )
         return 1 / np.sin(psi)
 
     known = np.array([threshold(w) for w in rates])
@@ -182,8 +245,15 @@ def test_fragility_is_the_share_of_loads_with_its_interval():
     above = scales[None, :] > known[:, None]
     assert again[above].all()  # beyond the threshold without an impact, pulses go on to overturn
     z, n, p = 1.959963984540054, 4, data.share.values
-    middle, half = (p + z * z / (2 * n)) / (1 + z * z / n), z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    np.testing.assert_allclose([data.lower, data.upper], [np.maximum(middle - half, 0), np.minimum(middle + half, 1)], atol=2e-5)
+    middle, half = (
+        (p + z * z / (2 * n)) / (1 + z * z / n),
+        z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)),
+    )
+    np.testing.assert_allclose(
+        [data.lower, data.upper],
+        [np.maximum(middle - half, 0), np.minimum(middle + half, 1)],
+        atol=2e-5,
+    )
 
 
 @pytest.mark.parametrize(
@@ -191,11 +261,19 @@ def test_fragility_is_the_share_of_loads_with_its_interval():
     [
         (System(model=RockingBlock(alpha=0.2)), "needs a load with one pulse or record"),
         (
-            System(model=LinearBlock(), load=Load(ground_horizontal=Ramp(amplitude=1.0, duration=1.0, quantity="acceleration"))),
+            System(
+                model=LinearBlock(),
+                load=Load(
+                    ground_horizontal=Ramp(amplitude=1.0, duration=1.0, quantity="acceleration")
+                ),
+            ),
             "a Ramp has no frequency",
         ),
         (
-            System(model=saltus.WallOscillator(), load=Load(force=HalfSine(amplitude=1.0, frequency=1.0))),
+            System(
+                model=saltus.WallOscillator(),
+                load=Load(force=HalfSine(amplitude=1.0, frequency=1.0)),
+            ),
             "WallOscillator cannot overturn",
         ),
     ],

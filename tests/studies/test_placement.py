@@ -11,18 +11,28 @@ FREQUENCY = "load.frequency"
 
 
 def test_a_branch_holds_its_own_orbits_beside_its_narrow_peak():
-    """The primary resonance at Hhat = 0.2 (Fig. 9a), whose amplitude changes by 0.05 rad within 1e-4 of the frequency."""
-    branch = continue_orbit(find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.1, 3.75))
+    """The primary resonance at Hhat = 0.2 (Fig.
+
+    9a), whose amplitude changes by 0.05 rad within 1e-4 of the frequency.
+    """
+    branch = continue_orbit(
+        find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.1, 3.75)
+    )
     placed = PlacedBranch(branch)
-    values = np.append(np.linspace(0.8305, 0.8325, 41), 0.8320974845378502)  # the last one is where a diagram met it
+    # the last one is where a diagram met it
+    values = np.append(np.linspace(0.8305, 0.8325, 41), 0.8320974845378502)
     found = [(orbit, value) for value in values.tolist() for orbit in branch.at(value)]
     assert len(found) >= len(values)
     assert all(placed.holds(orbit, value) for orbit, value in found)
 
 
 def test_stable_parts_end_at_the_special_points_where_stability_is_lost():
-    """Motions are begun just beyond the ends: beyond a point at which an orbit doubles, and not short of it."""
-    branch = continue_orbit(find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.7, 2.2))
+    """Motions are begun just beyond the ends: beyond a point at which an orbit doubles, and not
+    short of it.
+    """
+    branch = continue_orbit(
+        find_orbit(forced(0.2, 2.08925), theta=0.05, velocity=0.05), FREQUENCY, (0.7, 2.2)
+    )
     placed = PlacedBranch(branch)
     ends, stable = placed.stable_ends, branch.stable
     assert np.isin(branch.parameters[ends], [special.parameter for special in branch.special]).all()
@@ -32,7 +42,9 @@ def test_stable_parts_end_at_the_special_points_where_stability_is_lost():
 
 
 def test_chaotic_motions_that_return_by_chance_are_soon_given_up():
-    """Chance rarely lets a chaotic motion return ever nearer: few of those taken as slow are followed to the last round."""
+    """Chance rarely lets a chaotic motion return ever nearer: few of those taken as slow are
+    followed to the last round.
+    """
     system, counts, n, periods = forced(0.2, 0.38), [], 200, 100
     states = np.random.default_rng(5).uniform(-0.1, 0.1, (n, 2))
 

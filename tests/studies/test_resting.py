@@ -1,4 +1,6 @@
-"""Diagrams of a contact with losses: orbits that rest for a part of their period are branches too, and come back from files."""
+"""Diagrams of a contact with losses: orbits that rest for a part of their period are branches too,
+and come back from files.
+"""
 
 import math
 
@@ -37,11 +39,17 @@ def test_a_family_that_rests_comes_back_bit_for_bit(tmp_path):
         assert np.array_equal(orbit.releases, other.releases)
         assert np.array_equal(orbit.rests, other.rests)
         assert np.array_equal(orbit.speeds, other.speeds)
-        assert (orbit.amplitude, orbit.residual, orbit.stable) == (other.amplitude, other.residual, other.stable)
+        assert (orbit.amplitude, orbit.residual, orbit.stable) == (
+            other.amplitude,
+            other.residual,
+            other.stable,
+        )
 
 
 def test_a_family_that_rests_is_confirmed_over_its_whole_period():
-    """The release alone is the same for every orbit: that of another amplitude starts there too, and moves otherwise."""
+    """The release alone is the same for every orbit: that of another amplitude starts there too,
+    and moves otherwise.
+    """
     (data,) = confirmed([family()], DiagramWork(SLOW, AMPLITUDE))
     assert data["stable"].all()
     assert data["defect"].max() < 1e-10
@@ -51,12 +59,15 @@ def test_a_family_that_rests_is_confirmed_over_its_whole_period():
 
 @pytest.mark.thorough
 def test_a_diagram_has_the_family_that_rests_and_the_one_that_does_not():
-    tree = bifurcation_diagram(SLOW, AMPLITUDE, (0.05, 0.5), max_period=2, values=[0.07, 0.15, 0.45], starts=8)
+    tree = bifurcation_diagram(
+        SLOW, AMPLITUDE, (0.05, 0.5), max_period=2, values=[0.07, 0.15, 0.45], starts=8
+    )
     assert tree["search"]["at_rest"].values.tolist() == [8, 0, 0]  # only below Hcr = 0.088
     branches = [branch for _, branch in branches_of(tree)]
     assert len(branches) == 2
     resting = next(branch for branch in branches if "releases" in branch)
     moving = next(branch for branch in branches if "releases" not in branch)
     assert float(resting["parameter"].min()) == pytest.approx(CRITICAL, abs=1e-5)
-    last = float(resting["parameter"].where(resting["rest_share"] > 0.0).max())  # beyond it the family goes on without rests
+    # beyond it the family goes on without rests
+    last = float(resting["parameter"].where(resting["rest_share"] > 0.0).max())
     assert last == pytest.approx(float(moving["parameter"].min()), abs=1e-6)

@@ -1,4 +1,6 @@
-"""Parts of a search at the same time: the results, errors and progress are those of one after the other."""
+"""Parts of a search at the same time: the results, errors and progress are those of one after the
+other.
+"""
 
 import threading
 from concurrent.futures import CancelledError
@@ -48,7 +50,13 @@ def test_values_that_are_judged_with_different_level_at_the_same_time_have_the_s
     for count in (1, 2):
         cores(count)
         search = SearchedRange(DiagramWork(forced(1.0), AMPLITUDE), (1.74, 1.77))
-        search.simulate_starts([MotionStarts(1.755, states, 0), MotionStarts(1.76, states, 1), MotionStarts(1.765, states, 0)])
+        search.simulate_starts(
+            [
+                MotionStarts(1.755, states, 0),
+                MotionStarts(1.76, states, 1),
+                MotionStarts(1.765, states, 0),
+            ]
+        )
         found.append(search.tried())
     assert (found[0].verdict == Ending.CHAOTIC).sum() >= 2
     for one, other in zip(*(vars(tried).values() for tried in found), strict=True):
@@ -64,7 +72,11 @@ def test_both_parts_run_at_the_same_time(cores):
 def test_on_one_core_the_parts_run_one_after_the_other_in_this_thread(cores):
     cores(1)
     ran = []
-    side_by_side(lambda progress: ran.append(threading.get_ident()), lambda progress: ran.append(threading.get_ident()), silent)
+    side_by_side(
+        lambda progress: ran.append(threading.get_ident()),
+        lambda progress: ran.append(threading.get_ident()),
+        silent,
+    )
     assert ran == [threading.get_ident()] * 2
 
 
@@ -123,7 +135,13 @@ def test_an_error_beside_ends_the_other_part_at_its_next_report(cores):
 @pytest.mark.parametrize("count", [1, 2])
 def test_all_results_come_in_the_order_of_the_computations(cores, count):
     cores(count)
-    assert all_at_once([lambda progress, number=number: number**2 for number in range(5)]) == [0, 1, 4, 9, 16]
+    assert all_at_once([lambda progress, number=number: number**2 for number in range(5)]) == [
+        0,
+        1,
+        4,
+        9,
+        16,
+    ]
 
 
 def test_an_error_of_one_computation_ends_the_others_at_their_next_report(cores):
@@ -138,7 +156,10 @@ def test_an_error_of_one_computation_ends_the_others_at_their_next_report(cores)
         all_at_once([endless, fail, endless])
 
 
-LATE = [pytest.param(when, marks=pytest.mark.thorough) for when in ("following", "looking for chaos, confirming", "estimating")]
+LATE = [
+    pytest.param(when, marks=pytest.mark.thorough)
+    for when in ("following", "looking for chaos, confirming", "estimating")
+]
 
 
 @pytest.mark.parametrize("when", ["looking for chaos, values", *LATE])
@@ -151,8 +172,14 @@ def test_an_interrupted_diagram_ends_at_once(cores, when):
 
     begun = set(threading.enumerate())
     with pytest.raises(KeyboardInterrupt):
-        saltus.bifurcation_diagram(forced(1.0), AMPLITUDE, (1.74, 1.77), effort="quick", starts=4, progress=interrupt)
-    assert {thread for thread in threading.enumerate() if thread not in begun and not thread.name.startswith("saltus")} == set()
+        saltus.bifurcation_diagram(
+            forced(1.0), AMPLITUDE, (1.74, 1.77), effort="quick", starts=4, progress=interrupt
+        )
+    assert {
+        thread
+        for thread in threading.enumerate()
+        if thread not in begun and not thread.name.startswith("saltus")
+    } == set()
 
 
 def test_a_growing_progress_never_falls():

@@ -1,4 +1,6 @@
-"""A small response spectrum from end to end: what it finds, what it proves of every point, and that a seed is all its chance."""
+"""A small response spectrum from end to end: what it finds, what it proves of every point, and that
+a seed is all its chance.
+"""
 
 from itertools import pairwise
 
@@ -13,10 +15,15 @@ from saltus import bifurcation_diagram, response_spectrum
 from saltus.orbits import orbits_of
 from saltus.orbits.orbit import solve
 
-TOUCHING = 1e-9  # speed or gap below which an orbit grazes: rounding then decides whether there is an impact
+# speed or gap below which an orbit grazes: rounding then decides whether there is an impact
+TOUCHING = 1e-9
 
-# Folds and the grazing of the period-3 loop at H = 1, and folds at H = 0.5, by codes that share nothing with this one
-LOOP = {"LP": [2.1304272516, 2.3228679307, 3.0430772685, 3.0513452905, 3.1064546343], "GR": [2.4548757753]}
+# Folds and the grazing of the period-3 loop at H = 1, and folds at H = 0.5, by codes that share
+# nothing with this one
+LOOP = {
+    "LP": [2.1304272516, 2.3228679307, 3.0430772685, 3.0513452905, 3.1064546343],
+    "GR": [2.4548757753],
+}
 HALF = [0.848485265597, 0.908810732539]
 
 
@@ -33,7 +40,9 @@ def touches(branch):
 
 
 def orbits_at(branch, value):
-    """The orbits of a branch at a value of the parameter, solved between the points of its dataset alone."""
+    """The orbits of a branch at a value of the parameter, solved between the points of its dataset
+    alone.
+    """
     found = []
     for a, b in pairwise(orbits_of(branch)):
         start, end = a.solution.values[0], b.solution.values[0]
@@ -47,7 +56,7 @@ def orbits_at(branch, value):
     return found
 
 
-# --- what is found ---------------------------------------------------------------------------------------------------------
+# --- what is found -----------------------------------------------------------
 
 
 def test_a_main_branch_and_the_detached_loop_of_period_3(branches):
@@ -73,7 +82,7 @@ def test_a_loop_is_followed_beyond_the_range_to_where_it_closes(branches):
     assert main["parameter"].max() == 2.6
 
 
-# --- what is proved of every point -------------------------------------------------------------------------------------------
+# --- what is proved of every point -------------------------------------------
 
 
 def test_no_point_is_inadmissible(branches):
@@ -93,7 +102,9 @@ def test_every_stable_point_stays_where_it_is_for_20_periods(branches):
 
 
 def test_every_point_repeats_itself_as_well_as_it_repels(branches):
-    """The event-driven flow over a period multiplies the roundings of the orbit by its largest multiplier, or a little more."""
+    """The event-driven flow over a period multiplies the roundings of the orbit by its largest
+    multiplier, or a little more.
+    """
     for branch in branches:
         smooth = ~touches(branch)
         assert smooth.sum() > 0.9 * smooth.size
@@ -103,7 +114,8 @@ def test_every_point_repeats_itself_as_well_as_it_repels(branches):
 
 def test_stable_means_multipliers_inside_the_unit_circle(branches):
     for branch in branches:
-        inside = (largest_multiplier(branch) < 1.0 - 1e-9) & ~touches(branch)  # exactly at a special point it is not stable
+        # exactly at a special point it is not stable
+        inside = (largest_multiplier(branch) < 1.0 - 1e-9) & ~touches(branch)
         assert (branch["stable"].values.astype(bool) == inside).all()
 
 
@@ -112,7 +124,8 @@ def test_the_multipliers_obey_the_law_of_the_determinant(branches):
     for branch in branches:
         values = branch["multiplier_real"].values + 1j * branch["multiplier_imag"].values
         law = np.exp(-0.1 * branch["period"] * 2 * np.pi / branch["parameter"]).values
-        moderate = largest_multiplier(branch) < 100.0  # beside a grazing rounding takes digits of the smaller one
+        # beside a grazing rounding takes digits of the smaller one
+        moderate = largest_multiplier(branch) < 100.0
         assert moderate.sum() > 0.9 * moderate.size
         assert values.prod(axis=1)[moderate] == pytest.approx(law[moderate], rel=1e-8)
 
@@ -121,8 +134,15 @@ def test_every_dot_of_the_simulation_lies_on_a_stable_branch(spectrum, branches)
     dots = spectrum["attractors"]
     assert dots.sizes["dot"] >= 5
     assert set(dots["period"].values.tolist()) == {1, 3}
-    for value, amplitude, periods in zip(dots["parameter"].values, dots["amplitude"].values, dots["period"].values, strict=True):
-        orbits = [orbit for branch in branches for orbit in orbits_at(branch, value) if orbit.stable and orbit.period == periods]
+    for value, amplitude, periods in zip(
+        dots["parameter"].values, dots["amplitude"].values, dots["period"].values, strict=True
+    ):
+        orbits = [
+            orbit
+            for branch in branches
+            for orbit in orbits_at(branch, value)
+            if orbit.stable and orbit.period == periods
+        ]
         assert min(abs(orbit.amplitude - amplitude) for orbit in orbits) < 1e-6
 
 
@@ -145,11 +165,16 @@ def test_what_share_of_the_states_is_missed_is_estimated_by_a_sample(spectrum):
     assert 0.0 < attrs["missed_high"] - attrs["missed_low"] < 0.1
 
 
-# --- chance, and what is asked -------------------------------------------------------------------------------------------------
+# --- chance, and what is asked -----------------------------------------------
 
 
 def small(**options):
-    return response_spectrum(forced(H=0.5), FREQUENCY, (0.8, 1.0), **{"max_period": 1, "values": [0.9], "starts": 8} | options)
+    return response_spectrum(
+        forced(H=0.5),
+        FREQUENCY,
+        (0.8, 1.0),
+        **{"max_period": 1, "values": [0.9], "starts": 8} | options,
+    )
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_one_the_same_motions():
@@ -170,12 +195,20 @@ def test_progress_grows_to_one_and_says_what_is_done():
     assert shares[-1] == 1.0
     # What branches report is passed on only if they take longer than what is beside them.
     said = {what.split(",")[0] for _, what in heard if not what.startswith("following")}
-    assert said == {"searching", "looking for chaos", "estimating what is missing", "confirming", "done"}
+    assert said == {
+        "searching",
+        "looking for chaos",
+        "estimating what is missing",
+        "confirming",
+        "done",
+    }
 
 
 def test_where_everything_rests_there_is_no_branch():
     """Far below the onset, H = 0.0219879514 at Omega = 1, all motions end at rest."""
-    tree = bifurcation_diagram(forced(1.0), AMPLITUDE, (0.0, 0.01), max_period=2, values=[0.005], starts=8)
+    tree = bifurcation_diagram(
+        forced(1.0), AMPLITUDE, (0.0, 0.01), max_period=2, values=[0.005], starts=8
+    )
     assert tree["branches"].sizes.get("branch", 0) == tree["points"].sizes["point"] == 0
     assert tree["attractors"].sizes["dot"] == 0
     assert int(tree["search"]["at_rest"][0]) == 8

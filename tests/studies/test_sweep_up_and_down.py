@@ -1,4 +1,6 @@
-"""A parameter swept up and down: jumps where closed forms and branches have them, hysteresis between."""
+"""A parameter swept up and down: jumps where closed forms and branches have them, hysteresis
+between.
+"""
 
 import numpy as np
 import pytest
@@ -29,7 +31,9 @@ def linear_gain(w):
 
 
 def upper_grazing():
-    """The frequency above resonance at which the linear amplitude is that of the wall: (1 - u)^2 + c^2 u = F^2, u = w^2."""
+    """The frequency above resonance at which the linear amplitude is that of the wall: (1 - u)^2 +
+    c^2 u = F^2, u = w^2.
+    """
     return np.sqrt(max(np.roots([1.0, DAMPING**2 - 2, 1 - FORCE**2])))
 
 
@@ -47,12 +51,15 @@ def jumps(data, way):
 def test_on_the_way_down_the_jump_is_where_the_linear_motion_grazes_the_wall(swept):
     ((before, after),) = jumps(swept, "down")
     assert before - after < 1.1e-5  # a thousandth of the step
-    assert 0.5 * (before + after) == pytest.approx(upper_grazing(), abs=2e-5)  # beside it transients touch the wall as well
+    # beside it transients touch the wall as well
+    assert 0.5 * (before + after) == pytest.approx(upper_grazing(), abs=2e-5)
 
 
 def test_on_the_way_up_the_jump_is_the_fold_of_the_branch(swept):
     ((before, after),) = jumps(swept, "up")
-    branch = saltus.continue_orbit(saltus.find_orbit(oscillator(1.1), x=1.0), "load.frequency", (1.05, 1.4))
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(oscillator(1.1), x=1.0), "load.frequency", (1.05, 1.4)
+    )
     folds = [s.parameter for s in branch.special if s.kind == SpecialKind.LP]
     assert any(before <= fold <= after for fold in folds)
 
@@ -69,14 +76,20 @@ def test_without_impacts_both_ways_are_the_linear_response(swept):
     for way in ("up", "down"):
         one = swept.sel(direction=way)
         free = one.impact_count == 0
-        assert one.amplitude[free].values == pytest.approx(FORCE * linear_gain(one.value[free].values), rel=1e-8)
+        assert one.amplitude[free].values == pytest.approx(
+            FORCE * linear_gain(one.value[free].values), rel=1e-8
+        )
         assert free.sum() > 15
 
 
 def test_the_speeds_of_capture_of_all_values_are_proved_together(monkeypatch):
-    """One proof takes as long for one value as for a hundred; without a jump two ways of 12 values need three."""
+    """One proof takes as long for one value as for a hundred; without a jump two ways of 12 values
+    need three.
+    """
     proofs = []
-    monkeypatch.setattr("saltus.bounds.proved_speeds", lambda *given: proofs.append(0) or proved_speeds(*given))
+    monkeypatch.setattr(
+        "saltus.bounds.proved_speeds", lambda *given: proofs.append(0) or proved_speeds(*given)
+    )
     data = saltus.frequency_sweep(oscillator(), np.linspace(1.2, 1.25, 12), x=0.1)
     assert data.sizes["jump"] == 0
     assert 0 < len(proofs) <= 3
@@ -94,22 +107,33 @@ def test_any_parameter_of_the_load_is_swept():
 def test_a_function_is_asked_of_the_motion_on_which_each_value_is_left():
     """P = c (w X)^2 / 2 of the linear motion; with impacts what the load gives on the orbit."""
     grid = np.linspace(1.3, 1.6, 4)
-    data = saltus.frequency_sweep(oscillator(wall=50.0), grid, x=0.0, functions={"power": saltus.mean_dissipated_power})
-    assert data.power.values == pytest.approx(np.tile(DAMPING * (grid * FORCE * linear_gain(grid)) ** 2 / 2, (2, 1)), rel=1e-6)
-    seen = saltus.frequency_sweep(oscillator(), [1.05, 1.1], x=1.0, functions={"impacts": lambda motion: len(motion.impacts)})
+    data = saltus.frequency_sweep(
+        oscillator(wall=50.0), grid, x=0.0, functions={"power": saltus.mean_dissipated_power}
+    )
+    assert data.power.values == pytest.approx(
+        np.tile(DAMPING * (grid * FORCE * linear_gain(grid)) ** 2 / 2, (2, 1)), rel=1e-6
+    )
+    seen = saltus.frequency_sweep(
+        oscillator(), [1.05, 1.1], x=1.0, functions={"impacts": lambda motion: len(motion.impacts)}
+    )
     assert (seen.impacts == seen.impact_count).all()
     assert (seen.impacts > 0).any()
 
 
 def test_falling_values_are_swept_down_first():
-    """From rest at 1.5 the linear motion is kept down to where it grazes; begun at 1.02 the sweep is on the impacting one."""
+    """From rest at 1.5 the linear motion is kept down to where it grazes; begun at 1.02 the sweep
+    is on the impacting one.
+    """
     down, up = (
-        saltus.frequency_sweep(oscillator(), grid, x=0.1) for grid in (np.linspace(1.5, 1.02, 9), np.linspace(1.02, 1.5, 9))
+        saltus.frequency_sweep(oscillator(), grid, x=0.1)
+        for grid in (np.linspace(1.5, 1.02, 9), np.linspace(1.02, 1.5, 9))
     )
     assert (down.value == up.value).all()
     assert (np.diff(down.value) > 0).all()
     later = {"value": 1.2, "method": "nearest"}
-    assert down.amplitude.sel(direction="down").sel(**later) == pytest.approx(FORCE * linear_gain(1.2), rel=1e-6)
+    assert down.amplitude.sel(direction="down").sel(**later) == pytest.approx(
+        FORCE * linear_gain(1.2), rel=1e-6
+    )
     assert np.array(jumps(down, "down")) == pytest.approx(np.array(jumps(up, "down")), abs=1e-4)
     assert np.array(jumps(down, "up")) == pytest.approx(np.array(jumps(up, "up")), abs=1e-4)
 
@@ -129,7 +153,9 @@ def test_a_start_beyond_the_contact_is_refused_as_by_simulate(place):
 @pytest.mark.thorough
 def test_a_slow_sweep_follows_the_response_within_its_rate():
     grid = np.linspace(1.3, 1.6, 601)
-    data = saltus.frequency_sweep(oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0)
+    data = saltus.frequency_sweep(
+        oscillator(1.3, wall=50.0), grid, periods=1, stop_early=False, x=0.0
+    )
     late = data.sel(direction="down")
     assert (late.periods == 1).all()
     assert late.amplitude.values == pytest.approx(FORCE * linear_gain(grid), rel=0.02)
@@ -143,7 +169,11 @@ def test_a_sweep_ends_where_a_margin_ends_the_motion_and_goes_back_from_there():
         impact=saltus.VelocityReduction(0.8),
     )
     data = saltus.frequency_sweep(
-        block, np.linspace(0.02, 2.0, 12), path="load.ground_horizontal.amplitude", theta=0.0, periods=200
+        block,
+        np.linspace(0.02, 2.0, 12),
+        path="load.ground_horizontal.amplitude",
+        theta=0.0,
+        periods=200,
     )
     reached = np.isfinite(data.amplitude.sel(direction="up").values)
     assert 0 < reached.sum() < 12
@@ -182,12 +212,24 @@ x = 0.1
     ("change", "sentence"),
     [
         ({"values": [1.0]}, "values must be two or more"),
-        ({"values": [1.2, 1.0, 1.1]}, r"must be numbers that rise, or all fall, .* got \[1.2, 1.0, 1.1\]"),
-        ({"values": [1.0, 1.2, 1.1]}, r"must be numbers that rise, or all fall, .* got \[1.0, 1.2, 1.1\]"),
+        (
+            {"values": [1.2, 1.0, 1.1]},
+            r"must be numbers that rise, or all fall, .* got \[1.2, 1.0, 1.1\]",
+        ),
+        (
+            {"values": [1.0, 1.2, 1.1]},
+            r"must be numbers that rise, or all fall, .* got \[1.0, 1.2, 1.1\]",
+        ),
         ({"values": [[1.0, 1.1]]}, "must be numbers that rise, or all fall"),
         ({"values": []}, "must be numbers that rise, or all fall"),
-        ({"functions": {"power": 3.0}}, "functions must be functions of a motion, and 'power' is 3.0"),
-        ({"functions": {"state": lambda motion: motion.final_state}}, "functions must return a number, and 'state' returned"),
+        (
+            {"functions": {"power": 3.0}},
+            "functions must be functions of a motion, and 'power' is 3.0",
+        ),
+        (
+            {"functions": {"state": lambda motion: motion.final_state}},
+            "functions must return a number, and 'state' returned",
+        ),
         ({"path": "load.force"}, "not a number"),
         ({"periods": 0}, "periods"),
         ({"y": 0.3}, "no coordinate 'y'"),
@@ -201,15 +243,22 @@ def test_a_sweep_without_meaning_is_refused(change, sentence):
 
 
 def test_between_stops_what_was_asked_for_is_drawn():
-    """The amplitude is that of the stops for all values; the impacts in a period and functions can be drawn too."""
+    """The amplitude is that of the stops for all values; the impacts in a period and functions can
+    be drawn too.
+    """
     stops = saltus.System(
         model=saltus.TwoStops(damping=0.05),
         load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.4)),
         impact=saltus.NewtonImpact(0.6),
     )
-    data = saltus.frequency_sweep(stops, [0.9, 1.0, 1.1], x=0.0, functions={"speed": lambda motion: abs(motion.velocity)})
+    data = saltus.frequency_sweep(
+        stops, [0.9, 1.0, 1.1], x=0.0, functions={"speed": lambda motion: abs(motion.velocity)}
+    )
     assert np.ptp(data.amplitude.values) < 1e-9
-    for quantity, name, label in ((None, "speed", "speed"), ("impact_count", "impact_count", "impact")):
+    for quantity, name, label in (
+        (None, "speed", "speed"),
+        ("impact_count", "impact_count", "impact"),
+    ):
         ax = draw_sweep(data, quantity)
         np.testing.assert_allclose(ax.lines[0].get_ydata(), data[name].sel(direction="up").values)
         assert label in ax.get_ylabel()
@@ -245,7 +294,9 @@ def test_a_sweep_traces_a_system_of_several_contacts_for_its_proofs_at_most_once
     traced, traces = capture.trace, []
     monkeypatch.setattr(capture, "trace", lambda *given: traces.append(0) or traced(*given))
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(2.0))
-    stops = saltus.System(model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(e=0.7))
+    stops = saltus.System(
+        model=saltus.TwoStops(damping=0.05), load=load, impact=saltus.NewtonImpact(e=0.7)
+    )
     data = saltus.frequency_sweep(stops, np.linspace(1.0, 1.1, 5), x=0.1, periods=20)
     assert data.amplitude.shape == (2, 5)
     assert len(traces) <= 1

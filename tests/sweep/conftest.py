@@ -21,7 +21,9 @@ def _heed_interrupts():
 
 @pytest.fixture(scope="session")
 def waves_plan():
-    """Make a plan over a grid of 7 x 5 points in 4 x 2 chunks, the last of which are smaller, with other entries as named."""
+    """Make a plan over a grid of 7 x 5 points in 4 x 2 chunks, the last of which are smaller, with
+    other entries as named.
+    """
 
     def make(function="waves", arguments=None, **others):
         entries = {
@@ -45,19 +47,30 @@ def tree():
     """The files below a folder by their paths, with their bytes."""
 
     def read(folder):
-        return {str(file.relative_to(folder)): file.read_bytes() for file in Path(folder).rglob("*") if file.is_file()}
+        return {
+            str(file.relative_to(folder)): file.read_bytes()
+            for file in Path(folder).rglob("*")
+            if file.is_file()
+        }
 
     return read
 
 
 @pytest.fixture
 def script():
-    """Start `sweep_script.py` with arguments, in a group of its own; whatever is left is killed at the end."""
+    """Start `sweep_script.py` with arguments, in a group of its own; whatever is left is killed at
+    the end.
+    """
     processes = []
 
     def start(*arguments, before=()):
         command = [*before, sys.executable, str(HERE / "sweep_script.py"), *map(str, arguments)]
-        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+        options = {
+            "stdout": subprocess.PIPE,
+            "stderr": subprocess.PIPE,
+            "text": True,
+            "start_new_session": True,
+        }
         processes.append(subprocess.Popen(command, preexec_fn=_heed_interrupts, **options))
         return processes[-1]
 

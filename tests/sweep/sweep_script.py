@@ -16,14 +16,23 @@ def long_plan(chunks=120, **arguments):
     variables = {"height": Variable(), "count": Variable(dtype="i4", extra=(("k", 3),))}
     axes = {"x": np.linspace(-1.0, 1.0, chunks), "y": np.linspace(0.0, 1.0, 16)}
     function = "sweep_toys:waves"
-    return Plan(function=function, arguments=arguments, axes=axes, chunk={"x": 1}, variables=variables, attrs={"kind": "waves"})
+    return Plan(
+        function=function,
+        arguments=arguments,
+        axes=axes,
+        chunk={"x": 1},
+        variables=variables,
+        attrs={"kind": "waves"},
+    )
 
 
 def rows_plan(rows):
     """Rows, 25 000 in a chunk, of eight numbers each."""
     axes = {"start": np.linspace(0.0, 1.0, 1000), "row": np.arange(rows // 1000)}
     variables = {"end": Variable(extra=(("k", 8),))}
-    return Plan(function="sweep_toys:rows", axes=axes, chunk={"start": 1000, "row": 25}, variables=variables)
+    return Plan(
+        function="sweep_toys:rows", axes=axes, chunk={"start": 1000, "row": 25}, variables=variables
+    )
 
 
 def go_on(store, where, pause, quick=-2.0):
@@ -54,7 +63,11 @@ def fill_disk(folder):
         print(error)
     kept = status(store)
     print(kept.done, kept.total)
-    print(subprocess.run(["find", folder, "-name", ".*.part"], capture_output=True, text=True, check=True).stdout.count("\n"))
+    print(
+        subprocess.run(
+            ["find", folder, "-name", ".*.part"], capture_output=True, text=True, check=True
+        ).stdout.count("\n")
+    )
     subprocess.run(["mount", "-o", "remount,size=64m", folder], check=True)
     dataset = run(plan, store)
     print(dataset.load().identical(run(plan)))

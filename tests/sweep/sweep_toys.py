@@ -8,7 +8,8 @@ import numpy as np
 
 
 def waves(arguments, block):
-    """A real and an integer array over a grid of two axes, one with a dimension of its own; some values are NaN.
+    """A real and an integer array over a grid of two axes, one with a dimension of its own; some
+    values are NaN.
 
     It takes `pause` seconds, or where x is at most `quick` none.
     """
@@ -22,13 +23,23 @@ def waves(arguments, block):
 def draws(arguments, block):
     """Random numbers, from a seed that the arguments and the block give."""
     x, y = block["x"], block["y"]
-    rng = np.random.default_rng([arguments["seed"], x.tobytes()[0], *np.frombuffer(x.tobytes() + y.tobytes(), dtype="u4")])
-    return {"height": rng.normal(size=(len(x), len(y))), "count": rng.integers(0, 9, size=(len(x), len(y), 3))}
+    rng = np.random.default_rng(
+        [arguments["seed"], x.tobytes()[0], *np.frombuffer(x.tobytes() + y.tobytes(), dtype="u4")]
+    )
+    return {
+        "height": rng.normal(size=(len(x), len(y))),
+        "count": rng.integers(0, 9, size=(len(x), len(y), 3)),
+    }
 
 
 def fails(arguments, block):
-    """Raises in the chunks that hold the x in `bad`, until the file `until`, if there is one, exists."""
-    if set(arguments["bad"]) & set(block["x"].tolist()) and not Path(arguments.get("until", "/none")).exists():
+    """Raises in the chunks that hold the x in `bad`, until the file `until`, if there is one,
+    exists.
+    """
+    if (
+        set(arguments["bad"]) & set(block["x"].tolist())
+        and not Path(arguments.get("until", "/none")).exists()
+    ):
         raise ValueError(f"no wave at {block['x'][0]}")
     return waves(arguments, block)
 

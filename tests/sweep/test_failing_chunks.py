@@ -19,10 +19,13 @@ def test_the_rest_goes_on_and_the_same_run_completes_it(waves_plan, tree, tmp_pa
     with pytest.raises(SweepError) as told:
         run(plan, store, workers=workers)
     sentence = (
-        "2 of 8 chunks failed: chunk 1/0 (x 0.333333 to 0.5, y 0 to 1): ValueError: no wave at 0.3333333333333333, and 1 more; "
+        "2 of 8 chunks failed: chunk 1/0 (x 0.333333 to 0.5, y 0 to 1): ValueError: no "
+        "wave at 0.3333333333333333, and 1 more; "
     )
     assert str(told.value).startswith(sentence)
-    assert str(told.value).endswith(f"{store} keeps the others, and the same run again computes only what is missing")
+    assert str(told.value).endswith(
+        f"{store} keeps the others, and the same run again computes only what is missing"
+    )
     assert [failure.index for failure in told.value.failures] == [(1, 0), (1, 1)]
     assert {failure.attempts for failure in told.value.failures} == {2}
     found = status(store)
@@ -30,7 +33,12 @@ def test_the_rest_goes_on_and_the_same_run_completes_it(waves_plan, tree, tmp_pa
     assert found.failures == told.value.failures
     until.touch()
     counts = []
-    run(plan, store, workers=workers, progress=lambda fraction, _: counts.append(round(8 * fraction)))
+    run(
+        plan,
+        store,
+        workers=workers,
+        progress=lambda fraction, _: counts.append(round(8 * fraction)),
+    )
     assert counts == [6, 7, 8]
     assert status(store).failed == 0
     run(plan, tmp_path / "undisturbed")
@@ -79,11 +87,22 @@ def test_in_memory_the_error_holds_what_there_is(waves_plan):
 
 def test_progress_counts_up_and_estimates_the_time_left(waves_plan, tmp_path):
     said = []
-    run(waves_plan(arguments={"pause": 0.05}), tmp_path / "s", progress=lambda *what: said.append(what))
+    run(
+        waves_plan(arguments={"pause": 0.05}),
+        tmp_path / "s",
+        progress=lambda *what: said.append(what),
+    )
     assert [fraction for fraction, _ in said] == [done / 8 for done in range(9)]
     assert said[0][1] == "0 of 8 chunks"  # nothing to estimate from
     assert said[-1][1] == "8 of 8 chunks"
-    assert all(re.fullmatch(rf"{done} of 8 chunks, about [01] s left", what) for done, (_, what) in enumerate(said[1:-1], 1))
+    assert all(
+        re.fullmatch(rf"{done} of 8 chunks, about [01] s left", what)
+        for done, (_, what) in enumerate(said[1:-1], 1)
+    )
     again = []
-    run(waves_plan(arguments={"pause": 0.05}), tmp_path / "s", progress=lambda *what: again.append(what))
+    run(
+        waves_plan(arguments={"pause": 0.05}),
+        tmp_path / "s",
+        progress=lambda *what: again.append(what),
+    )
     assert again == [(1.0, "8 of 8 chunks")]

@@ -16,7 +16,9 @@ def _own_disks() -> bool:
     """Whether this system lets a user mount a disk of memory in a name space of his own."""
     if not shutil.which("unshare"):
         return False
-    return subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
+    return (
+        subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
+    )
 
 
 @pytest.mark.skipif(not _own_disks(), reason="needs user name spaces")
@@ -47,7 +49,9 @@ def test_the_file_that_did_not_fit_is_not_there(waves_plan, tree, tmp_path, monk
         original(path, content)
 
     monkeypatch.setattr(stores, "write_durably", fails)
-    with pytest.raises(SweepError, match=f"{os.strerror(code).lower()}.*; the chunks before it are kept"):
+    with pytest.raises(
+        SweepError, match=f"{os.strerror(code).lower()}.*; the chunks before it are kept"
+    ):
         run(plan, store)
     assert status(store).done == 3
     monkeypatch.undo()

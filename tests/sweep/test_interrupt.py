@@ -22,8 +22,12 @@ def test_an_interrupt_waits_until_it_is_heeded():
         signal.signal(signal.SIGINT, before)
 
 
-def test_an_interrupt_while_a_store_is_made_waits_until_it_is_there(waves_plan, tmp_path, monkeypatch):
-    """Zarr writes in a thread: if the folder were removed under it there would be its traceback after the message."""
+def test_an_interrupt_while_a_store_is_made_waits_until_it_is_there(
+    waves_plan, tmp_path, monkeypatch
+):
+    """Zarr writes in a thread: if the folder were removed under it there would be its traceback
+    after the message.
+    """
     made = store._make
 
     def interrupted(plan, path):

@@ -1,4 +1,6 @@
-"""A quantity of one's own over a grid: what it returns, where its function may stand, and how it goes on."""
+"""A quantity of one's own over a grid: what it returns, where its function may stand, and how it
+goes on.
+"""
 
 import numpy as np
 import pytest
@@ -14,7 +16,13 @@ def total(x, y):
 
 
 def several(x, y):
-    return {"sum": x + y, "powers": [x, x**2, x**3], "whole": int(x), "true": x > y, "wave": np.exp(1j * x)}
+    return {
+        "sum": x + y,
+        "powers": [x, x**2, x**3],
+        "whole": int(x),
+        "true": x > y,
+        "wave": np.exp(1j * x),
+    }
 
 
 def test_a_number_at_every_point_is_the_variable_value():
@@ -39,10 +47,15 @@ def test_processes_find_a_function_wherever_it_stands(where, tmp_path):
     function = total if where == "a module" else (lambda x, y: factor * total(x, y))
     if where == "a notebook":  # it is in no file, and its module is __main__ in every process
         cell: dict = {"__name__": "__main__", "saltus": saltus, "fall": saltus.Load(force=2.0)}
-        exec("def function(x, y):\n    return fall.force(0.0) * (x + y) if saltus.Load else 0.0\n", cell)
+        exec(
+            "def function(x, y):\n    return fall.force(0.0) * (x + y) if saltus.Load else 0.0\n",
+            cell,
+        )
         function = cell["function"]
     data = saltus.map_over(function, GRID, store=tmp_path / "kept.zarr", workers=2)
-    np.testing.assert_array_equal(data.value, (1.0 if where == "a module" else 2.0) * np.add.outer(GRID["x"], GRID["y"]))
+    np.testing.assert_array_equal(
+        data.value, (1.0 if where == "a module" else 2.0) * np.add.outer(GRID["x"], GRID["y"])
+    )
 
 
 def test_what_is_kept_is_not_computed_again_after_a_failure(tmp_path):
@@ -67,10 +80,15 @@ def test_what_is_kept_is_not_computed_again_after_a_failure(tmp_path):
 
 
 def test_other_points_are_computed_where_the_function_raises_at_the_first():
-    with pytest.raises(SweepError, match=r"1 of 3 chunks failed: chunk 0 \(x 0\): ZeroDivisionError") as raised:
+    with pytest.raises(
+        SweepError, match=r"1 of 3 chunks failed: chunk 0 \(x 0\): ZeroDivisionError"
+    ) as raised:
         saltus.map_over(lambda x: 1 / x, {"x": [0.0, 2.0, 4.0]})
     np.testing.assert_array_equal(raised.value.dataset.value, [np.nan, 0.5, 0.25])
-    with pytest.raises(SweepError, match=r"raised at each of the 2 points: TypeError: .* at the first, x 0.0, y 1.0"):
+    with pytest.raises(
+        SweepError,
+        match=r"raised at each of the 2 points: TypeError: .* at the first, x 0.0, y 1.0",
+    ):
         saltus.map_over(lambda x: 1 / x, {"x": [0.0, 2.0], "y": [1.0]})
 
 
@@ -80,11 +98,18 @@ def test_a_number_over_one_name_or_two_is_drawn_and_a_part_of_more():
     np.testing.assert_array_equal(one.lines[0].get_xydata(), [[1.0, 2.0], [2.0, 4.0], [3.0, 6.0]])
     two = saltus.plot(saltus.map_over(total, GRID))
     assert (two.get_xlabel(), two.get_ylabel()) == ("x", "y")
-    np.testing.assert_array_equal(np.ravel(two.collections[0].get_array()), [1.0, 2.0, 3.0, 11.0, 12.0, 13.0])
-    named = saltus.plot(saltus.map_over(lambda period: {"stop": 2 * period}, {"period": [1.0, 2.0]}))  # names of ensembles
+    np.testing.assert_array_equal(
+        np.ravel(two.collections[0].get_array()), [1.0, 2.0, 3.0, 11.0, 12.0, 13.0]
+    )
+    # names of ensembles
+    named = saltus.plot(
+        saltus.map_over(lambda period: {"stop": 2 * period}, {"period": [1.0, 2.0]})
+    )
     assert (named.get_xlabel(), named.get_ylabel()) == ("period", "stop")
     three = saltus.map_over(lambda x, y, z: x + y + z, GRID | {"z": [0.5, 0.7]})
-    with pytest.raises(ParameterError, match=r"over one or two dimensions to draw; draw a part, as isel\(x=0\)"):
+    with pytest.raises(
+        ParameterError, match=r"over one or two dimensions to draw; draw a part, as isel\(x=0\)"
+    ):
         saltus.plot(three)
     assert saltus.plot(three.isel(z=1)).get_xlabel() == "x"
 
@@ -92,7 +117,9 @@ def test_a_number_over_one_name_or_two_is_drawn_and_a_part_of_more():
 def test_a_store_of_another_text_or_another_grid_is_refused(tmp_path):
     store = tmp_path / "kept.zarr"
     saltus.map_over(lambda x: x + 1, {"x": [1.0]}, store=store)
-    with pytest.raises(ParameterError, match=r"text of the function .* has changed since .*remove_store"):
+    with pytest.raises(
+        ParameterError, match=r"text of the function .* has changed since .*remove_store"
+    ):
         saltus.map_over(lambda x: x + 2, {"x": [1.0]}, store=store)
     saltus.sweep.remove_store(store)
     saltus.map_over(total, GRID, store=store)

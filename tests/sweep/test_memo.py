@@ -1,4 +1,6 @@
-"""What a search computes: each input once, found again by who asks next, and back from its file as it was."""
+"""What a search computes: each input once, found again by who asks next, and back from its file as
+it was.
+"""
 
 import numpy as np
 import pytest
@@ -25,7 +27,10 @@ VALUES = {
 
 def squares(arguments, inputs):
     asked.extend(inputs)
-    return {"input": np.array(inputs), "square": [{"is": arguments["scale"] * x**2} for x in inputs]}
+    return {
+        "input": np.array(inputs),
+        "square": [{"is": arguments["scale"] * x**2} for x in inputs],
+    }
 
 
 def failing(arguments, inputs):
@@ -47,7 +52,9 @@ def test_an_input_is_computed_once(kept, tmp_path):
     again = Memo({"scale": 2.0}, store)
     assert found(again, [5, 4]) == [(5, 50), (4, 32)]
     assert asked == [1, 2, 3, 4, 5] + ([] if kept else [5, 4])
-    assert sorted(given for given, _ in again.remembered(SQUARES)) == ([1, 2, 3, 4, 5] if kept else [4, 5])
+    assert sorted(given for given, _ in again.remembered(SQUARES)) == (
+        [1, 2, 3, 4, 5] if kept else [4, 5]
+    )
 
 
 def test_what_was_computed_with_other_arguments_is_not_taken(tmp_path):
@@ -56,7 +63,9 @@ def test_what_was_computed_with_other_arguments_is_not_taken(tmp_path):
 
 
 def test_a_run_that_was_stopped_ends_with_the_same_files(tmp_path):
-    """Whichever files of a call are there: the chunks are cut from all that the run has not asked for before."""
+    """Whichever files of a call are there: the chunks are cut from all that the run has not asked
+    for before.
+    """
     found(Memo({"scale": 2.0}, tmp_path), list(range(10)))
     whole = {file: file.read_bytes() for file in (tmp_path / "parts").iterdir()}
     assert len(whole) == 4
@@ -113,7 +122,10 @@ def test_what_cannot_be_computed_or_written_is_told(tmp_path):
 
 
 def test_an_entry_costs_about_a_millisecond(tmp_path):
-    """A store that cost 15 ms a part took a third of the time of Fig. 9f; the bound leaves room for a busy machine."""
+    """A store that cost 15 ms a part took a third of the time of Fig.
+
+    9f; the bound leaves room for a busy machine.
+    """
     import time
 
     many = Memo({"scale": 2.0}, tmp_path)

@@ -18,7 +18,10 @@ GRID = np.linspace(0.0, 1.0, 4)
     [
         ({"function": "wavse"}, "has no 'wavse'; did you mean 'waves'"),
         ({"function": "not_a_function"}, "is of type int, not a function"),
-        ({"arguments": {"a": {"b": [1, np.arange(2)]}}}, r"arguments\['a'\]\['b'\]\[1\] is of type ndarray"),
+        (
+            {"arguments": {"a": {"b": [1, np.arange(2)]}}},
+            r"arguments\['a'\]\['b'\]\[1\] is of type ndarray",
+        ),
         ({"arguments": {"a": float("nan")}}, r"arguments\['a'\] is nan"),
         ({"arguments": {1: 2}}, "has the key 1; keys are strings"),
         ({"attrs": {"system": object()}}, r"attrs\['system'\] is of type object"),
@@ -31,7 +34,10 @@ GRID = np.linspace(0.0, 1.0, 4)
         ({"axes": {"x": GRID, "a/b": GRID}}, "'a/b' cannot be the name of an axis"),
         ({"axes": {"x": GRID, "Height": GRID}, "chunk": {}}, "differ in their capitals alone"),
         ({"chunk": {"z": 2}}, "the axis 'z', which the plan does not have"),
-        ({"chunk": {"x": 0}}, r"chunk\['x'\] must be a whole number of points of at least 1, got 0"),
+        (
+            {"chunk": {"x": 0}},
+            r"chunk\['x'\] must be a whole number of points of at least 1, got 0",
+        ),
         ({"chunk": {"x": 1.5}}, "got 1.5"),
         ({"chunk": {"x": True}}, "got True"),
         ({"variables": {}}, "at least one variable"),
@@ -43,7 +49,10 @@ GRID = np.linspace(0.0, 1.0, 4)
         ({"variables": {"x": Variable()}}, "'x' names two things"),
         ({"variables": {"height": Variable(extra=(("y", 2),))}}, "'y' names two things"),
         ({"variables": {"k": Variable(extra=(("k", 2),))}}, "'k' names two things"),
-        ({"variables": {"a": Variable(extra=(("k", 2),)), "b": Variable(extra=(("k", 3),))}}, "has the sizes 2 and 3"),
+        (
+            {"variables": {"a": Variable(extra=(("k", 2),)), "b": Variable(extra=(("k", 3),))}},
+            "has the sizes 2 and 3",
+        ),
         ({"variables": {"a": Variable(extra=(("k", 2), ("k", 2)))}}, "'a' has a dimension twice"),
         ({"variables": {"zarr.json": Variable()}}, "cannot be the name of a variable"),
     ],
@@ -89,7 +98,10 @@ def test_a_variable_without_meaning_is_refused(entry, sentence):
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        ("no dict", r"returned for chunk 0/0 \(x 0 to 0.166667, y 0 to 1\) a list; a dict of arrays"),
+        (
+            "no dict",
+            r"returned for chunk 0/0 \(x 0 to 0.166667, y 0 to 1\) a list; a dict of arrays",
+        ),
         ("missing", "no 'count'"),
         ("too many", "'heigth', which is no variable of the plan; did you mean 'height'"),
         ("shape", r"'height' of shape \(3, 2\); expected is \(2, 3\), along x, y"),
@@ -126,7 +138,8 @@ def test_a_run_without_meaning_is_refused(waves_plan, arguments, sentence):
 def test_chunks_cover_every_point_once(sizes):
     names = "abc"[: len(sizes)]
     chunks = ChunkGrid(
-        {n: size for n, (size, _) in zip(names, sizes, strict=True)}, {n: c for n, (_, c) in zip(names, sizes, strict=True)}
+        {n: size for n, (size, _) in zip(names, sizes, strict=True)},
+        {n: c for n, (_, c) in zip(names, sizes, strict=True)},
     )
     hits = np.zeros([size for size, _ in sizes], dtype=int)
     indices = list(chunks.indices())
@@ -137,9 +150,23 @@ def test_chunks_cover_every_point_once(sizes):
 
 
 def test_arguments_reach_the_function_as_json_gives_them_back():
-    given_ = {"pair": (1, 2.5), "flag": True, "none": None, "number": np.float64(0.1), "count": np.int64(3), "on": np.bool_(True)}
+    given_ = {
+        "pair": (1, 2.5),
+        "flag": True,
+        "none": None,
+        "number": np.float64(0.1),
+        "count": np.int64(3),
+        "on": np.bool_(True),
+    }
     there = as_json(given_, "arguments")
-    assert there == {"pair": [1, 2.5], "flag": True, "none": None, "number": 0.1, "count": 3, "on": True}
+    assert there == {
+        "pair": [1, 2.5],
+        "flag": True,
+        "none": None,
+        "number": 0.1,
+        "count": 3,
+        "on": True,
+    }
     assert [type(there[name]) for name in ("number", "count", "on")] == [float, int, bool]
 
 

@@ -28,7 +28,9 @@ def reference(tree, tmp_path_factory):
 
 
 def _killed(script, store, rng, chunks, workers=0) -> StoreStatus | None:
-    """Kill a run at a random moment after so many chunks; how far it came, None if not even to make the store."""
+    """Kill a run at a random moment after so many chunks; how far it came, None if not even to make
+    the store.
+    """
     process = script("go_on", store, workers, 0.0)
     while (line := process.stdout.readline().strip()) and (line == "go" or int(line) < chunks):
         if line == "go" and chunks < 0:
@@ -81,11 +83,14 @@ def test_what_a_kill_left_half_written_is_removed(tree, tmp_path):
     plan, store = sweep_script.long_plan(chunks=4), tmp_path / "store"
     run(plan, store)
     before = tree(store)
-    files.chunk_file(store, "height", (2, 0), 0).rename(store / "height" / "c" / "2" / ".0.0a1b2c.part")
+    files.chunk_file(store, "height", (2, 0), 0).rename(
+        store / "height" / "c" / "2" / ".0.0a1b2c.part"
+    )
     stale = tmp_path / ".store.0a1b2c.part"
     stale.mkdir()
     os.utime(stale, (0, 0))
-    fresh = tmp_path / ".store.3d4e5f.part"  # perhaps of a run that is about to find the store there
+    # perhaps of a run that is about to find the store there
+    fresh = tmp_path / ".store.3d4e5f.part"
     fresh.mkdir()
     run(plan, store)
     assert tree(store) == before
@@ -119,7 +124,9 @@ def test_an_interrupt_ends_a_run_and_says_how_to_go_on(script, tmp_path, workers
     _, err = process.communicate(timeout=20)
     last = err.strip().splitlines()[-1]
     done = status(store).done
-    assert last.endswith(f"interrupted after {done} of 120 chunks; {store} keeps them: run the same again to go on")
+    assert last.endswith(
+        f"interrupted after {done} of 120 chunks; {store} keeps them: run the same again to go on"
+    )
     assert "SpawnProcess" not in err
 
 
@@ -169,7 +176,9 @@ def test_two_that_begin_at_once_make_one_store(tree, tmp_path, monkeypatch):
 
 
 def test_where_there_are_no_locks_two_runs_write_the_same(tree, tmp_path, monkeypatch):
-    """Without a lock, two runs at once cost time, not the store: files are whole, and both write the same bytes."""
+    """Without a lock, two runs at once cost time, not the store: files are whole, and both write
+    the same bytes.
+    """
     monkeypatch.setattr(files, "lock", lambda file, shared=False: None)
     plan = sweep_script.long_plan(chunks=12, pause=0.005)
     run(plan, tmp_path / "alone")
@@ -183,7 +192,9 @@ def test_where_there_are_no_locks_two_runs_write_the_same(tree, tmp_path, monkey
 
 
 def test_a_store_is_made_without_a_warning(tmp_path):
-    """Zarr's own function for consolidated metadata warns, which could not be silenced in one of several threads alone."""
+    """Zarr's own function for consolidated metadata warns, which could not be silenced in one of
+    several threads alone.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run(sweep_script.long_plan(3, pause=0.0, quick=-2.0), tmp_path / "store")

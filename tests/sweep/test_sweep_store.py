@@ -49,7 +49,9 @@ def test_netcdf_keeps_a_dataset_with_its_plan(waves_plan, tmp_path):
 
 
 def test_neither_order_nor_gaps_change_a_byte(waves_plan, whole, tree, tmp_path):
-    """Chunks, or files of one variable of a chunk, that are missing are computed again, whichever they are."""
+    """Chunks, or files of one variable of a chunk, that are missing are computed again, whichever
+    they are.
+    """
     plan, reference = waves_plan(), tree(whole)
     run(plan, tmp_path / "s")
     chunks = [name for name in reference if "/c/" in name and name[0] not in "xy"]
@@ -76,9 +78,17 @@ def test_each_file_is_written_once(waves_plan, monkeypatch, tmp_path):
 
     written = []
     original = store.write_durably
-    monkeypatch.setattr(store, "write_durably", lambda path, content: (written.append(path), original(path, content)))
+    monkeypatch.setattr(
+        store,
+        "write_durably",
+        lambda path, content: (written.append(path), original(path, content)),
+    )
     run(waves_plan(), tmp_path / "s")
-    chunks = [path for path in written if path.parent.name != "c" and "c" in path.parts and tmp_path / "s" in path.parents]
+    chunks = [
+        path
+        for path in written
+        if path.parent.name != "c" and "c" in path.parts and tmp_path / "s" in path.parents
+    ]
     assert len(chunks) == len(set(chunks)) == 2 * 8
     before = len(written)
     run(waves_plan(), tmp_path / "s")
@@ -126,11 +136,16 @@ def test_chunks_of_nothing_but_fill_values_are_done(waves_plan, tmp_path):
         ({"function": "draws"}, "function is 'sweep_toys:waves' there and 'sweep_toys:draws' here"),
         ({"attrs": {"kind": "waves", "seed": 1}}, "attrs.seed is 0 there and 1 here"),
         ({"chunk": {"x": 2, "y": 2}}, "chunk.y is 3 there and 2 here"),
-        ({"axes": {"x": np.linspace(0, 1, 7), "y": np.linspace(0, 3, 5)}}, "axes.y.last is 2.0 there and 3.0 here"),
+        (
+            {"axes": {"x": np.linspace(0, 1, 7), "y": np.linspace(0, 3, 5)}},
+            "axes.y.last is 2.0 there and 3.0 here",
+        ),
         ({"axes": {"y": np.linspace(0, 2, 5), "x": np.linspace(0, 1, 7)}}, "order is"),
     ],
 )
-def test_the_store_of_another_plan_is_refused_and_left_alone(waves_plan, whole, tree, entry, sentence):
+def test_the_store_of_another_plan_is_refused_and_left_alone(
+    waves_plan, whole, tree, entry, sentence
+):
     before = tree(whole)
     with pytest.raises(ParameterError, match="is the store of another plan: .*" + sentence):
         run(waves_plan(**entry), whole)
@@ -168,7 +183,13 @@ def test_an_incomplete_store_is_read_when_asked_for(waves_plan, tmp_path):
 def test_every_kind_of_number_comes_back_as_it_was(tmp_path):
     x, kinds = np.linspace(-3.0, 100.0, 5), ["bool", "i1", "i8", "f2", "f4", "c8", "c16"]
     variables = {kind: Variable(dtype=kind) for kind in kinds}
-    plan = Plan(function="sweep_toys:kinds", arguments={"kinds": kinds}, axes={"x": x}, chunk={"x": 2}, variables=variables)
+    plan = Plan(
+        function="sweep_toys:kinds",
+        arguments={"kinds": kinds},
+        axes={"x": x},
+        chunk={"x": 2},
+        variables=variables,
+    )
     for dataset in (run(plan), run(plan, tmp_path / "s")):
         for kind in kinds:
             assert dataset[kind].dtype == np.dtype(kind)
@@ -193,7 +214,12 @@ def test_an_interval_is_no_time_difference(waves_plan, tmp_path):
 def test_planning_and_looking_at_a_sweep_import_nothing_heavy():
     heavy = ("zarr", "xarray", "distributed", "dask", "scipy", "numba")
     code = f"import sys, saltus.sweep; print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )
 
 
 def test_a_sweep_in_memory_needs_no_zarr(waves_plan):
@@ -201,10 +227,19 @@ def test_a_sweep_in_memory_needs_no_zarr(waves_plan):
         (
             "import sys, numpy as np",
             "from saltus.sweep import Plan, Variable, run",
-            "entries = {'arguments': {'kinds': ['f8']}, 'axes': {'x': np.arange(3.0)}, 'variables': {'f8': Variable()}}",
+            (
+                "entries = {'arguments': {'kinds': ['f8']}, 'axes': {'x': np.arange(3.0)}, "
+                "'variables': {'f8': Variable()}}"
+            ),
             "run(Plan(function='sweep_toys:kinds', **entries))",
             "print([m for m in ('zarr', 'distributed') if m in sys.modules])",
         )
     )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(__file__).parent)
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parent,
+    )
     assert result.stdout.strip() == "[]"

@@ -26,8 +26,14 @@ def test_a_worker_that_dies_fails_its_own_chunk_which_is_tried_again(waves_plan,
 
 
 def test_a_worker_that_dies_each_time_is_told(waves_plan, tmp_path):
-    arguments = {"bad": float(np.linspace(0.0, 1.0, 7)[4]), "mark": str(tmp_path / "no folder" / "mark"), "always": True}
-    with pytest.raises(SweepError, match=r"2 of 8 chunks failed: chunk 2/0 .* ended with exit code 9"):
+    arguments = {
+        "bad": float(np.linspace(0.0, 1.0, 7)[4]),
+        "mark": str(tmp_path / "no folder" / "mark"),
+        "always": True,
+    }
+    with pytest.raises(
+        SweepError, match=r"2 of 8 chunks failed: chunk 2/0 .* ended with exit code 9"
+    ):
         run(waves_plan("dies", arguments), tmp_path / "s", workers=2)
 
 
@@ -40,6 +46,10 @@ def test_a_script_without_its_guard_is_told(tmp_path):
     )
     (tmp_path / "careless.py").write_text("\n".join(lines))
     result = subprocess.run(
-        [sys.executable, str(tmp_path / "careless.py")], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, str(tmp_path / "careless.py")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert "call the sweep below `if __name__" in result.stderr.strip().splitlines()[-1]

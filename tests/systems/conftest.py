@@ -1,4 +1,6 @@
-"""Tools to evaluate a model with symbols: SymPy's expressions made to answer NumPy's functions, and loads without numbers."""
+"""Tools to evaluate a model with symbols: SymPy's expressions made to answer NumPy's functions, and
+loads without numbers.
+"""
 
 from types import SimpleNamespace
 
@@ -35,7 +37,9 @@ def _method(function):
 
 @pytest.fixture
 def symbols(monkeypatch):
-    """`symbols.model(model)` has a positive symbol for every number; `symbols.load` and `symbols.t` complete it."""
+    """`symbols.model(model)` has a positive symbol for every number; `symbols.load` and `symbols.t`
+    complete it.
+    """
     for name in ("sin", "cos", "tanh", "sqrt"):
         monkeypatch.setattr(sp.Expr, name, _method(getattr(sp, name)), raising=False)
 

@@ -1,4 +1,6 @@
-"""Drawings of mechanisms: bars keep their lengths, blocks stand on the ground, masses touch what they hit."""
+"""Drawings of mechanisms: bars keep their lengths, blocks stand on the ground, masses touch what
+they hit.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -45,7 +47,9 @@ def lengths(shape):
 def test_a_drawing_has_the_same_rigid_parts_in_every_state(model):
     drawings = [drawing_of(System(model=model), state) for state in STATES[model]]
     for drawing in drawings:
-        assert [(s.kind, s.role, len(s.points)) for s in drawing] == [(s.kind, s.role, len(s.points)) for s in drawings[0]]
+        assert [(s.kind, s.role, len(s.points)) for s in drawing] == [
+            (s.kind, s.role, len(s.points)) for s in drawings[0]
+        ]
         assert all(np.isfinite(shape.points).all() for shape in drawing)
         for shape, first in zip(drawing, drawings[0], strict=True):
             if shape.role in ("body", "bar", "mass", "wall", "ground"):
@@ -55,20 +59,25 @@ def test_a_drawing_has_the_same_rigid_parts_in_every_state(model):
 
 @pytest.mark.parametrize("theta", [-1.2, -0.1, 0.0, 0.4])
 def test_a_block_stands_on_the_corner_about_which_it_turns(theta):
-    """Its lowest point is that corner, on the ground, and its middle is at the height R cos(alpha - abs(theta)), with R = 1."""
+    """Its lowest point is that corner, on the ground, and its middle is at the height R cos(alpha -
+    abs(theta)), with R = 1.
+    """
     (body,) = shapes(RockingBlock(alpha=0.3), [theta], "body")
     corners = body.points[:4]
     assert corners[:, 1].min() == pytest.approx(0.0, abs=1e-12)
     assert corners.mean(axis=0)[1] == pytest.approx(np.cos(0.3 - abs(theta)))
     pivot = np.sign(theta) * np.sin(0.3)
-    assert corners.mean(axis=0)[0] == pytest.approx(pivot - np.sign(theta) * np.sin(0.3 - abs(theta)))
+    assert corners.mean(axis=0)[0] == pytest.approx(
+        pivot - np.sign(theta) * np.sin(0.3 - abs(theta))
+    )
 
 
 def test_masses_touch_what_they_hit():
     (mass,) = shapes(WallOscillator(wall=0.7), [0.7], "mass")
     assert mass.points[:, 0].max() == pytest.approx(0.7)
     stops = TwoStops(left=-0.5, right=0.8)
-    walls = sorted(wall.points[0, 0] for wall in shapes(stops, [0.0], "wall"))[1:]  # without that of the spring
+    # without that of the spring
+    walls = sorted(wall.points[0, 0] for wall in shapes(stops, [0.0], "wall"))[1:]
     for place, end in ((-0.5, np.min), (0.8, np.max)):
         (mass,) = shapes(stops, [place], "mass")
         assert end(mass.points[:, 0]) == pytest.approx(walls[0] if place < 0 else walls[1])
@@ -78,7 +87,9 @@ def test_masses_touch_what_they_hit():
 
 
 def test_masses_of_a_cell_are_where_the_model_puts_them():
-    """The lower mass is moved by cos(beta0) - cos(beta0 + theta_1), and rises by sin(beta0 + theta_1) - sin(beta0)."""
+    """The lower mass is moved by cos(beta0) - cos(beta0 + theta_1), and rises by sin(beta0 +
+    theta_1) - sin(beta0).
+    """
     model = TwoLayer(beta0=1.4)
     still, moved = (shapes(model, [theta, 0.0], "mass")[0].points[0] for theta in (0.0, 0.3))
     assert moved - still == pytest.approx([np.cos(1.4) - np.cos(1.7), np.sin(1.7) - np.sin(1.4)])
@@ -100,7 +111,9 @@ class Drawn(Free):
 
 def test_a_model_of_ones_own_is_drawn_by_itself_or_as_masses_on_lines():
     assert len(shapes(Free(), [0.1, 0.2], "mass")) == 2
-    assert [s.points[:, 0].mean() for s in shapes(Free(), [0.1, 0.2], "mass")] == pytest.approx([0.06, 0.16], abs=0.1)
+    assert [s.points[:, 0].mean() for s in shapes(Free(), [0.1, 0.2], "mass")] == pytest.approx(
+        [0.06, 0.16], abs=0.1
+    )
     (bar,) = drawing_of(System(model=Drawn()), [0.1, 0.2])
     assert bar.points[1] == pytest.approx([0.1, 0.2])
     with pytest.raises(ParameterError, match="position must be"):

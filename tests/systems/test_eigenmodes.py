@@ -1,5 +1,5 @@
-"""Structures whose fast modes are heavily damped are followed in eigenmodes: beside the exponential of their matrices, beside
-their own Taylor series, and in ensembles."""
+"""Structures whose fast modes are heavily damped are followed in eigenmodes: beside the exponential
+of their matrices, beside their own Taylor series, and in ensembles."""
 
 import mpmath
 import numpy as np
@@ -9,11 +9,15 @@ from scipy.linalg import expm
 import saltus
 from saltus.systems import eigenmodes
 
-DAMPING = 0.02  # in parts of the stiffness: the fastest of six modes dies out 2000 times as fast as the first one turns
+# in parts of the stiffness: the fastest of six modes dies out 2000 times as fast as the first one
+# turns
+DAMPING = 0.02
 
 
 def beam(elements: int = 3) -> dict[str, np.ndarray]:
-    """The matrices of a cantilever of length 1 in cubic elements, of unit mass and bending stiffness; its tip is row -2."""
+    """The matrices of a cantilever of length 1 in cubic elements, of unit mass and bending
+    stiffness; its tip is row -2.
+    """
     s, size = 1.0 / elements, 2 * elements + 2
     bent = np.array(
         [
@@ -36,14 +40,20 @@ def beam(elements: int = 3) -> dict[str, np.ndarray]:
         at = slice(2 * i, 2 * i + 4)
         mass[at, at] += heavy * s / 420
         stiffness[at, at] += bent / s**3
-    return {"mass": mass[2:, 2:], "stiffness": stiffness[2:, 2:], "damping": DAMPING * stiffness[2:, 2:]}
+    return {
+        "mass": mass[2:, 2:],
+        "stiffness": stiffness[2:, 2:],
+        "damping": DAMPING * stiffness[2:, 2:],
+    }
 
 
 def on(parts: dict[str, list], e: float = 0.6, **given: np.ndarray) -> saltus.System:
     """A beam that is pushed at its tip near its first resonance."""
     model = saltus.Structure(**(given or beam()), forces={"push": 4}, **parts)
     load = saltus.Load(frequency=3.4, push=saltus.Harmonic(0.02))
-    return saltus.System(model=model, load=load, **({"impact": saltus.NewtonImpact(e=e)} if model.contacts else {}))
+    return saltus.System(
+        model=model, load=load, **({"impact": saltus.NewtonImpact(e=e)} if model.contacts else {})
+    )
 
 
 STOP = {"contacts": [saltus.Contact(name="stop", coordinate=4, position=0.02, sign=-1)]}
@@ -70,7 +80,9 @@ def test_free_motion_is_the_exponential_of_the_matrices_in_few_steps() -> None:
     motion = saltus.simulate(system, **system.model.start(displacement=0.01), periods=4, tol=1e-13)
     slope, size = np.zeros((14, 14)), 6
     slope[:6, 6:12] = np.eye(size)
-    slope[6:12, :6], slope[6:12, 6:12] = (-np.linalg.solve(given["mass"], given[name]) for name in ("stiffness", "damping"))
+    slope[6:12, :6], slope[6:12, 6:12] = (
+        -np.linalg.solve(given["mass"], given[name]) for name in ("stiffness", "damping")
+    )
     slope[6:12, 12] = np.linalg.solve(given["mass"], 0.02 * np.eye(size)[4])
     slope[12, 13], slope[13, 12] = 3.4, -3.4  # sine and cosine
     end = expm(slope * motion.time) @ np.concatenate([np.full(6, 0.01), np.zeros(7), [1.0]])
@@ -79,8 +91,14 @@ def test_free_motion_is_the_exponential_of_the_matrices_in_few_steps() -> None:
     assert len(motion.dense.start) < 250  # by Taylor series more than 5000
 
 
-@pytest.mark.parametrize(("parts", "e"), [(STOP, 0.6), (STOP, 0.0), (SOFT, 1.0)], ids=["bounces", "rests and releases", "soft"])
-def test_events_are_those_of_the_taylor_series(monkeypatch: pytest.MonkeyPatch, parts: dict[str, list], e: float) -> None:
+@pytest.mark.parametrize(
+    ("parts", "e"),
+    [(STOP, 0.6), (STOP, 0.0), (SOFT, 1.0)],
+    ids=["bounces", "rests and releases", "soft"],
+)
+def test_events_are_those_of_the_taylor_series(
+    monkeypatch: pytest.MonkeyPatch, parts: dict[str, list], e: float
+) -> None:
     system = on(parts, e)
     assert system.model.eigenmodes(24).size > 0
     own = saltus.simulate(system, **system.model.start(), periods=6, tol=1e-13)
@@ -95,10 +113,17 @@ def test_events_are_those_of_the_taylor_series(monkeypatch: pytest.MonkeyPatch, 
 def test_ensembles_have_the_motions_of_simulate_also_with_other_springs() -> None:
     system = on(SOFT)
     stiffness, frequency = np.array([20.0, 40.0, 300.0]), np.array([3.0, 3.2, 3.4])
-    for path, values in (("model.surfaces.above.stiffness", stiffness), ("load.frequency", frequency)):
-        found = saltus.simulate_many(system, **system.model.start(), parameters={path: values}, periods=3, tol=1e-12)
+    for path, values in (
+        ("model.surfaces.above.stiffness", stiffness),
+        ("load.frequency", frequency),
+    ):
+        found = saltus.simulate_many(
+            system, **system.model.start(), parameters={path: values}, periods=3, tol=1e-12
+        )
         for i, value in enumerate(values):
-            alone = saltus.simulate(system.with_({path: float(value)}), **system.model.start(), periods=3, tol=1e-12)
+            alone = saltus.simulate(
+                system.with_({path: float(value)}), **system.model.start(), periods=3, tol=1e-12
+            )
             assert float(found["x4"][i]) == pytest.approx(alone.position[0], abs=1e-12)
 
 
@@ -124,7 +149,9 @@ def test_few_damped_and_nearly_defective_structures_keep_their_taylor_series() -
 
 def test_a_sweep_has_the_amplitudes_of_the_receptance() -> None:
     system, given = on(FAR), beam()
-    sweep = saltus.frequency_sweep(system, [3.2, 3.8], periods=120, stop_early=False, max_period=1, **system.model.start())
+    sweep = saltus.frequency_sweep(
+        system, [3.2, 3.8], periods=120, stop_early=False, max_period=1, **system.model.start()
+    )
     for value, largest in zip(sweep.value.values, sweep.largest_x4.values.T, strict=True):
         dynamic = given["stiffness"] - value**2 * given["mass"] + 1j * value * given["damping"]
         assert np.abs(largest - abs(0.02 * np.linalg.inv(dynamic)[4, 4])).max() < 1e-9

@@ -1,4 +1,6 @@
-"""Models from expressions of SymPy move as the same equations written by hand, and go to files and to other processes."""
+"""Models from expressions of SymPy move as the same equations written by hand, and go to files and
+to other processes.
+"""
 
 import pickle
 
@@ -28,7 +30,9 @@ def wall(e=0.5):
 
 
 def test_a_model_with_a_stop_hits_it_at_the_instant_of_its_closed_form():
-    """From x = -1/2 about x_0 = F / k = 1/16 with w = 2: x = x_0 + (x(0) - x_0) cos(2 t) reaches d = 1/2 as cos(2 t) = -7/9."""
+    """From x = -1/2 about x_0 = F / k = 1/16 with w = 2: x = x_0 + (x(0) - x_0) cos(2 t) reaches d
+    = 1/2 as cos(2 t) = -7/9.
+    """
     motion = saltus.simulate(wall(), x=-0.5, velocity=0.0, duration=2.0)
     first = np.arccos(-7 / 9) / 2
     assert motion.impacts.time[0] == pytest.approx(first, abs=1e-12)
@@ -53,7 +57,9 @@ def double_pendulum():
     place = [sympy.sin(one), -sympy.cos(one)]
     second = [place[0] + sympy.sin(other), place[1] - sympy.cos(other)]
     speeds = [sum(x.diff(t) ** 2 for x in each) for each in (place, second)]
-    method = mechanics.LagrangesMethod(m * sum(speeds) / 2 - m * g * (place[1] + second[1]), [one, other])
+    method = mechanics.LagrangesMethod(
+        m * sum(speeds) / 2 - m * g * (place[1] + second[1]), [one, other]
+    )
     method.form_lagranges_equations()
     return saltus.from_sympy(method, parameters={g: 9.81, m: 2.0}, name="DoublePendulum")
 
@@ -63,12 +69,19 @@ def test_lagranges_equations_keep_the_energy_and_are_those_written_by_hand():
     system = saltus.System(model=model)
     theta, velocity = (0.4, -0.7), (0.3, 1.1)
     by_hand = np.array([[2.0, np.cos(1.1)], [np.cos(1.1), 1.0]])
-    pull = [-1.1 * 1.1 * np.sin(1.1) - 2 * 9.81 * np.sin(0.4), 0.3 * 0.3 * np.sin(1.1) + 9.81 * np.sin(0.7)]
+    pull = [
+        -1.1 * 1.1 * np.sin(1.1) - 2 * 9.81 * np.sin(0.4),
+        0.3 * 0.3 * np.sin(1.1) + 9.81 * np.sin(0.7),
+    ]
     expected = np.linalg.solve(by_hand, pull)
-    np.testing.assert_allclose(model.acceleration(0.0, theta, velocity, 1, system.load), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        model.acceleration(0.0, theta, velocity, 1, system.load), expected, rtol=0, atol=1e-12
+    )
     motion = saltus.simulate(system, one=0.4, other=-0.7, velocity=velocity, duration=10.0)
     (a, b), (u, v) = motion.at(np.linspace(0.0, 10.0, 60))
-    energy = 2.0 * (u * u + v * v / 2 + u * v * np.cos(a - b)) - 2.0 * 9.81 * (2 * np.cos(a) + np.cos(b))
+    energy = 2.0 * (u * u + v * v / 2 + u * v * np.cos(a - b)) - 2.0 * 9.81 * (
+        2 * np.cos(a) + np.cos(b)
+    )
     np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-9)
 
 
@@ -80,14 +93,18 @@ def test_kanes_equations_with_rates_as_speeds_are_taken():
     method = mechanics.KanesMethod(frame, [x], [u], kd_eqs=[x.diff() - u])
     method.kanes_equations([body], [(point, -k * x * frame.x)])
     system = saltus.System(model=saltus.from_sympy(method, parameters={k: 9.0}, name="Kane"))
-    assert saltus.simulate(system, x=0.2, velocity=0.0, duration=1.0).position == pytest.approx(0.2 * np.cos(3.0), abs=1e-12)
+    assert saltus.simulate(system, x=0.2, velocity=0.0, duration=1.0).position == pytest.approx(
+        0.2 * np.cos(3.0), abs=1e-12
+    )
 
 
 def test_other_equations_are_another_model():
     """A file of the first of two systems is read as that system, whether they are named or not."""
     x, v, k = sympy.symbols("x v k")
     asked = {"coordinates": [x], "velocities": [v], "parameters": {k: 2.0}}
-    linear, cubic = (saltus.System(model=saltus.from_sympy(**asked, force=[-k * x**n])) for n in (1, 3))
+    linear, cubic = (
+        saltus.System(model=saltus.from_sympy(**asked, force=[-k * x**n])) for n in (1, 3)
+    )
     again = saltus.from_sympy(**asked | {"parameters": {k: 3.0}}, force=[-k * x])
     assert type(again) is type(linear.model) is not type(cubic.model)
     for system, force in ((linear, -1.0), (cubic, -0.25)):
@@ -95,7 +112,9 @@ def test_other_equations_are_another_model():
         assert read == system
         assert read.model.force(0.0, 0.5, 0.0, read.load) == force
     saltus.from_sympy(**asked, force=[-k * x], name="OneName")
-    with pytest.raises(ParameterError, match="there is a model 'OneName' with other equations already"):
+    with pytest.raises(
+        ParameterError, match="there is a model 'OneName' with other equations already"
+    ):
         saltus.from_sympy(**asked, force=[-k * x**3], name="OneName")
 
 
@@ -103,16 +122,35 @@ def test_what_an_expression_may_not_have_is_refused():
     x, v, k, z = sympy.symbols("x v k z")
     with pytest.raises(ParameterError, match="force has 'z', which is none of x, k"):
         saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x + z], parameters={k: 1.0})
-    with pytest.raises(ParameterError, match="velocities must have the rate of each coordinate, and x has none"):
+    with pytest.raises(
+        ParameterError, match="velocities must have the rate of each coordinate, and x has none"
+    ):
         saltus.from_sympy(coordinates=[x], force=[-k * x], parameters={k: 1.0})
-    with pytest.raises(ParameterError, match="there is a model 'TwoStops' with other equations already"):
-        saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x], parameters={k: 1.0}, name="TwoStops")
+    with pytest.raises(
+        ParameterError, match="there is a model 'TwoStops' with other equations already"
+    ):
+        saltus.from_sympy(
+            coordinates=[x], velocities=[v], force=[-k * x], parameters={k: 1.0}, name="TwoStops"
+        )
     with pytest.raises(ParameterError, match="mass has"):
-        saltus.from_sympy(coordinates=[x], velocities=[v], mass=[[1 + v]], force=[-k * x], parameters={k: 1.0})
-    with pytest.raises(ParameterError, match="1 coordinates need a mass matrix of 1 rows and 1 forces"):
+        saltus.from_sympy(
+            coordinates=[x], velocities=[v], mass=[[1 + v]], force=[-k * x], parameters={k: 1.0}
+        )
+    with pytest.raises(
+        ParameterError, match="1 coordinates need a mass matrix of 1 rows and 1 forces"
+    ):
         saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x, 0], parameters={k: 1.0})
-    for wrong in ({"coordinates": "x"}, {"parameters": 3}, {"channels": {"force": 3}}, {"name": ""}):
+    for wrong in (
+        {"coordinates": "x"},
+        {"parameters": 3},
+        {"channels": {"force": 3}},
+        {"name": ""},
+    ):
         with pytest.raises(ParameterError, match=f"{next(iter(wrong))} must be"):
-            saltus.from_sympy(**{"coordinates": [x], "velocities": [v], "force": [-x], "parameters": {}} | wrong)
-    with pytest.raises(ParameterError, match="equations must be a LagrangesMethod or a KanesMethod"):
+            saltus.from_sympy(
+                **{"coordinates": [x], "velocities": [v], "force": [-x], "parameters": {}} | wrong
+            )
+    with pytest.raises(
+        ParameterError, match="equations must be a LagrangesMethod or a KanesMethod"
+    ):
         saltus.from_sympy(3, parameters={})

@@ -1,4 +1,6 @@
-"""The classes of models: what their base class says of them, and what is refused when a system is made of one."""
+"""The classes of models: what their base class says of them, and what is refused when a system is
+made of one.
+"""
 
 import math
 from dataclasses import dataclass
@@ -51,22 +53,62 @@ FLOOR = (Contact(name="floor", coordinate="x"),)
             "contacts, so its base class must be saltus.ContactModel",
         ),
         (made(Model, force=pulled), "defines force, so its base class must be saltus.ContactModel"),
-        (made(ContactModel, force=pulled, sides=(1,)), "defines sides, so its base class must be saltus.OneContactModel"),
+        (
+            made(ContactModel, force=pulled, sides=(1,)),
+            "defines sides, so its base class must be saltus.OneContactModel",
+        ),
         (
             made(OneContactModel, acceleration=fall, sides=(1, -1), coordinates=("x", "y")),
             "coordinates x, y, which must be one",
         ),
         (made(OneContactModel, acceleration=fall, sides=(1,)), "define reset"),
         (made(OneContactModel, acceleration=fall, sides=(-1,)), r"sides must be \(1, -1\)"),
-        (made(OneContactModel, acceleration=fall, contact=1.0), "gap must be 0 at Own.contact = 1, got 1 on side 1"),
-        (made(OneContactModel, acceleration=fall, reset=bounce, sides=(1,), gap=lambda self, x, side: 1.0), "gap must depend"),
-        (made(OneContactModel, acceleration=fall, reset=lambda self, t, v, side, load, impact: (side, v)), "beyond the contact"),
-        (made(Model, acceleration=lambda self, t, x, velocity, load: -x), "acceleration must take the arguments self, t"),
-        (made(Model, acceleration=lambda self, t, x, v, side, load: (x, v)), r"acceleration must return 1 value\(s\)"),
-        (made(Model, acceleration=lambda self, t, x, v, side, load: -self.stiffness * x), "fails: AttributeError"),
-        (made(Model, acceleration=lambda self, t, x, v, side, load: -undefined * x), "fails: NameError"),  # noqa: F821
-        (made(ContactModel, force=pulled, contacts=FLOOR + FLOOR), "must have names of their own, got floor, floor"),
-        (made(ContactModel, force=pulled, contacts=(Contact(name="a", coordinate="y"),)), "holds 'y', but Own has x"),
+        (
+            made(OneContactModel, acceleration=fall, contact=1.0),
+            "gap must be 0 at Own.contact = 1, got 1 on side 1",
+        ),
+        (
+            made(
+                OneContactModel,
+                acceleration=fall,
+                reset=bounce,
+                sides=(1,),
+                gap=lambda self, x, side: 1.0,
+            ),
+            "gap must depend",
+        ),
+        (
+            made(
+                OneContactModel,
+                acceleration=fall,
+                reset=lambda self, t, v, side, load, impact: (side, v),
+            ),
+            "beyond the contact",
+        ),
+        (
+            made(Model, acceleration=lambda self, t, x, velocity, load: -x),
+            "acceleration must take the arguments self, t",
+        ),
+        (
+            made(Model, acceleration=lambda self, t, x, v, side, load: (x, v)),
+            r"acceleration must return 1 value\(s\)",
+        ),
+        (
+            made(Model, acceleration=lambda self, t, x, v, side, load: -self.stiffness * x),
+            "fails: AttributeError",
+        ),
+        (
+            made(Model, acceleration=lambda self, t, x, v, side, load: -undefined * x),  # noqa: F821
+            "fails: NameError",
+        ),
+        (
+            made(ContactModel, force=pulled, contacts=FLOOR + FLOOR),
+            "must have names of their own, got floor, floor",
+        ),
+        (
+            made(ContactModel, force=pulled, contacts=(Contact(name="a", coordinate="y"),)),
+            "holds 'y', but Own has x",
+        ),
         (
             made(
                 ContactModel,
@@ -106,15 +148,45 @@ UNIT = [[1.0, 0.0], [0.0, 1.0]]
 @pytest.mark.parametrize(
     ("model", "sentence"),
     [
-        (NamedGap(), "NamedGap has a number named gap, which is the name of a method of saltus.OneContactModel: rename it"),
-        (NoDataclass(), r"NoDataclass is no dataclass, so stiffness would be no parameter: write @dataclass\(frozen"),
-        (with_two(UNIT, lambda self, t, q, v, load: (1.0, 2.0, 3.0)), "force must return 2 numbers, for x, y, got 3 numbers"),
-        (with_two(UNIT, lambda self, t, q, v, load: -q[0]), "force must return 2 numbers, for x, y, got a number"),
-        (made(ContactModel, force=lambda self, t, q, v, load: (q, v)), "force must return a number, for x, got 2 numbers"),
-        (with_two([[1.0]]), "mass_matrix must return 2 rows of 2 numbers, for x, y, got 1 row of 1 number$"),
-        (with_two([[1.0], [0.0, 1.0]]), "mass_matrix must return 2 rows of 2 numbers, for x, y, got 2 rows of 1 and 2 numbers"),
+        (
+            NamedGap(),
+            (
+                "NamedGap has a number named gap, which is the name of a method of "
+                "saltus.OneContactModel: rename it"
+            ),
+        ),
+        (
+            NoDataclass(),
+            (
+                r"NoDataclass is no dataclass, so stiffness would be no parameter: write "
+                r"@dataclass\(frozen"
+            ),
+        ),
+        (
+            with_two(UNIT, lambda self, t, q, v, load: (1.0, 2.0, 3.0)),
+            "force must return 2 numbers, for x, y, got 3 numbers",
+        ),
+        (
+            with_two(UNIT, lambda self, t, q, v, load: -q[0]),
+            "force must return 2 numbers, for x, y, got a number",
+        ),
+        (
+            made(ContactModel, force=lambda self, t, q, v, load: (q, v)),
+            "force must return a number, for x, got 2 numbers",
+        ),
+        (
+            with_two([[1.0]]),
+            "mass_matrix must return 2 rows of 2 numbers, for x, y, got 1 row of 1 number$",
+        ),
+        (
+            with_two([[1.0], [0.0, 1.0]]),
+            "mass_matrix must return 2 rows of 2 numbers, for x, y, got 2 rows of 1 and 2 numbers",
+        ),
         (with_two(2.0), "mass_matrix must return 2 rows of 2 numbers, for x, y, got a number"),
-        (with_two([[1.0, 0.1], [0.2, 1.0]]), "mass_matrix must be symmetric, got 0.1 for x, y and 0.2 for y, x"),
+        (
+            with_two([[1.0, 0.1], [0.2, 1.0]]),
+            "mass_matrix must be symmetric, got 0.1 for x, y and 0.2 for y, x",
+        ),
     ],
 )
 def test_what_a_newcomer_gets_wrong_in_a_model_is_said_when_a_system_is_made_of_it(model, sentence):
@@ -133,25 +205,38 @@ def test_a_mass_matrix_that_is_symmetric_but_for_rounding_is_taken():
 
 
 def test_a_misspelt_channel_is_refused_when_a_system_is_made():
-    model = made(Model, channels=("force",), acceleration=lambda self, t, x, v, side, load: load.forse(t) - x)
-    with pytest.raises(saltus.TraceError, match=r"reads load\.forse, not one of its channels; did you mean 'force'"):
+    model = made(
+        Model, channels=("force",), acceleration=lambda self, t, x, v, side, load: load.forse(t) - x
+    )
+    with pytest.raises(
+        saltus.TraceError, match=r"reads load\.forse, not one of its channels; did you mean 'force'"
+    ):
         System(model=model)
 
 
 def test_what_a_law_needs_of_a_model_is_refused_when_a_system_is_made():
     with pytest.raises(ParameterError, match="WallOscillator defines no inelastic_factor"):
         System(model=saltus.WallOscillator(), impact=saltus.InelasticImpact())
-    with pytest.raises(ParameterError, match=r"passes its contact and does not bounce there, so that impact\.e must be 0"):
+    with pytest.raises(
+        ParameterError,
+        match=r"passes its contact and does not bounce there, so that impact\.e must be 0",
+    ):
         System(model=saltus.RockingBlock(alpha=0.2), impact=saltus.NewtonImpact(e=0.5))
-    with pytest.raises(ParameterError, match=r"impact.e must have 1 value for a WallOscillator, got 2"):
+    with pytest.raises(
+        ParameterError, match=r"impact.e must have 1 value for a WallOscillator, got 2"
+    ):
         System(model=saltus.WallOscillator(), impact=saltus.NewtonImpact(e=(0.5, 0.4)))
 
 
 @pytest.mark.parametrize("e", [0.5, (0.5,)])
 def test_newtons_law_at_a_wall_is_restitution(e):
-    """A ball falls from 2 under the acceleration 1 and loses half of its speed: t = 2, then flights of 2 v with each speed v."""
+    """A ball falls from 2 under the acceleration 1 and loses half of its speed: t = 2, then flights
+    of 2 v with each speed v.
+    """
     ball = System(
-        model=saltus.WallOscillator(stiffness=0.0, wall=0.0), load=saltus.Load(force=1.0), impact=saltus.NewtonImpact(e=e)
+        model=saltus.WallOscillator(stiffness=0.0, wall=0.0),
+        load=saltus.Load(force=1.0),
+        impact=saltus.NewtonImpact(e=e),
     )
     times = saltus.simulate(ball, x=-2.0, duration=5.6).impacts.time
     assert times == pytest.approx([2.0, 4.0, 5.0, 5.5], abs=1e-13)
@@ -181,7 +266,13 @@ ANSWERS = {  # holds_coordinates, has_one_contact, names_its_contacts, has_state
 def test_a_model_answers_what_its_callers_want_to_know(name):
     kind = MODELS[name]
     model = kind(**{key: 1.4 for key in ("beta0", "alpha") if key in kind.__dataclass_fields__})
-    found = (model.holds_coordinates, model.has_one_contact, model.names_its_contacts, model.has_state_plane, model.every_side)
+    found = (
+        model.holds_coordinates,
+        model.has_one_contact,
+        model.names_its_contacts,
+        model.has_state_plane,
+        model.every_side,
+    )
     assert found == ANSWERS[name]
     assert isinstance(model, OneContactModel) is model.has_one_contact
     assert isinstance(model, ContactModel) is model.holds_coordinates
@@ -195,11 +286,23 @@ def test_smoothing_takes_the_contact_away():
 
 def test_a_coordinate_reaches_what_its_contacts_let_it_reach():
     at = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    assert saltus.WallOscillator(wall=1.0).reaches("x", at).tolist() == [True, True, True, True, False]
+    assert saltus.WallOscillator(wall=1.0).reaches("x", at).tolist() == [
+        True,
+        True,
+        True,
+        True,
+        False,
+    ]
     assert saltus.Metainterface(beta0=1.4).reaches("theta", at).all()
     assert saltus.TwoStops().reaches("x", at).tolist() == [False, True, True, True, False]
     assert saltus.ImpactPair(clearance=1.0).reaches("z", at).all()
-    assert saltus.TwoLayer(beta0=1.4).reaches("theta_2", at).tolist() == [True, True, True, False, False]
+    assert saltus.TwoLayer(beta0=1.4).reaches("theta_2", at).tolist() == [
+        True,
+        True,
+        True,
+        False,
+        False,
+    ]
     assert saltus.BeltOscillator().reaches("x", at).all()
 
 
@@ -241,9 +344,13 @@ def test_what_the_class_of_a_user_refuses_is_said_with_its_path_and_value():
         system.with_({"model.stiffness": -1.5})
     assert refused.value.parameter == "model.stiffness"
     assert str(refused.value) == "model.stiffness must be >= 0, got -1.5"
-    with pytest.raises(ParameterError, match=r"^model\.stiffness: that spring is too stiff, got 7\.0$"):
+    with pytest.raises(
+        ParameterError, match=r"^model\.stiffness: that spring is too stiff, got 7\.0$"
+    ):
         system.with_({"model.stiffness": 7.0})
     with pytest.raises(ParameterError, match=r"model\.stiffness must be >= 0, got -2\.0"):
-        saltus.simulate_many(system, theta=0.1, duration=1.0, parameters={"model.stiffness": [1.0, -2.0]})
+        saltus.simulate_many(
+            system, theta=0.1, duration=1.0, parameters={"model.stiffness": [1.0, -2.0]}
+        )
     ends = {side: bound["end"] for side, bound in accepted(system)["model.stiffness"].items()}
     assert ends == {"least": 0.0, "most": 5.0}  # which are the ends of the slider of a page

@@ -1,4 +1,6 @@
-"""Pulses as signals: their values, derivatives and integrals against printed formulas and quadrature, and their files."""
+"""Pulses as signals: their values, derivatives and integrals against printed formulas and
+quadrature, and their files.
+"""
 
 import math
 
@@ -6,7 +8,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from saltus import Chirp, HalfSine, MavroeidisPapageorgiou, OneCosine, OneSine, PhysicalCell, Ramp, Ricker
+from saltus import (
+    Chirp,
+    HalfSine,
+    MavroeidisPapageorgiou,
+    OneCosine,
+    OneSine,
+    PhysicalCell,
+    Ramp,
+    Ricker,
+)
 from saltus.config import load_study
 from saltus.errors import ParameterError
 from saltus.systems import Harmonic, Load, RockingBlock, System, WallOscillator
@@ -50,7 +61,9 @@ def values(name, quantity, order, times):
 def test_a_pulse_is_its_formula_within_its_span_and_nothing_outside(name):
     _, _, duration, formula = PULSES[name]
     inside = START + duration * np.linspace(0.01, 0.99, 29)
-    assert values(name, "force", 0, inside) == pytest.approx([formula(t - START) for t in inside], abs=1e-14)
+    assert values(name, "force", 0, inside) == pytest.approx(
+        [formula(t - START) for t in inside], abs=1e-14
+    )
     outside = np.array([START - 1.0, START - 1e-9, START + duration + 1e-9, 100.0])
     after = A if name == "ramp" else 0.0
     assert values(name, "force", 0, outside) == pytest.approx([0.0, 0.0, after, after], abs=0.0)
@@ -72,14 +85,19 @@ def test_derivatives_of_a_pulse_are_those_of_its_formula(name, order):
 
 
 @pytest.mark.parametrize("name", INTEGRATED)
-@pytest.mark.parametrize("share", [0.3, 1.0, 1.7])  # within the pulse, at its end, and long after it
+# within the pulse, at its end, and long after it
+@pytest.mark.parametrize("share", [0.3, 1.0, 1.7])
 def test_the_ground_under_a_pulse_of_acceleration_moves_from_rest(name, share):
     _, _, duration, formula = PULSES[name]
     end = share * duration
     held = (lambda s: A) if name == "ramp" else (lambda s: 0.0)
-    parts = [(0.0, min(end, duration), formula)] + ([(duration, end, held)] if end > duration else [])
+    parts = [(0.0, min(end, duration), formula)] + (
+        [(duration, end, held)] if end > duration else []
+    )
     velocity = sum(quad(f, a, b, epsabs=1e-13, limit=400)[0] for a, b, f in parts)
-    position = sum(quad(lambda s, f=f: (end - s) * f(s), a, b, epsabs=1e-13, limit=400)[0] for a, b, f in parts)
+    position = sum(
+        quad(lambda s, f=f: (end - s) * f(s), a, b, epsabs=1e-13, limit=400)[0] for a, b, f in parts
+    )
     assert values(name, "acceleration", 1, START + end) == pytest.approx(velocity, abs=1e-11)
     assert values(name, "acceleration", 0, START + end) == pytest.approx(position, abs=1e-11)
 
@@ -94,7 +112,10 @@ def test_a_near_fault_pulse_of_velocity_begins_and_ends_at_rest():
 def test_systems_with_pulses_come_back_from_json_and_have_dotted_paths(name):
     cls, numbers, _, _ = PULSES[name]
     pulse = cls(amplitude=A, start=START, **numbers)
-    system = System(model=WallOscillator(stiffness=1.0), load=Load(frequency=2.0, force=pulse + Harmonic(amplitude=0.1)))
+    system = System(
+        model=WallOscillator(stiffness=1.0),
+        load=Load(frequency=2.0, force=pulse + Harmonic(amplitude=0.1)),
+    )
     assert System.from_json(system.to_json()) == system
     assert system.with_({"load.force.0.start": 0.9}).load.channels["force"].terms[0].start == 0.9
 
@@ -114,11 +135,16 @@ quantity = "velocity"
 """
     path = tmp_path / "study.toml"
     path.write_text(text)
-    pulse = MavroeidisPapageorgiou(amplitude=0.3, frequency=2.0, gamma=1.5, phase=math.pi / 2, quantity="velocity")
-    assert load_study(path).system == System(model=RockingBlock(alpha=0.2), load=Load(ground_horizontal=pulse))
+    pulse = MavroeidisPapageorgiou(
+        amplitude=0.3, frequency=2.0, gamma=1.5, phase=math.pi / 2, quantity="velocity"
+    )
+    assert load_study(path).system == System(
+        model=RockingBlock(alpha=0.2), load=Load(ground_horizontal=pulse)
+    )
     path.write_text(text.replace("MavroeidisPapageorgiou", "HalfSin"))
     with pytest.raises(
-        ParameterError, match=r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean 'HalfSine'"
+        ParameterError,
+        match=r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean 'HalfSine'",
     ):
         load_study(path)
 
@@ -128,16 +154,20 @@ def test_pulses_in_si_units_are_the_same_pulses():
     pulse = HalfSine(amplitude=4.0, frequency=50.0, start=0.3, quantity="acceleration")
     si = Load(ground_horizontal=pulse, vertical=Ramp(amplitude=-20.0, duration=0.5))
     load, unit = cell.load(si), cell.units
-    assert load.ground_horizontal.acceleration(0.31 / unit["time"]) * unit["acceleration"] == pytest.approx(
-        4.0 * math.sin(0.5), rel=1e-13
-    )
+    assert load.ground_horizontal.acceleration(0.31 / unit["time"]) * unit[
+        "acceleration"
+    ] == pytest.approx(4.0 * math.sin(0.5), rel=1e-13)
     assert load.vertical(0.4 / unit["time"]) * unit["force"] == pytest.approx(-16.0, rel=1e-13)
     back = cell.load_in_si(load)
-    assert back.ground_horizontal.acceleration(0.31) == pytest.approx(4.0 * math.sin(0.5), rel=1e-13)
+    assert back.ground_horizontal.acceleration(0.31) == pytest.approx(
+        4.0 * math.sin(0.5), rel=1e-13
+    )
 
 
 def sweep():
-    return Chirp(amplitude=1.0, frequency=1.0, end_frequency=2.0, duration=1.0, quantity="acceleration")
+    return Chirp(
+        amplitude=1.0, frequency=1.0, end_frequency=2.0, duration=1.0, quantity="acceleration"
+    )
 
 
 @pytest.mark.parametrize(

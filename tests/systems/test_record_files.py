@@ -1,8 +1,9 @@
 """Records in files: each format as its publisher describes it, made here from known samples.
 
-The headings are those of published files: CSMIP's V2 of station 89486 (20 December 2022), whose three components also gave the
-peaks that its headings state; COSMOS 1.20 of AK.BMR (30 November 2018), with 42000 samples in 210 s, raw steps of 20 ms and
-processed ones of 5 ms; and of PEER's AT2 the four that are found in public repositories.
+The headings are those of published files: CSMIP's V2 of station 89486 (20 December 2022), whose
+three components also gave the peaks that its headings state; COSMOS 1.20 of AK.BMR (30 November
+2018), with 42000 samples in 210 s, raw steps of 20 ms and processed ones of 5 ms; and of PEER's AT2
+the four that are found in public repositories.
 """
 
 import numpy as np
@@ -20,30 +21,49 @@ def lines_of(numbers, each, form):
     return ["".join(form % x for x in numbers[i : i + each]) for i in range(0, len(numbers), each)]
 
 
-def peer(heading="ACCELERATION TIME SERIES IN UNITS OF G", said="NPTS=     43, DT=   .0200 SEC,", numbers=ACCELERATION / 980.665):
+def peer(
+    heading="ACCELERATION TIME SERIES IN UNITS OF G",
+    said="NPTS=     43, DT=   .0200 SEC,",
+    numbers=ACCELERATION / 980.665,
+):
     title = ["PEER NGA STRONG MOTION DATABASE RECORD", "Synthetic, 1/1/2000, Station X, 90"]
     return "\n".join([*title, heading, said, *lines_of(numbers, 5, "%15.7E")])
 
 
 def csmip(said="in cm/sec2. (8f10.3)", components=3, form="%10.3f"):
-    """A V2 file of CSMIP: for each component 25 lines of text, 7 of whole numbers, 13 of others, and three blocks of samples."""
+    """A V2 file of CSMIP: for each component 25 lines of text, 7 of whole numbers, 13 of others,
+    and three blocks of samples.
+    """
     text = []
     for k in range(components):
-        text += ["Corrected accelerogram  points of the heading"] * 25 + ["    0" * 16] * 7 + [" " * 6 + "1.00"] * 13
+        text += (
+            ["Corrected accelerogram  points of the heading"] * 25
+            + ["    0" * 16] * 7
+            + [" " * 6 + "1.00"] * 13
+        )
         for name, factor in (("accel", 1.0), ("veloc", 0.1), ("displ", 0.01)):
             rate = {"accel": "/sec2", "veloc": "/sec", "displ": ""}[name]
-            text.append(f"   43 points of {name} data equally spaced at  .020 sec, {said.replace('/sec2', rate)}")
+            text.append(
+                f"   43 points of {name} data equally spaced at  .020 sec, {said.replace('/sec2', rate)}"
+            )
             text += lines_of((k + 1) * factor * ACCELERATION, 8, form)
         text.append(f"/&  ----------  End of data for channel {k + 1}  ----------")
     return "\n".join(text)
 
 
-def cosmos(raw=0.005, processed=20.0, said="units=cm/s^2 (4),Format=(10F8.2)", numbers=ACCELERATION):
+def cosmos(
+    raw=0.005, processed=20.0, said="units=cm/s^2 (4),Format=(10F8.2)", numbers=ACCELERATION
+):
     reals = np.full(100, -999.0)
     reals[33], reals[61] = raw, processed
     text = ["Corrected acceleration   (Format v01.20 with 13 text lines) Src: 02"] + ["..."] * 12
-    text += ["  100 Integer-header values follow on 10 lines, Format= (10I8)"] + ["    -999" * 10] * 10
-    text += [" 100 Real-header values follow on  20 lines, Format= (5F15.6)", *lines_of(reals, 5, "%15.6f")]
+    text += ["  100 Integer-header values follow on 10 lines, Format= (10I8)"] + [
+        "    -999" * 10
+    ] * 10
+    text += [
+        " 100 Real-header values follow on  20 lines, Format= (5F15.6)",
+        *lines_of(reals, 5, "%15.6f"),
+    ]
     text += ['   1 Comment line(s) follow, each starting with a "|":', "| made for a test"]
     text += [f"      43 acceleration pts, approx   1 secs, {said}", *lines_of(numbers, 10, "%8.2f")]
     return "\n".join([*text, "End-of-data for Chan  1 acceleration"])
@@ -63,14 +83,20 @@ def one_a_line(text):
 
 FILES = {
     "AT2": (peer(), 1e-7),
-    "old AT2": (peer("ACCELERATION TIME HISTORY IN UNITS OF G", "   43    0.0200    NPTS, DT"), 1e-7),
+    "old AT2": (
+        peer("ACCELERATION TIME HISTORY IN UNITS OF G", "   43    0.0200    NPTS, DT"),
+        1e-7,
+    ),
     "units below": (peer("NPTS= 43, DT= .02 SEC", "ACCELERATION IN UNITS OF G"), 1e-7),
     "CSMIP": (csmip(), 1e-12),
     "older CSMIP": (csmip("(UNITS: CM/SEC/SEC)").upper(), 1e-12),
     "CSMIP without units": (csmip("").replace("sec, ", "SEC."), 1e-12),
     "COSMOS": (cosmos(), 1e-4),
     "COSMOS, step of the raw samples": (cosmos(raw=0.02, processed=-999.0), 1e-4),
-    "COSMOS, one number a line": (one_a_line(cosmos(said="units=cm/sec2(04),Format=(1E15.6)")), 1e-4),
+    "COSMOS, one number a line": (
+        one_a_line(cosmos(said="units=cm/sec2(04),Format=(1E15.6)")),
+        1e-4,
+    ),
     "COSMOS, not corrected": (cosmos().replace("acceleration pts,", "uncor. accel. pts,"), 1e-4),
     "COSMOS, samples in a second": (
         cosmos(raw=-999.0).replace("pts, approx   1 secs, units=", "pts a   50 pts/sec, Units="),
@@ -111,7 +137,13 @@ def test_a_velocity_and_a_displacement_of_peer(tmp_path):
 def test_two_columns_have_the_units_that_are_given(tmp_path):
     text = "t,a\n0,0\n0.5,0.25\n1,0"
     assert (read(tmp_path, text).quantity, read(tmp_path, text).value[1]) == ("force", 0.25)
-    for units, factor in (("g", 9.80665), ("cm/s2", 0.01), ("gal", 0.01), ("cm/sec/sec", 0.01), ("m/s^2", 1.0)):
+    for units, factor in (
+        ("g", 9.80665),
+        ("cm/s2", 0.01),
+        ("gal", 0.01),
+        ("cm/sec/sec", 0.01),
+        ("m/s^2", 1.0),
+    ):
         record = read(tmp_path, text, units=units)
         assert (record.quantity, record.value[1]) == ("acceleration", pytest.approx(0.25 * factor))
     scaled = read(tmp_path, text, quantity="acceleration", scale=3.0, time_scale=2.0)
@@ -120,7 +152,9 @@ def test_two_columns_have_the_units_that_are_given(tmp_path):
 
 @pytest.mark.parametrize("degree", [0, 1, 3])
 def test_a_baseline_is_a_polynomial_that_is_fitted_by_least_squares(tmp_path, degree):
-    """What is left is orthogonal to all powers of the time, and is the same with any polynomial added."""
+    """What is left is orthogonal to all powers of the time, and is the same with any polynomial
+    added.
+    """
     time = STEP * np.arange(43)
     drift = np.polyval([0.5, -2.0, 30.0, 7.0][3 - degree :], time)
     plain, drifted = (
@@ -133,7 +167,9 @@ def test_a_baseline_is_a_polynomial_that_is_fitted_by_least_squares(tmp_path, de
         for d in (0.0, drift)
     )
     np.testing.assert_allclose(drifted.value, plain.value, atol=1e-9)
-    assert [plain.value @ time**k for k in range(degree + 1)] == pytest.approx([0.0] * (degree + 1), abs=1e-9)
+    assert [plain.value @ time**k for k in range(degree + 1)] == pytest.approx(
+        [0.0] * (degree + 1), abs=1e-9
+    )
 
 
 def test_a_study_reads_the_same_files(tmp_path):
@@ -147,7 +183,9 @@ def test_a_study_reads_the_same_files(tmp_path):
     system = load_study(tmp_path / "study.toml").system
     assert isinstance(system, System)
     for t in (0.3, 1.1):
-        assert system.load.ground_horizontal.acceleration(t) == pytest.approx(expected.load.ground_horizontal.acceleration(t))
+        assert system.load.ground_horizontal.acceleration(t) == pytest.approx(
+            expected.load.ground_horizontal.acceleration(t)
+        )
     ends = [simulate(each, theta=0.0, duration=3.0) for each in (system, expected)]
     assert ends[0].theta == pytest.approx(ends[1].theta, abs=1e-10)
 
@@ -157,15 +195,24 @@ REFUSED = {
         "once upon a time\nthere was a block\n",
         'line 2 must be two finite numbers, got the text "there was a block"; saltus reads AT2',
     ),
-    "cut short": (peer(numbers=ACCELERATION[:20]), "file 'r.txt' has 20 of the 43 samples that its headings promise"),
+    "cut short": (
+        peer(numbers=ACCELERATION[:20]),
+        "file 'r.txt' has 20 of the 43 samples that its headings promise",
+    ),
     "letters": (peer().replace("E-", "K-"), "line 5 must be numbers, got the text"),
-    "no units": (peer("ACCELERATION (G)"), "does not say in its headings in which units it is; give them, such as units"),
+    "no units": (
+        peer("ACCELERATION (G)"),
+        "does not say in its headings in which units it is; give them, such as units",
+    ),
     "no step": (peer(said="NPTS= 43, DT= 0.0 SEC"), "samples 0 s apart; the step must be above 0"),
     "counts": (
         cosmos(said="units=counts (50),Format=(10F8.2)"),
         "file 'r.txt': units 'counts' are not known; known here: cm",
     ),
-    "no fitting step": (cosmos(raw=-999.0, processed=-999.0), "43 samples in about 1 s, and no step in the headings above fits"),
+    "no fitting step": (
+        cosmos(raw=-999.0, processed=-999.0),
+        "43 samples in about 1 s, and no step in the headings above fits",
+    ),
 }
 
 

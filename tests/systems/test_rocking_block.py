@@ -10,9 +10,11 @@ from saltus.systems import Load, RockingBlock
 
 @pytest.mark.parametrize("side", [1, pytest.param(-1, marks=pytest.mark.thorough)])
 def test_errata_10_and_11_block_follows_from_its_lagrangian(symbols, is_zero, side):
-    """T of a rectangle (I_G = M R^2 / 3) rocking about a corner on a moving ground, in units (4/3) M R^2 p^2, p^2 = 3 g / (4 R).
+    """T of a rectangle (I_G = M R^2 / 3) rocking about a corner on a moving ground, in units (4/3)
+    M R^2 p^2, p^2 = 3 g / (4 R).
 
-    The centre is at R (sin, cos)-wise from the corner; U = (4/3) R (zeta, nu) and gravity (4/3) M R^2 p^2 = M g R.
+    The centre is at R (sin, cos)-wise from the corner; U = (4/3) R (zeta, nu) and gravity (4/3) M
+    R^2 p^2 = M g R.
     """
     block, load, t = symbols.model(RockingBlock(alpha=0.3)), symbols.load, symbols.t
     s, alpha = sp.Integer(side), block.alpha
@@ -31,7 +33,8 @@ def test_errata_10_and_11_block_follows_from_its_lagrangian(symbols, is_zero, si
     mine = block.acceleration(t, q, v, s, load)
     assert is_zero(equation.doit().subs(names).subs(a, mine))
     assert is_zero(kinetic.doit().subs(names) - block.kinetic_energy(t, q, v, s, load))
-    # erratum 10: 4 zeta'^2 in the bracket, as printed, is another energy (it leaves the equation of motion alone)
+    # erratum 10: 4 zeta'^2 in the bracket, as printed, is another energy (it leaves the equation of
+    # motion alone)
     printed = block.kinetic_energy(t, q, v, s, load) + sp.Rational(4, 3) * sp.diff(zeta, t) ** 2
     assert not is_zero(kinetic.doit().subs(names) - printed)
     # erratum 11: + zeta'' sin(...) in the equation of motion is not a solution
@@ -43,7 +46,10 @@ def test_a_block_on_its_side_is_overturned():
     block = RockingBlock(alpha=0.3)
     assert "overturned" in block.stops
     for side in (1, -1):
-        margins = [block.margins(0.0, side * x, 0.0, 0.0, side, Load())["overturned"] for x in (1.0, math.pi / 2, 1.6)]
+        margins = [
+            block.margins(0.0, side * x, 0.0, 0.0, side, Load())["overturned"]
+            for x in (1.0, math.pi / 2, 1.6)
+        ]
         assert margins[0] > 0 > margins[2]
         assert margins[1] == 0
 

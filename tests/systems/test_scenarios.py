@@ -45,13 +45,22 @@ def test_rows_of_table_1_are_named(s, hit, back, thrown):
     angle = -signed(other, 0.4)
     before = state(s, signed(s, hit), 0.7, angle)
     assert name_impact(before, state(s, 0.0, 0.2, angle)) == (Scenario.NO_BOUNCING, s, 2, 1)
-    assert name_impact(before, state(s, -signed(s, back), 0.2, angle)) == (Scenario.BOUNCING, s, 2, 2)
+    assert name_impact(before, state(s, -signed(s, back), 0.2, angle)) == (
+        Scenario.BOUNCING,
+        s,
+        2,
+        2,
+    )
 
 
 @settings(deadline=None)
 @given(st.sampled_from([1, 2]), speeds, st.floats(0, 1), st.floats(-5, 5), st.floats(0.3, 2.0))
-def test_erratum_16_an_impulse_on_one_layer_moves_the_other_open_one(s, hit, restitution, other_velocity, size):
-    """The momentum of the layer that is not hit is kept, so its velocity jumps by -M_js / M_jj times the other jump."""
+def test_erratum_16_an_impulse_on_one_layer_moves_the_other_open_one(
+    s, hit, restitution, other_velocity, size
+):
+    """The momentum of the layer that is not hit is kept, so its velocity jumps by -M_js / M_jj
+    times the other jump.
+    """
     angle = -signed(3 - s, size)
     before = state(s, signed(s, hit), other_velocity, angle)
     mass = MODEL.mass_matrix(before.theta)
@@ -65,7 +74,8 @@ def test_erratum_16_an_impulse_on_one_layer_moves_the_other_open_one(s, hit, res
     found = name_impact(before, after, model=MODEL)
     assert found.scenario in (Scenario.BOUNCING, Scenario.NO_BOUNCING)
     assert found.deformed_before == 2
-    # as printed, the other layer keeps its velocity: against the balance, unless the layers happen to be uncoupled
+    # as printed, the other layer keeps its velocity: against the balance, unless the layers happen
+    # to be uncoupled
     if abs(response) > 1e-3 * hit:
         printed = state(s, before.velocity[i] + jump, other_velocity, angle)
         with pytest.raises(ParameterError, match=rf"layer {3 - s} is open and not hit"):
@@ -91,27 +101,52 @@ def test_erratum_16_angles_do_not_jump_so_the_printed_conditions_are_refused():
 
 
 @pytest.mark.parametrize(("layer", "mass"), [(1, 1.0), (2, 1.0 + MODEL.mass_ratio)])
-def test_erratum_29_a_velocity_factor_below_the_inelastic_one_needs_a_contact_that_pulls(layer, mass):
-    """The impulse on the closed layer pushes only for e >= -cos(2 beta0), or -cos(2 beta0)/(1+m) from upper to lower."""
+def test_erratum_29_a_velocity_factor_below_the_inelastic_one_needs_a_contact_that_pulls(
+    layer, mass
+):
+    """The impulse on the closed layer pushes only for e >= -cos(2 beta0), or -cos(2 beta0)/(1+m)
+    from upper to lower.
+    """
     inelastic = -math.cos(2 * MODEL.beta0) / mass
     closing = signed(layer, 1.0)
     before = LayerState((0.0, 0.0), pair(layer, closing, 0.0))
-    for e, pushes in ((1.0, True), (inelastic + 1e-6, True), (inelastic - 1e-6, False), (0.5, False)):
+    for e, pushes in (
+        (1.0, True),
+        (inelastic + 1e-6, True),
+        (inelastic - 1e-6, False),
+        (0.5, False),
+    ):
         after = LayerState((0.0, 0.0), pair(layer, 0.0, e * closing))
         assert name_impact(before, after).scenario is Scenario.NO_BOUNCING
-        push = -other_impulse(MODEL, before, after, 1) if layer == 1 else other_impulse(MODEL, before, after, 2)
+        push = (
+            -other_impulse(MODEL, before, after, 1)
+            if layer == 1
+            else other_impulse(MODEL, before, after, 2)
+        )
         assert (push >= 0) is pushes
 
 
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        (((0.0, -0.1), (1.0, 0.0)), ((0.0, -0.1), (1.0, 0.0)), "no layer that is closed moves towards"),
+        (
+            ((0.0, -0.1), (1.0, 0.0)),
+            ((0.0, -0.1), (1.0, 0.0)),
+            "no layer that is closed moves towards",
+        ),
         (((0.0, 0.0), (-1.0, 1.0)), ((0.0, 0.0), (0.0, 0.0)), "both layers impact at once"),
         (((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (-0.5, 0.0)), "layer 1 would close further"),
         (((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, 0.5)), "layer 2 would close further"),
-        (((-0.1, 0.0), (-1.0, 0.0)), ((-0.1, 0.0), (0.0, 0.0)), "needs theta_1 >= 0 and theta_2 <= 0"),
-        (((0.0, 0.0), (math.nan, 0.0)), ((0.0, 0.0), (0.0, 0.0)), "before the impact must be finite"),
+        (
+            ((-0.1, 0.0), (-1.0, 0.0)),
+            ((-0.1, 0.0), (0.0, 0.0)),
+            "needs theta_1 >= 0 and theta_2 <= 0",
+        ),
+        (
+            ((0.0, 0.0), (math.nan, 0.0)),
+            ((0.0, 0.0), (0.0, 0.0)),
+            "before the impact must be finite",
+        ),
     ],
 )
 def test_what_is_no_impact_is_refused(before, after, message):

@@ -29,7 +29,9 @@ def test_harmonic_and_its_derivatives_are_sympys(amplitude, mean, phase, order, 
     signal = Harmonic(amplitude, mean, phase, order)
     for n in (0, 1, 2):
         expected = float(sp.diff(expression, tau, n).subs(tau, t))
-        assert signal.derivative(t, omega, n) == pytest.approx(expected, abs=1e-10 * (1 + (order * omega) ** n * 5))
+        assert signal.derivative(t, omega, n) == pytest.approx(
+            expected, abs=1e-10 * (1 + (order * omega) ** n * 5)
+        )
 
 
 def test_the_papers_loads_are_written_as_its_equations():
@@ -49,7 +51,11 @@ def test_the_papers_loads_are_written_as_its_equations():
 
 
 @settings(deadline=None)
-@given(st.lists(st.tuples(number, number, st.integers(1, 4)), min_size=1, max_size=4), number, st.floats(0, 9))
+@given(
+    st.lists(st.tuples(number, number, st.integers(1, 4)), min_size=1, max_size=4),
+    number,
+    st.floats(0, 9),
+)
 def test_a_sum_is_the_sum_of_its_terms(terms, constant, t):
     signals = [Harmonic(a, phase=p, order=n) for a, p, n in terms]
     total = signals[0]
@@ -80,7 +86,13 @@ def test_a_ground_record_gives_back_its_samples_and_its_derivatives_are_consiste
     for n in (0, 1):  # each derivative integrates to the one before
         for a, b in ((0.6, 1.4), (1.0, 3.2)):
             breaks = TIMES[(a < TIMES) & (b > TIMES)]
-            area, _ = quad(lambda x, n=n: record.derivative(x, None, n + 1), a, b, points=list(breaks), epsabs=1e-12)
+            area, _ = quad(
+                lambda x, n=n: record.derivative(x, None, n + 1),
+                a,
+                b,
+                points=list(breaks),
+                epsabs=1e-12,
+            )
             change = record.derivative(b, None, n) - record.derivative(a, None, n)
             assert change == pytest.approx(area, abs=1e-10)
 
@@ -132,12 +144,27 @@ def test_records_keep_their_own_copy_and_compare_by_value():
 @pytest.mark.parametrize(
     ("time", "value", "options", "message"),
     [
-        ([0, 2, 1], [0, 0, 0], {}, r"record: times must increase, but sample 2 has 1 after 2; sort the file"),
+        (
+            [0, 2, 1],
+            [0, 0, 0],
+            {},
+            r"record: times must increase, but sample 2 has 1 after 2; sort the file",
+        ),
         ([0, 1, 1], [0, 0, 0], {}, "sample 2 has 1 after 1"),
         ([0], [1], {}, "a record of force needs at least 2 samples, got 1"),
-        ([0, 1, 2], [0, 0, 0], {"quantity": "velocity"}, "a record of velocity needs at least 4 samples, got 3"),
+        (
+            [0, 1, 2],
+            [0, 0, 0],
+            {"quantity": "velocity"},
+            "a record of velocity needs at least 4 samples, got 3",
+        ),
         ([0, 1, 2], [0, math.nan, 0], {}, "sample 1 is not a finite number"),
-        ([0, math.inf, 2], [0, 1, 0], {"source": "q.csv"}, "record 'q.csv': sample 1 is not a finite number"),
+        (
+            [0, math.inf, 2],
+            [0, 1, 0],
+            {"source": "q.csv"},
+            "record 'q.csv': sample 1 is not a finite number",
+        ),
         ([0, 1, 2], [0, 1], {}, "time and value must have one length, got 3 and 2"),
         ([[0, 1]], [[0, 1]], {}, "time must be a list of numbers"),
         (["a", "b"], [0, 1], {}, "time must be a list of numbers"),
@@ -163,17 +190,32 @@ def test_impossible_records_are_refused_in_a_sentence(time, value, options, mess
         (lambda: Sum(0.5), "a Sum needs signals"),
         (lambda: Load(force=[]), "load.force is an empty list"),
         (lambda: Load(force=[0.5, [Harmonic]]), "load.force.1.0 must be a finite number"),
-        (lambda: Record([-1e308, 1e308], [0.0, 1.0]), r"times and values must be at most 1e\+100 in size, got 1e\+308"),
+        (
+            lambda: Record([-1e308, 1e308], [0.0, 1.0]),
+            r"times and values must be at most 1e\+100 in size, got 1e\+308",
+        ),
         (lambda: Record([0.0, 1e-320], [0.0, 1e10]), "samples 0 and 1 are too near in time"),
-        (lambda: Load(horizontal=Harmonic(0.5)), "load.horizontal is harmonic, so load.frequency must be given"),
+        (
+            lambda: Load(horizontal=Harmonic(0.5)),
+            "load.horizontal is harmonic, so load.frequency must be given",
+        ),
         (lambda: Load(horizontal=0.5 + Harmonic(0.5)), "load.horizontal is harmonic"),
         (lambda: Load(frequency=0.0), r"load.frequency must lie in \(0, inf\), got 0.0"),
         (lambda: Load(frequency=-1.0), "load.frequency"),
         (lambda: Load(vertical=math.nan), "load.vertical must be finite, got nan"),
         (lambda: Load(vertical="-0.5"), "load.vertical must be"),
-        (lambda: Load(horizontal=Record(TIMES, VALUES, "velocity")), "load.horizontal takes a record of force"),
-        (lambda: Load(ground_vertical=Record(TIMES, VALUES)), "load.ground_vertical takes a record of displacement, velocity"),
-        (lambda: Load(ground_vertical=Record(TIMES, VALUES) + 0.1), "load.ground_vertical takes a record"),
+        (
+            lambda: Load(horizontal=Record(TIMES, VALUES, "velocity")),
+            "load.horizontal takes a record of force",
+        ),
+        (
+            lambda: Load(ground_vertical=Record(TIMES, VALUES)),
+            "load.ground_vertical takes a record of displacement, velocity",
+        ),
+        (
+            lambda: Load(ground_vertical=Record(TIMES, VALUES) + 0.1),
+            "load.ground_vertical takes a record",
+        ),
     ],
 )
 def test_impossible_signals_and_loads_are_refused_in_a_sentence(make, message):
@@ -198,9 +240,17 @@ def test_a_load_is_frozen():
 
 
 def test_a_list_is_the_sum_of_its_entries_however_they_are_nested():
-    base, second, gust = Harmonic(0.5), Harmonic(0.1, order=2), Record([0.0, 1.0, 2.0], [0.0, 3.0, 0.0])
+    base, second, gust = (
+        Harmonic(0.5),
+        Harmonic(0.1, order=2),
+        Record([0.0, 1.0, 2.0], [0.0, 3.0, 0.0]),
+    )
     total = base + second + 0.25 + gust
-    for nested in ([base, second, 0.25, gust], (base, [second, [0.25, gust]]), [[base + second], [[0.25]], gust]):
+    for nested in (
+        [base, second, 0.25, gust],
+        (base, [second, [0.25, gust]]),
+        [[base + second], [[0.25]], gust],
+    ):
         assert Load(frequency=1.0, force=nested) == Load(frequency=1.0, force=total)
     load = Load(frequency=1.0, force=[base, 0.25])
     assert load.force(0.7) == base.derivative(0.7, 1.0) + 0.25
@@ -208,8 +258,17 @@ def test_a_list_is_the_sum_of_its_entries_however_they_are_nested():
 
 def test_a_list_in_a_list_on_a_ground_channel_is_read():
     ground = {"time": [0, 1, 2], "value": [0, 0.1, 0], "quantity": "acceleration"}
-    data = {"model": {"type": "RockingBlock", "alpha": 0.2}, "load": {"ground_horizontal": [[ground]]}}
-    assert System.from_dict(data).load.channels["ground_horizontal"].terms[0].quantity == "acceleration"
+    data = {
+        "model": {"type": "RockingBlock", "alpha": 0.2},
+        "load": {"ground_horizontal": [[ground]]},
+    }
+    assert (
+        System.from_dict(data).load.channels["ground_horizontal"].terms[0].quantity
+        == "acceleration"
+    )
     wrong = {**data, "load": {"ground_horizontal": [[{**ground, "quantity": "force"}]]}}
-    with pytest.raises(ParameterError, match=r"load\.ground_horizontal takes a record of displacement, velocity or acceleration"):
+    with pytest.raises(
+        ParameterError,
+        match=r"load\.ground_horizontal takes a record of displacement, velocity or acceleration",
+    ):
         System.from_dict(wrong)

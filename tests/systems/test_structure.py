@@ -1,4 +1,6 @@
-"""A structure from its matrices: its coordinates and equations, what it refuses, and how it is written."""
+"""A structure from its matrices: its coordinates and equations, what it refuses, and how it is
+written.
+"""
 
 from dataclasses import dataclass
 
@@ -44,10 +46,17 @@ def test_motion_is_that_of_the_model_written_out() -> None:
     structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
     law = saltus.NewtonImpact(e=0.7)
     moved = saltus.simulate(
-        saltus.System(model=structure, load=LOAD, impact=law), **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]), periods=12
+        saltus.System(model=structure, load=LOAD, impact=law),
+        **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]),
+        periods=12,
     )
     written = saltus.simulate(
-        saltus.System(model=ThreeMasses(), load=LOAD, impact=law), x0=0.05, x1=0.1, x2=0.2, velocity=(0.0, 0.1, -0.3), periods=12
+        saltus.System(model=ThreeMasses(), load=LOAD, impact=law),
+        x0=0.05,
+        x1=0.1,
+        x2=0.2,
+        velocity=(0.0, 0.1, -0.3),
+        periods=12,
     )
     assert len(moved.impacts) == len(written.impacts) == 9
     assert np.abs(moved.impacts.time - written.impacts.time).max() < 1e-12
@@ -62,10 +71,17 @@ def test_derivatives_are_those_of_the_model_written_out() -> None:
     )
     asked = {"parameters": ["load.frequency", "load.drive.amplitude", "impact.e"], "periods": 6}
     own = saltus.sensitivities(
-        saltus.System(model=structure, load=LOAD, impact=law), **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]), **asked
+        saltus.System(model=structure, load=LOAD, impact=law),
+        **structure.start([0.05, 0.1, 0.2], [0.0, 0.1, -0.3]),
+        **asked,
     )
     written = saltus.sensitivities(
-        saltus.System(model=ThreeMasses(), load=LOAD, impact=law), x0=0.05, x1=0.1, x2=0.2, velocity=(0.0, 0.1, -0.3), **asked
+        saltus.System(model=ThreeMasses(), load=LOAD, impact=law),
+        x0=0.05,
+        x1=0.1,
+        x2=0.2,
+        velocity=(0.0, 0.1, -0.3),
+        **asked,
     )
     assert len(own.motion.impacts) == 5
     basis = np.kron(np.eye(2), structure.displacements(np.eye(3)))
@@ -81,7 +97,10 @@ def test_coordinates_are_local_displacements_and_held_modes() -> None:
     u = np.linspace(-0.5, 1.0, 6)
     start = structure.start(u)
     assert start["tip"] == pytest.approx(u[5] - u[4], abs=1e-15)
-    assert np.abs(structure.displacements([start[name] for name in structure.coordinates]) - u).max() < 1e-14
+    assert (
+        np.abs(structure.displacements([start[name] for name in structure.coordinates]) - u).max()
+        < 1e-14
+    )
     basis = structure.displacements(np.eye(6))
     reduced = basis.T @ given["mass"] @ basis
     assert np.abs(reduced[1:, 1:] - np.eye(5)).max() < 1e-14
@@ -91,7 +110,9 @@ def test_coordinates_are_local_displacements_and_held_modes() -> None:
 def test_kinetic_energy_is_that_of_the_displacements() -> None:
     given = chain(5)
     given["mass"] = given["mass"] + 0.2 * given["stiffness"]
-    structure = saltus.Structure(**given, contacts=[STOP, saltus.Contact(name="other", coordinate=4, position=1.0, sign=-1)])
+    structure = saltus.Structure(
+        **given, contacts=[STOP, saltus.Contact(name="other", coordinate=4, position=1.0, sign=-1)]
+    )
     rates = np.arange(1.0, 6.0)
     energy = structure.kinetic_energy(0.0, (0.0,) * 5, tuple(rates), 1, saltus.Load())
     u = structure.displacements(rates)
@@ -117,7 +138,9 @@ def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
     from saltus.taylor.tracing import trace
 
     def code(size: int) -> str:
-        model = saltus.Structure(**chain_of(size, coupled), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
+        model = saltus.Structure(
+            **chain_of(size, coupled), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0}
+        )
         traced = trace(saltus.System(model=model, load=LOAD))
         return functions_text([*structure_functions(traced), *lane_functions(traced)])
 
@@ -125,7 +148,9 @@ def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
 
 
 def chain_of(size: int, coupled: bool) -> dict[str, np.ndarray]:
-    """The chain, with a damping that is no combination of mass and stiffness, so that it couples the modes, or without."""
+    """The chain, with a damping that is no combination of mass and stiffness, so that it couples
+    the modes, or without.
+    """
     given = chain(size)
     given["damping"][0, 0] += float(coupled)
     return given
@@ -134,14 +159,19 @@ def chain_of(size: int, coupled: bool) -> dict[str, np.ndarray]:
 def driven(size: int, coupled: bool) -> tuple[saltus.System, list[dict]]:
     """A chain against its stop, and starts that hit it."""
     model = saltus.Structure(**chain_of(size, coupled), contacts=[STOP], forces={"drive": 0})
-    starts = [model.start(0.2, 0.1 * np.arange(1.0, size + 1) * factor) for factor in (0.8, 1.0, 1.3, 2.0, 3.0)]
+    starts = [
+        model.start(0.2, 0.1 * np.arange(1.0, size + 1) * factor)
+        for factor in (0.8, 1.0, 1.3, 2.0, 3.0)
+    ]
     return saltus.System(model=model, load=LOAD, impact=saltus.NewtonImpact(e=0.7)), starts
 
 
 def followed_together(system: saltus.System, starts: list[dict], **asked) -> xr.Dataset:
     """The motions of an ensemble from these starts."""
     columns = {name: [start[name] for start in starts] for name in system.model.coordinates}
-    return saltus.simulate_many(system, **columns, velocity=[*np.array([start["velocity"] for start in starts]).T], **asked)
+    return saltus.simulate_many(
+        system, **columns, velocity=[*np.array([start["velocity"] for start in starts]).T], **asked
+    )
 
 
 @pytest.mark.parametrize("coupled", [False, True])
@@ -163,7 +193,10 @@ def test_an_ensemble_has_the_derivatives_of_its_motions(coupled: bool) -> None:
     for start, own in zip(starts, found.values, strict=True):
         alone = saltus.sensitivities(system, parameters=paths, **start, periods=2)
         assert len(alone.motion.impacts) > 0
-        assert np.abs(own - np.hstack([alone.state, alone.parameters])).max() < 1e-9 * np.abs(own).max()
+        assert (
+            np.abs(own - np.hstack([alone.state, alone.parameters])).max()
+            < 1e-9 * np.abs(own).max()
+        )
 
 
 def test_the_series_of_derivatives_are_as_long_for_any_size() -> None:
@@ -172,8 +205,12 @@ def test_the_series_of_derivatives_are_as_long_for_any_size() -> None:
     from saltus.taylor.tracing import trace
 
     def length(size: int) -> int:
-        model = saltus.Structure(**chain(size), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0})
-        functions = structure_functions(trace(saltus.System(model=model, load=LOAD), sensitivities=("load.drive.amplitude",)))
+        model = saltus.Structure(
+            **chain(size), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0}
+        )
+        functions = structure_functions(
+            trace(saltus.System(model=model, load=LOAD), sensitivities=("load.drive.amplitude",))
+        )
         return len(llvm_text([each for each in functions if each.name == "series"]))
 
     assert length(24) < 1.01 * length(4)
@@ -183,9 +220,13 @@ SOFT_WALL = saltus.Contact(name="wall", coordinate=0, position=-2.0)
 
 
 def test_numbers_of_its_parts_are_parameters() -> None:
-    structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": {0: 1.0, "x2": 0.5}})
+    structure = saltus.Structure(
+        **chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": {0: 1.0, "x2": 0.5}}
+    )
     system = saltus.System(model=structure, load=LOAD)
-    moved = system.with_({"model.contacts.stop.position": 0.5, "model.surfaces.soft.stiffness": 7.0})
+    moved = system.with_(
+        {"model.contacts.stop.position": 0.5, "model.surfaces.soft.stiffness": 7.0}
+    )
     assert moved.parameters["model.contacts.stop.position"] == 0.5
     assert moved.model.surfaces[0].stiffness == 7.0
     assert not [path for path in system.parameters if "coefficients" in path]
@@ -193,7 +234,13 @@ def test_numbers_of_its_parts_are_parameters() -> None:
 
 @pytest.mark.parametrize("text", ["json", "toml"])
 def test_a_structure_is_read_back_as_it_was_written(text: str) -> None:
-    structure = saltus.Structure(**chain(3), contacts=[STOP], surfaces=[SOFT], forces={"drive": 0}, points={"mean": [0.3] * 3})
+    structure = saltus.Structure(
+        **chain(3),
+        contacts=[STOP],
+        surfaces=[SOFT],
+        forces={"drive": 0},
+        points={"mean": [0.3] * 3},
+    )
     system = saltus.System(model=structure, load=LOAD)
     assert getattr(saltus.System, f"from_{text}")(getattr(system, f"to_{text}")()) == system
 
@@ -208,15 +255,21 @@ def test_matrices_of_files(tmp_path, name: str) -> None:
         from scipy.io import savemat
 
         savemat(path, called)
-    assert saltus.Structure(file=str(path), contacts=[STOP]) == saltus.Structure(**given, contacts=[STOP])
+    assert saltus.Structure(file=str(path), contacts=[STOP]) == saltus.Structure(
+        **given, contacts=[STOP]
+    )
 
 
 GOOD = chain(3)
 REFUSED = {
     "mass must be a square matrix, got one of 2 x 3": {"mass": np.eye(3)[:2]},
     "stiffness must be 3 x 3 as the mass is, got 2 x 2": {"stiffness": np.eye(2)},
-    "mass must be symmetric, got 0.1 in row 0, column 1": {"mass": np.eye(3) + 0.1 * np.eye(3, k=1)},
-    "mass must be positive definite, and its least eigenvalue is -1": {"mass": np.diag([1.0, -1.0, 1.0])},
+    "mass must be symmetric, got 0.1 in row 0, column 1": {
+        "mass": np.eye(3) + 0.1 * np.eye(3, k=1)
+    },
+    "mass must be positive definite, and its least eigenvalue is -1": {
+        "mass": np.diag([1.0, -1.0, 1.0])
+    },
     "stiffness must be symmetric": {"stiffness": np.eye(3) + np.eye(3, k=1)},
     "stiffness must be finite; it holds nan or inf": {"stiffness": np.diag([1.0, np.nan, 1.0])},
     "damping must be rows of numbers": {"damping": "strong"},
@@ -225,7 +278,9 @@ REFUSED = {
     "contacts.stop: there is no row 7; the rows are 0 to 2": {
         "contacts": [saltus.Contact(name="stop", coordinate=7, position=1.0)]
     },
-    "contacts.stop: no row is called 'tip'": {"contacts": [saltus.Contact(name="stop", coordinate="tip", position=1.0)]},
+    "contacts.stop: no row is called 'tip'": {
+        "contacts": [saltus.Contact(name="stop", coordinate="tip", position=1.0)]
+    },
     "forces.drive must have 3 numbers, one for each row": {"forces": {"drive": [1.0, 2.0]}},
     "the displacement both follows from x0, x1": {
         "contacts": [
@@ -250,14 +305,23 @@ def test_free_flight_is_the_exponential_of_the_matrices(size: int) -> None:
     from scipy.linalg import expm
 
     rng = np.random.default_rng(size)
-    mass, stiffness, damping = (x @ x.T / size + np.eye(size) for x in rng.normal(size=(3, size, size)))
+    mass, stiffness, damping = (
+        x @ x.T / size + np.eye(size) for x in rng.normal(size=(3, size, size))
+    )
     far = saltus.Contact(name="far", coordinate=0, position=-100.0)
-    structure = saltus.Structure(mass=mass, stiffness=stiffness, damping=0.1 * damping, contacts=[far])
+    structure = saltus.Structure(
+        mass=mass, stiffness=stiffness, damping=0.1 * damping, contacts=[far]
+    )
     u, v = rng.normal(size=(2, size))
     end = saltus.simulate(saltus.System(model=structure), **structure.start(u, v), duration=3.0)
     inverse, zero = np.linalg.inv(mass), np.zeros((size, size))
-    flow = expm(3.0 * np.block([[zero, np.eye(size)], [-inverse @ stiffness, -0.1 * inverse @ damping]]))
-    found = np.append(structure.displacements(np.atleast_1d(end.position)), structure.displacements(np.atleast_1d(end.velocity)))
+    flow = expm(
+        3.0 * np.block([[zero, np.eye(size)], [-inverse @ stiffness, -0.1 * inverse @ damping]])
+    )
+    found = np.append(
+        structure.displacements(np.atleast_1d(end.position)),
+        structure.displacements(np.atleast_1d(end.velocity)),
+    )
     assert np.abs(found - flow @ np.append(u, v)).max() < 1e-11
 
 
@@ -280,7 +344,9 @@ def test_a_study_names_the_file_of_the_matrices_beside_it(tmp_path) -> None:
 
 def test_the_energies_of_contact_friction_and_soft_stop_close() -> None:
     belt = saltus.Friction(name="belt", coordinate=1, kinetic=0.05, static=0.08, ground_speed=0.1)
-    structure = saltus.Structure(**chain(4), contacts=[STOP], surfaces=[SOFT], friction=[belt], forces={"drive": 3})
+    structure = saltus.Structure(
+        **chain(4), contacts=[STOP], surfaces=[SOFT], friction=[belt], forces={"drive": 3}
+    )
     system = saltus.System(model=structure, load=LOAD, impact=saltus.NewtonImpact(e=0.5))
     motion = saltus.simulate(system, **structure.start(), periods=10)
     assert len(motion.events) > 20
@@ -294,4 +360,7 @@ def test_a_structure_without_modes_is_proved_to_stay_at_rest() -> None:
     wall = saltus.Contact(name="wall", coordinate=0, position=0.1)
     model = saltus.Structure(mass=[[2.0]], stiffness=[[1.0]], contacts=[wall], forces={"push": 0})
     system = saltus.System(model=model, load=saltus.Load(frequency=0.7, push=saltus.Harmonic(0.05)))
-    assert keeps_rest(system, {"load.push.amplitude": np.array([0.05, 0.2])}).tolist() == [True, False]
+    assert keeps_rest(system, {"load.push.amplitude": np.array([0.05, 0.2])}).tolist() == [
+        True,
+        False,
+    ]

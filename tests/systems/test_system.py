@@ -33,7 +33,12 @@ finite = st.floats(-1e6, 1e6)
 positive = st.floats(1e-6, 1e6)
 at_least_0 = st.floats(0, 1e6)
 angle = st.floats(1e-3, 3.14)
-ratios = {"damping": at_least_0, "stiffness_ratio": positive, "mass_ratio": at_least_0, "dissipation_ratio": at_least_0}
+ratios = {
+    "damping": at_least_0,
+    "stiffness_ratio": positive,
+    "mass_ratio": at_least_0,
+    "dissipation_ratio": at_least_0,
+}
 models = st.one_of(
     st.builds(Metainterface, beta0=angle, **ratios),
     st.builds(Metainterface, beta0=angle, damping=at_least_0, smoothing=positive),
@@ -42,7 +47,9 @@ models = st.one_of(
     st.builds(WallOscillator, stiffness=at_least_0, damping=at_least_0, wall=finite),
 )
 impacts = st.one_of(
-    st.builds(VelocityReduction, st.floats(0, 1)), st.builds(EnergyRestitution, st.floats(0.01, 1.0)), st.just(InelasticImpact())
+    st.builds(VelocityReduction, st.floats(0, 1)),
+    st.builds(EnergyRestitution, st.floats(0.01, 1.0)),
+    st.just(InelasticImpact()),
 )
 harmonics = st.builds(Harmonic, finite, finite, finite, st.integers(1, 9))
 
@@ -51,7 +58,13 @@ harmonics = st.builds(Harmonic, finite, finite, finite, st.integers(1, 9))
 def records(draw, quantities):
     steps = draw(st.lists(st.floats(0.01, 10), min_size=4, max_size=8))
     values = draw(st.lists(finite, min_size=len(steps), max_size=len(steps)))
-    return Record(np.cumsum(steps), values, draw(st.sampled_from(quantities)), draw(finite), draw(st.sampled_from(["", "q.csv"])))
+    return Record(
+        np.cumsum(steps),
+        values,
+        draw(st.sampled_from(quantities)),
+        draw(finite),
+        draw(st.sampled_from(["", "q.csv"])),
+    )
 
 
 @st.composite
@@ -66,7 +79,11 @@ def systems(draw):
         single = st.one_of(finite, harmonics, record)
         channels[name] = draw(st.one_of(single, st.builds(lambda a, b: a + b, harmonics, single)))
     impact = draw(impacts) if model.sides else VelocityReduction()
-    impact = VelocityReduction() if impact == InelasticImpact() and isinstance(model, WallOscillator) else impact
+    impact = (
+        VelocityReduction()
+        if impact == InelasticImpact() and isinstance(model, WallOscillator)
+        else impact
+    )
     return System(model=model, load=Load(frequency=draw(positive), **channels), impact=impact)
 
 
@@ -96,7 +113,12 @@ def test_every_number_has_a_path_that_reads_and_replaces_it(system, pick):
     assert system.get(path) == paths[path]
     assert system.with_({path: system.get(path)}) == system
     smoothed = getattr(system.model, "smoothing", None) is not None  # its ratios may not change
-    bound = ("order", "smoothing", *(("_ratio",) if smoothed else ()), *(() if system.model.sides else ("impact.e",)))
+    bound = (
+        "order",
+        "smoothing",
+        *(("_ratio",) if smoothed else ()),
+        *(() if system.model.sides else ("impact.e",)),
+    )
     if not path.endswith(bound):
         changed = system.with_({path: 0.25})
         assert changed.get(path) == 0.25
@@ -113,12 +135,19 @@ def test_changes_apply_at_once_in_any_order():
         (smooth, {"model.mass_ratio": 1.0, "model.smoothing": None}),
         (EXAMPLE, {"load.horizontal": Harmonic(0.1), "load.horizontal.amplitude": 0.7}),
     ):
-        first, second = (system.with_(dict(order)) for order in (changes.items(), reversed(changes.items())))
+        first, second = (
+            system.with_(dict(order)) for order in (changes.items(), reversed(changes.items()))
+        )
         assert first == second
-        assert all(first.get(path) == value for path, value in changes.items() if path != "load.horizontal")
+        assert all(
+            first.get(path) == value for path, value in changes.items() if path != "load.horizontal"
+        )
 
 
-@pytest.mark.parametrize("text", ["garbage", "[1]", "3", '{"model": 3}', '{"model": {"type": 3}}', '{"model": {"type": []}}'])
+@pytest.mark.parametrize(
+    "text",
+    ["garbage", "[1]", "3", '{"model": 3}', '{"model": {"type": 3}}', '{"model": {"type": []}}'],
+)
 def test_what_is_no_system_in_json_is_refused_in_a_sentence(text):
     with pytest.raises(ParameterError):
         System.from_json(text)
@@ -129,13 +158,17 @@ def test_what_is_no_system_in_json_is_refused_in_a_sentence(text):
 def test_a_key_that_is_given_twice_is_refused():
     """As in TOML: of two values neither is meant more than the other."""
     text = EXAMPLE.to_json().replace('"beta0"', '"beta0": 1.0, "beta0"', 1)
-    with pytest.raises(ParameterError, match="not the JSON of a system: the key 'beta0' is given twice"):
+    with pytest.raises(
+        ParameterError, match="not the JSON of a system: the key 'beta0' is given twice"
+    ):
         System.from_json(text)
 
 
 def test_numbers_beyond_what_can_be_squared_are_refused():
     for path in ("model.damping", "load.horizontal.0.amplitude"):
-        with pytest.raises(ParameterError, match=rf"^{path} must be at most 1e\+100 in size, got 1e\+200") as refusal:
+        with pytest.raises(
+            ParameterError, match=rf"^{path} must be at most 1e\+100 in size, got 1e\+200"
+        ) as refusal:
             EXAMPLE.with_({path: 1e200})
         assert refusal.value.parameter == path
 
@@ -143,7 +176,10 @@ def test_numbers_beyond_what_can_be_squared_are_refused():
 def test_an_impact_law_without_impacts_is_refused():
     with pytest.raises(ParameterError, match="has no impacts"):
         System(model=Metainterface(beta0=1.4, smoothing=50.0), impact=VelocityReduction(0.5))
-    with pytest.raises(ParameterError, match="EnergyRestitution is no law for the contacts of a TwoLayer; give NewtonImpact"):
+    with pytest.raises(
+        ParameterError,
+        match="EnergyRestitution is no law for the contacts of a TwoLayer; give NewtonImpact",
+    ):
         System(model=TwoLayer(beta0=1.4), impact=EnergyRestitution(0.5))
 
 
@@ -192,30 +228,56 @@ def test_a_wrong_path_is_answered_with_the_near_ones(path, hint):
 
 
 def test_get_names_near_whole_paths():
-    with pytest.raises(ParameterError, match=r"no parameter 'load.frequncy'; did you mean 'load.frequency'"):
+    with pytest.raises(
+        ParameterError, match=r"no parameter 'load.frequncy'; did you mean 'load.frequency'"
+    ):
         EXAMPLE.get("load.frequncy")
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: EXAMPLE.with_({"model.damping": -1.0}), r"damping must lie in \[0, inf\), got -1.0"),
-        (lambda: EXAMPLE.with_({"load.horzontal": 1.0}), "does not read load.horzontal; did you mean 'horizontal'"),
+        (
+            lambda: EXAMPLE.with_({"model.damping": -1.0}),
+            r"damping must lie in \[0, inf\), got -1.0",
+        ),
+        (
+            lambda: EXAMPLE.with_({"load.horzontal": 1.0}),
+            "does not read load.horzontal; did you mean 'horizontal'",
+        ),
         (lambda: EXAMPLE.with_({"load.frequency": None}), "load.frequency must be given"),
-        (lambda: System(model=RockingBlock(alpha=0.3), load=Load(vertical=1.0)), "RockingBlock does not read load.vertical"),
-        (lambda: System(model=WallOscillator(), load=Load(horizontal=1.0)), "known here: force, frequency"),
+        (
+            lambda: System(model=RockingBlock(alpha=0.3), load=Load(vertical=1.0)),
+            "RockingBlock does not read load.vertical",
+        ),
+        (
+            lambda: System(model=WallOscillator(), load=Load(horizontal=1.0)),
+            "known here: force, frequency",
+        ),
         (lambda: System(model=Metainterface), "^model must be a Model"),
         (lambda: System(model=EXAMPLE.model, load={"vertical": 1}), "^load must be a Load"),
         (lambda: System(model=EXAMPLE.model, impact=0.9), "^impact must be an ImpactLaw"),
         (lambda: System.from_dict({"load": {}}), "a system needs a model"),
         (lambda: System.from_dict({"model": {"beta0": 1.0}}), "model.type is missing"),
-        (lambda: System.from_dict({"model": {"type": "Metainterfce"}}), "did you mean 'Metainterface'"),
+        (
+            lambda: System.from_dict({"model": {"type": "Metainterfce"}}),
+            "did you mean 'Metainterface'",
+        ),
         (lambda: System.from_dict({"model": {"type": "Metainterface"}}), "model.beta0 is missing"),
-        (lambda: System.from_dict({"model": {"type": "TwoLayer", "beta0": 1.0, "dampng": 1}}), "did you mean 'damping'"),
+        (
+            lambda: System.from_dict({"model": {"type": "TwoLayer", "beta0": 1.0, "dampng": 1}}),
+            "did you mean 'damping'",
+        ),
         (lambda: System.from_dict({"modl": {}}), "did you mean 'model'"),
         (lambda: System.from_dict({"model": 3}), "model must be a table"),
-        (lambda: System.from_dict({**EXAMPLE.to_dict(), "impact": {"type": "Bounce"}}), "impact.type 'Bounce' is not known"),
-        (lambda: System.from_dict({**EXAMPLE.to_dict(), "load": {"vertical": {"amplitud": 1}}}), "'amplitude'"),
+        (
+            lambda: System.from_dict({**EXAMPLE.to_dict(), "impact": {"type": "Bounce"}}),
+            "impact.type 'Bounce' is not known",
+        ),
+        (
+            lambda: System.from_dict({**EXAMPLE.to_dict(), "load": {"vertical": {"amplitud": 1}}}),
+            "'amplitude'",
+        ),
     ],
 )
 def test_impossible_systems_are_refused_in_a_sentence(make, message):
@@ -236,7 +298,10 @@ def test_impossible_systems_are_refused_in_a_sentence(make, message):
         ({"beta0": True}, "beta0 must be a number"),
         ({"beta0": 1.4, "damping": -0.1}, r"damping must lie in \[0, inf\), got -0.1"),
         ({"beta0": 1.4, "damping": math.nan}, "damping"),
-        ({"beta0": 1.4, "stiffness_ratio": 0.0}, r"stiffness_ratio must lie in \(0, inf\), got 0.0"),
+        (
+            {"beta0": 1.4, "stiffness_ratio": 0.0},
+            r"stiffness_ratio must lie in \(0, inf\), got 0.0",
+        ),
         ({"beta0": 1.4, "mass_ratio": -1.0}, "mass_ratio"),
         ({"beta0": 1.4, "dissipation_ratio": -1.0}, "dissipation_ratio"),
     ],
@@ -273,7 +338,9 @@ def test_mirrored_systems_keep_everything_but_the_horizontal_load():
     assert mirrored.mirrored() == EXAMPLE
     assert mirrored.get("load.horizontal.0.amplitude") == -0.5
     assert mirrored.get("load.vertical") == -0.5
-    assert System(model=Metainterface(beta0=1.4, mass_ratio=0.5), load=EXAMPLE.load).mirrored() is None
+    assert (
+        System(model=Metainterface(beta0=1.4, mass_ratio=0.5), load=EXAMPLE.load).mirrored() is None
+    )
 
 
 def test_models_and_laws_of_ones_own_are_registered_by_name():
@@ -305,24 +372,34 @@ def test_a_bare_model_says_what_it_lacks():
         EnergyRestitution(0.5).velocity_after(Bare(), 0.0, 1.0, 1, -1, Load())
 
 
-@pytest.mark.parametrize("model", [Metainterface(beta0=1.4), TwoLayer(beta0=1.4), RockingBlock(alpha=0.2), WallOscillator()])
+@pytest.mark.parametrize(
+    "model",
+    [Metainterface(beta0=1.4), TwoLayer(beta0=1.4), RockingBlock(alpha=0.2), WallOscillator()],
+)
 def test_a_model_says_what_it_means_to_pass_each_of_its_margins(model):
     still = 0.0 if len(model.coordinates) == 1 else (0.0, 0.0)
     margins = model.margins(0.0, still, still, still, (*model.sides, 1)[0], Load())
     assert set(model.margin_kinds) == set(margins)
     assert model.margin_kind("one that a user wrote") is MarginKind.ASSUMPTION
-    assert set(model.stops) <= {name for name in margins if model.margin_kind(name) is MarginKind.LIMIT}
+    assert set(model.stops) <= {
+        name for name in margins if model.margin_kind(name) is MarginKind.LIMIT
+    }
 
 
 class Lopsided(Metainterface):
     """A model that states a mirror symmetry whatever its layers are."""
 
     def mirror(self, load):
-        reversed_ = {n: scaled(s, -1.0) if n.endswith("horizontal") else s for n, s in load.channels.items()}
+        reversed_ = {
+            n: scaled(s, -1.0) if n.endswith("horizontal") else s for n, s in load.channels.items()
+        }
         return Load(frequency=load.frequency, **reversed_)
 
 
-@pytest.mark.parametrize("numbers", [{"stiffness_ratio": 2.0}, {"mass_ratio": 0.1}, {"damping": 0.1, "dissipation_ratio": 3.0}])
+@pytest.mark.parametrize(
+    "numbers",
+    [{"stiffness_ratio": 2.0}, {"mass_ratio": 0.1}, {"damping": 0.1, "dissipation_ratio": 3.0}],
+)
 def test_a_mirror_that_is_no_symmetry_is_refused(numbers):
     load = Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5)
     assert System(model=Lopsided(beta0=1.4), load=load).mirrored() is not None

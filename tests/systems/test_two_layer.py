@@ -9,7 +9,9 @@ import sympy as sp
 from saltus import TwoLayer
 from saltus.systems import Harmonic, Load, Metainterface
 
-EXAMPLE = TwoLayer(beta0=1.3, damping=0.2, stiffness_ratio=0.7, mass_ratio=0.4, dissipation_ratio=1.6)
+EXAMPLE = TwoLayer(
+    beta0=1.3, damping=0.2, stiffness_ratio=0.7, mass_ratio=0.4, dissipation_ratio=1.6
+)
 LOAD = Load(
     frequency=1.3,
     horizontal=Harmonic(0.7),
@@ -23,7 +25,9 @@ LOAD = Load(
 
 @pytest.fixture
 def lagrange(symbols):
-    """The paper's T, Pi, R and Q (per K2) as printed, and the Euler-Lagrange residuals in theta, theta', theta''."""
+    """The paper's T, Pi, R and Q (per K2) as printed, and the Euler-Lagrange residuals in theta,
+    theta', theta''.
+    """
     model, load, t = symbols.model(EXAMPLE), symbols.load, symbols.t
     b0, m, k, c, damping = (
         model.beta0,
@@ -44,16 +48,23 @@ def lagrange(symbols):
         kinetic += ((2 - j) * m + j - 1) * (x**2 + y**2) / 2
         potential += ((2 - j) * k + j - 1) * q[j - 1] ** 2 / 2
         rayleigh += damping * ((2 - j) * c + j - 1) * v[j - 1] ** 2 / 2
-        h = load.horizontal(t) + (2 - j) * load.lower_horizontal(t)  # (1 + h)^(2-j) H, as h H is the lower channel
+        # (1 + h)^(2-j) H, as h H is the lower channel
+        h = load.horizontal(t) + (2 - j) * load.lower_horizontal(t)
         w = load.vertical(t) + (2 - j) * load.lower_vertical(t)
         forces.append(h * sp.sin(angle) - s * w * sp.cos(angle))
     lagrangian = kinetic - potential
     residuals = [
-        sp.diff(sp.diff(lagrangian, v[i]), t) - sp.diff(lagrangian, q[i]) + sp.diff(rayleigh, v[i]) - forces[i] for i in (0, 1)
+        sp.diff(sp.diff(lagrangian, v[i]), t)
+        - sp.diff(lagrangian, q[i])
+        + sp.diff(rayleigh, v[i])
+        - forces[i]
+        for i in (0, 1)
     ]
     theta, rate, second = (sp.symbols(f"{n}_1 {n}_2", real=True) for n in ("q", "v", "a"))
     names = [(sp.diff(x, t, 2), a) for x, a in zip(q, second, strict=True)]
-    names += [(sp.diff(x, t), b) for x, b in zip(q, rate, strict=True)] + list(zip(q, theta, strict=True))
+    names += [(sp.diff(x, t), b) for x, b in zip(q, rate, strict=True)] + list(
+        zip(q, theta, strict=True)
+    )
 
     class Result:
         pass
@@ -68,10 +79,14 @@ def lagrange(symbols):
 
 def test_energies_dissipation_and_forces_are_the_papers(lagrange, is_zero):
     model, theta, rate = lagrange.model, lagrange.theta, lagrange.rate
-    assert is_zero(model.kinetic_energy(lagrange.t, theta, rate, 0, lagrange.load) - lagrange.kinetic)
+    assert is_zero(
+        model.kinetic_energy(lagrange.t, theta, rate, 0, lagrange.load) - lagrange.kinetic
+    )
     assert is_zero(model.potential_energy(theta) - lagrange.potential)
     assert is_zero(model.dissipation(rate) - lagrange.rayleigh)
-    for mine, paper in zip(model.generalised_forces(lagrange.t, theta, lagrange.load), lagrange.forces, strict=True):
+    for mine, paper in zip(
+        model.generalised_forces(lagrange.t, theta, lagrange.load), lagrange.forces, strict=True
+    ):
         assert is_zero(mine - paper)
 
 
@@ -82,7 +97,8 @@ def test_every_entry_of_the_matrices_follows_from_the_lagrangian(lagrange, is_ze
     force = model.load_vector(lagrange.t, theta, lagrange.load)
     zero = dict.fromkeys((*rate, *second), 0)
     for i, residual in enumerate(lagrange.residuals):
-        assert is_zero(sp.diff(residual, rate[0], rate[1]))  # no product of velocities: D is all there is
+        # no product of velocities: D is all there is
+        assert is_zero(sp.diff(residual, rate[0], rate[1]))
         for j in (0, 1):
             assert is_zero(sp.diff(residual, second[j]) - mass[i, j])
             assert is_zero(sp.diff(residual, rate[j]).subs(zero) - drag[i, j])
@@ -101,7 +117,10 @@ def test_linearisation_is_the_first_order_of_the_series(lagrange, is_zero):
         grown = residual.subs(shrink, simultaneous=True)
         first = sp.diff(grown, small).subs(small, 0)
         wanted = sum(
-            mass[i, j] * lagrange.second[j] + drag[i, j] * lagrange.rate[j] + stiffness[i, j] * lagrange.theta[j] for j in (0, 1)
+            mass[i, j] * lagrange.second[j]
+            + drag[i, j] * lagrange.rate[j]
+            + stiffness[i, j] * lagrange.theta[j]
+            for j in (0, 1)
         )
         assert is_zero(grown.subs(small, 0) + force[i])
         assert is_zero(first - wanted)
@@ -126,9 +145,18 @@ def test_acceleration_solves_the_matrix_equation_for_numbers_and_arrays():
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_reduced_equation_is_the_two_layer_one_with_the_other_layer_closed(symbols, is_zero, side):
-    """Symbolic: theta'' of `gov_eqn_theta_long` makes the open layer's row vanish; the closed row is the reaction margin."""
-    concrete = Metainterface(beta0=1.3, damping=0.2, stiffness_ratio=0.7, mass_ratio=0.4, dissipation_ratio=1.6)
-    reduced, full, load, t = symbols.model(concrete), symbols.model(EXAMPLE), symbols.load, symbols.t
+    """Symbolic: theta'' of `gov_eqn_theta_long` makes the open layer's row vanish; the closed row
+    is the reaction margin.
+    """
+    concrete = Metainterface(
+        beta0=1.3, damping=0.2, stiffness_ratio=0.7, mass_ratio=0.4, dissipation_ratio=1.6
+    )
+    reduced, full, load, t = (
+        symbols.model(concrete),
+        symbols.model(EXAMPLE),
+        symbols.load,
+        symbols.t,
+    )
     size, speed = sp.Symbol("size", positive=True), sp.Symbol("speed", real=True)
     s = sp.Integer(side)
     theta = s * size
@@ -142,13 +170,17 @@ def test_reduced_equation_is_the_two_layer_one_with_the_other_layer_closed(symbo
     assert is_zero(opened)
     # erratum 21: R2 <= 0 while the lower layer is open, R1 >= 0 while the upper one is
     assert is_zero(closed + s * reduced.margins(t, theta, speed, second, s, load)["reaction"])
-    difference = reduced.kinetic_energy(t, theta, speed, s, load) - full.kinetic_energy(t, pair(theta), pair(speed), 0, load)
+    difference = reduced.kinetic_energy(t, theta, speed, s, load) - full.kinetic_energy(
+        t, pair(theta), pair(speed), 0, load
+    )
     assert is_zero(difference)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_erratum_21_reaction_fails_right_after_a_fast_crossing(side):
-    """At theta = 0+ in free motion the second row asks for theta'^2 <= -V sin(beta0): 0.70 at 80 deg and V = -0.5."""
+    """At theta = 0+ in free motion the second row asks for theta'^2 <= -V sin(beta0): 0.70 at 80
+    deg and V = -0.5.
+    """
     beta0, vertical = math.radians(80), -0.5
     model, load = Metainterface(beta0=beta0), Load(vertical=vertical)
 
@@ -176,7 +208,9 @@ def test_free_undamped_motion_conserves_energy_to_first_order():
         def energy(shift, q=q, v=v, a=a):
             velocity = v + a * shift
             position = q + v * shift + a * shift**2 / 2
-            return model.kinetic_energy(0.0, position, velocity, 0, load) + model.potential_energy(position)
+            return model.kinetic_energy(0.0, position, velocity, 0, load) + model.potential_energy(
+                position
+            )
 
         assert (energy(step) - energy(-step)) / (2 * step) == pytest.approx(power, abs=1e-7)
 
@@ -202,4 +236,6 @@ def test_massless_middle_has_a_singular_mass_matrix_where_the_bars_are_parallel(
     beta0 = math.radians(80)
     theta = (math.radians(5), -math.radians(15))
     for m in (0.0, 0.3):
-        assert np.linalg.det(TwoLayer(beta0=beta0, mass_ratio=m).mass_matrix(theta)) == pytest.approx(m, abs=1e-15)
+        assert np.linalg.det(
+            TwoLayer(beta0=beta0, mass_ratio=m).mass_matrix(theta)
+        ) == pytest.approx(m, abs=1e-15)

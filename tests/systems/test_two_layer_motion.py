@@ -10,7 +10,9 @@ from saltus import TwoLayer
 from saltus.flow import EventKind, simulate
 from saltus.systems import Harmonic, Load, System
 
-MODEL = TwoLayer(beta0=math.radians(80), mass_ratio=0.4, damping=0.05, stiffness_ratio=0.8, dissipation_ratio=1.2)
+MODEL = TwoLayer(
+    beta0=math.radians(80), mass_ratio=0.4, damping=0.05, stiffness_ratio=0.8, dissipation_ratio=1.2
+)
 LOAD = Load(frequency=1.2, vertical=-0.5, horizontal=Harmonic(0.2), ground_horizontal=Harmonic(0.1))
 
 
@@ -26,7 +28,9 @@ def reference(start, duration):
     closes = [lambda t, y: y[0], lambda t, y: -y[1]]
     for event in closes:
         event.terminal, event.direction = True, -1
-    return solve_ivp(rate, (0, duration), start, method="DOP853", rtol=1e-12, atol=1e-14, events=closes)
+    return solve_ivp(
+        rate, (0, duration), start, method="DOP853", rtol=1e-12, atol=1e-14, events=closes
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""The unit cell: its geometry drawn and measured, the two angle measures, and errata 1, 2, 3, 19, 20."""
+"""The unit cell: its geometry drawn and measured, the two angle measures, and errata 1, 2, 3, 19,
+20.
+"""
 
 import math
 
@@ -26,7 +28,9 @@ def length(layout, pair):
 
 
 @settings(deadline=None)
-@given(cells(), st.floats(0, 1), st.floats(0, 1), st.sampled_from([(1, 1), (-1, 1), (1, -1), (-1, -1)]))
+@given(
+    cells(), st.floats(0, 1), st.floats(0, 1), st.sampled_from([(1, 1), (-1, 1), (1, -1), (-1, -1)])
+)
 def test_every_bar_keeps_its_length_and_every_slider_jumps_transversely(cell, first, second, signs):
     theta = (first * cell.kinematic_limit, -second * cell.kinematic_limit)
     layout = cell.layout(*theta, misaligned=signs)
@@ -37,7 +41,8 @@ def test_every_bar_keeps_its_length_and_every_slider_jumps_transversely(cell, fi
     assert length(layout, ("lower_left", "middle_left")) == pytest.approx(1.0)
     for angle, (a, d), (b, c) in zip(theta, layout.diagonals, layout.sliders, strict=True):
         p, q, r, s = (layout.points[name] for name in (a, b, c, d))
-        assert np.dot(r - q, q - p) == pytest.approx(0.0, abs=1e-6 * size**2)  # sqrt of rounding at the closed slider
+        # sqrt of rounding at the closed slider
+        assert np.dot(r - q, q - p) == pytest.approx(0.0, abs=1e-6 * size**2)
         assert (q - p) == pytest.approx(s - r, abs=1e-9 * size)  # halves stay parallel and equal
         jump = np.linalg.norm(r - q)
         assert jump == pytest.approx(2 * cell.lambda_ * math.tan(cell.phi(angle)), abs=1e-7 * size)
@@ -46,16 +51,26 @@ def test_every_bar_keeps_its_length_and_every_slider_jumps_transversely(cell, fi
 @settings(deadline=None)
 @given(cells(), st.floats(0, 1), st.floats(0, 1))
 def test_masses_are_at_the_coordinates_of_the_paper(cell, first, second):
-    """x_1 = xi_1 - sin(alpha0 - beta0) / (2 sin(alpha0)), x_2 - x_1 = xi_2 + cos(beta0), y_1 = eta_1, ... (`displ_ratio2`)."""
+    """x_1 = xi_1 - sin(alpha0 - beta0) / (2 sin(alpha0)), x_2 - x_1 = xi_2 + cos(beta0), y_1 =
+    eta_1, ... (`displ_ratio2`).
+    """
     theta = (first * cell.kinematic_limit, -second * cell.kinematic_limit)
     layout = cell.layout(*theta)
     size = max(1.0, cell.base)
     offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
-    assert layout.points["mass_1"] == pytest.approx([cell.xi(theta[0]) - offset, cell.eta(theta[0])], abs=1e-12 * size)
+    assert layout.points["mass_1"] == pytest.approx(
+        [cell.xi(theta[0]) - offset, cell.eta(theta[0])], abs=1e-12 * size
+    )
     step = layout.points["mass_2"] - layout.points["mass_1"]
-    assert step == pytest.approx([cell.xi(theta[1]) + math.cos(cell.beta0), cell.eta(theta[1])], abs=1e-12 * size)
-    assert layout.points["mass_1"] == pytest.approx((layout.points["middle_left"] + layout.points["middle_right"]) / 2)
-    assert layout.points["mass_2"] == pytest.approx((layout.points["upper_left"] + layout.points["upper_right"]) / 2)
+    assert step == pytest.approx(
+        [cell.xi(theta[1]) + math.cos(cell.beta0), cell.eta(theta[1])], abs=1e-12 * size
+    )
+    assert layout.points["mass_1"] == pytest.approx(
+        (layout.points["middle_left"] + layout.points["middle_right"]) / 2
+    )
+    assert layout.points["mass_2"] == pytest.approx(
+        (layout.points["upper_left"] + layout.points["upper_right"]) / 2
+    )
 
 
 @settings(deadline=None)
@@ -63,11 +78,15 @@ def test_masses_are_at_the_coordinates_of_the_paper(cell, first, second):
 def test_both_angle_measures_give_each_other(cell, part, layer):
     sign = 1 if layer == 1 else -1
     for past_line in (False, True):
-        size = part * cell.line_limit + past_line * (cell.kinematic_limit - 2 * part * cell.line_limit)
+        size = part * cell.line_limit + past_line * (
+            cell.kinematic_limit - 2 * part * cell.line_limit
+        )
         theta = sign * size
         phi = cell.phi(theta)
         assert cell.theta(phi, layer=layer, past_line=past_line) == pytest.approx(theta, abs=1e-6)
-        assert cell.beta_of_phi(phi) == pytest.approx(min(cell.beta(theta), 2 * math.pi - cell.beta(theta)), abs=1e-6)
+        assert cell.beta_of_phi(phi) == pytest.approx(
+            min(cell.beta(theta), 2 * math.pi - cell.beta(theta)), abs=1e-6
+        )
         assert cell.alpha_of_phi(phi) == pytest.approx(cell.alpha(theta), abs=1e-6)
         back = cell.phi(cell.theta(phi, layer=layer, past_line=past_line))
         assert back == pytest.approx(phi, abs=1e-6)
@@ -88,7 +107,9 @@ def test_erratum_1_printed_chi_and_the_other_reading_of_psi_miss_the_undeformed_
     printed = math.sin(2 * CELL.alpha0 + CELL.beta0) / math.sin(CELL.alpha0 + CELL.beta0)
     assert math.degrees(math.acos(CELL.psi / (2 * CELL.lambda_) + CELL.chi)) == pytest.approx(40.0)
     assert abs(math.degrees(math.acos(CELL.psi / (2 * CELL.lambda_) + printed)) - 40.0) > 1.0
-    other = math.sin(CELL.beta0**2) / (2 * math.sin(CELL.alpha0) * math.sin(CELL.alpha0 + CELL.beta0))
+    other = math.sin(CELL.beta0**2) / (
+        2 * math.sin(CELL.alpha0) * math.sin(CELL.alpha0 + CELL.beta0)
+    )
     assert abs(math.acos(other / (2 * CELL.lambda_) + CELL.chi) - CELL.alpha0) > 0.01
 
 
@@ -102,8 +123,12 @@ def test_erratum_2_the_sign_of_theta_is_that_of_the_inequalities():
     assert CELL.theta(phi, layer=1) == pytest.approx(opening) == -CELL.theta(phi, layer=2)
     # the velocity of the first mass that kin_eng uses, sin(beta0 + theta_1) theta_1', needs it too
     theta, step = CELL.theta(phi, layer=1), 1e-6
-    slope = (CELL.layout(theta + step).points["mass_1"] - CELL.layout(theta - step).points["mass_1"]) / (2 * step)
-    assert slope == pytest.approx([math.sin(CELL.beta0 + theta), math.cos(CELL.beta0 + theta)], abs=1e-9)
+    slope = (
+        CELL.layout(theta + step).points["mass_1"] - CELL.layout(theta - step).points["mass_1"]
+    ) / (2 * step)
+    assert slope == pytest.approx(
+        [math.sin(CELL.beta0 + theta), math.cos(CELL.beta0 + theta)], abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("theta", [0.4, -0.4, 1.5, -1.5])
@@ -117,7 +142,9 @@ def test_erratum_3_alpha_is_the_angle_of_the_diagonal_and_the_printed_one_is_not
     lowered = math.cos(CELL.beta0) - math.cos(CELL.beta0 + (-1) ** j * theta)
     ratio = (lowered + CELL.psi) / CELL.psi
     if ratio > 0:
-        secant = math.sqrt(ratio) * 2 * CELL.lambda_ / (lowered + 4 * CELL.lambda_ * CELL.chi + CELL.psi)
+        secant = (
+            math.sqrt(ratio) * 2 * CELL.lambda_ / (lowered + 4 * CELL.lambda_ * CELL.chi + CELL.psi)
+        )
         assert abs(secant) < 1 or abs(math.acos(1 / secant) - measured) > 0.05
 
 
@@ -169,7 +196,9 @@ def test_small_theta_is_quadratic_in_phi():
 
 
 def test_rate_of_phi_diverges_at_an_impact_like_the_inverse_root():
-    """phi' abs(phi) -> abs(theta)' sin(beta0) / (2 psi): with theta' finite, phi' grows 10-fold as theta falls 100-fold."""
+    """phi' abs(phi) -> abs(theta)' sin(beta0) / (2 psi): with theta' finite, phi' grows 10-fold as
+    theta falls 100-fold.
+    """
     theta = np.array([1e-4, 1e-6, 1e-8, 1e-10])
     for sign in (1, -1):
         rate = CELL.phi_velocity(sign * theta, -sign * 0.5)
@@ -191,7 +220,9 @@ def test_rate_of_phi_is_the_derivative_of_phi(theta):
             return mpmath.atan(mpmath.sqrt((mpmath.cos(b0) - mpmath.cos(b0 + abs(x))) / psi))
 
         assert CELL.phi(theta) == pytest.approx(float(phi(mpmath.mpf(theta))), rel=1e-13)
-        assert CELL.phi_velocity(theta, 0.7) == pytest.approx(float(0.7 * mpmath.diff(phi, theta)), rel=1e-12)
+        assert CELL.phi_velocity(theta, 0.7) == pytest.approx(
+            float(0.7 * mpmath.diff(phi, theta)), rel=1e-12
+        )
 
 
 def test_functions_take_arrays_and_agree_with_numbers():
@@ -205,7 +236,10 @@ def test_functions_take_arrays_and_agree_with_numbers():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"alpha0": 40.0, "beta0": 1.0}, r"alpha0 must lie in \(0, pi\) rad, got 40.0 \(degrees\?\)"),
+        (
+            {"alpha0": 40.0, "beta0": 1.0},
+            r"alpha0 must lie in \(0, pi\) rad, got 40.0 \(degrees\?\)",
+        ),
         ({"alpha0": 0.0, "beta0": 1.0}, "alpha0 must lie in"),
         ({"alpha0": 1.0, "beta0": math.nan}, "beta0 must lie in"),
         ({"alpha0": 2.0, "beta0": 2.0}, r"alpha0 \+ beta0 must lie below pi rad, got 2.0 \+ 2.0"),

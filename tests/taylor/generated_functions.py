@@ -1,4 +1,6 @@
-"""The generated functions of one motion, compiled, with the numbers of a system, to be called from Python."""
+"""The generated functions of one motion, compiled, with the numbers of a system, to be called from
+Python.
+"""
 
 from functools import cache
 
@@ -30,7 +32,11 @@ class Generated:
         parameters = np.array([value for _, value in numbers(system)] or [0.0])
         self.env, _ = self.structure.prepare(parameters, record_table(system, self.trace.records))
         several = ("series", "matrices", "matrix_slopes", "tangent", "load_series")
-        names = several if self.trace.signs else ("series", "contact_series", "reset", "contact_damping", "tangent")
+        names = (
+            several
+            if self.trace.signs
+            else ("series", "contact_series", "reset", "contact_damping", "tangent")
+        )
         self._functions = dict(zip(names, self.structure.functions, strict=True))
 
     def call(self, name, *arguments):
@@ -44,7 +50,11 @@ class Generated:
         """Taylor coefficients of coordinates, velocities, accelerations, gap and margins."""
         dof, stops, rows = self.structure.sizes[:3]
         q, v, a = (np.full((dof, order + 2), np.nan) for _ in range(3))
-        g, m, w = np.zeros(order + 2), np.zeros((max(1, stops), order + 2)), np.full((rows, order + 6), np.nan)
+        g, m, w = (
+            np.zeros(order + 2),
+            np.zeros((max(1, stops), order + 2)),
+            np.full((rows, order + 6), np.nan),
+        )
         q[:, 0], v[:, 0] = position, velocity
         self.call("series", t, 0.0, side, self.env, piece, q, v, a, g, m, w, order)
         return q, v, a, g, m

@@ -1,7 +1,8 @@
-"""Truncated power series in 40 digits, composed by brute force: what the generated recurrences are held against.
+"""Truncated power series in 40 digits, composed by brute force: what the generated recurrences are
+held against.
 
-f(u) is the sum of f^(j)(u_0) / j! (u - u_0)^j, with the derivatives from mpmath and the powers multiplied out. No recurrence of
-`saltus.taylor.rules` is used.
+f(u) is the sum of f^(j)(u_0) / j! (u - u_0)^j, with the derivatives from mpmath and the powers
+multiplied out. No recurrence of `saltus.taylor.rules` is used.
 """
 
 import mpmath as mp
@@ -11,11 +12,15 @@ from saltus.taylor import rules
 
 DIGITS = 40
 # By NumPy's names: every function of the rules, which mpmath has under the same name.
-FUNCTIONS = {rule.numpy.__name__: getattr(mp, name) for name, rule in rules.FUNCTIONS.items()} | {"tan": mp.tan}
+FUNCTIONS = {rule.numpy.__name__: getattr(mp, name) for name, rule in rules.FUNCTIONS.items()} | {
+    "tan": mp.tan
+}
 
 
 class Series:
-    """sum c_k tau^k, k < len(c); answers Python's operators and NumPy's functions, so that a model's own formula runs on it."""
+    """sum c_k tau^k, k < len(c); answers Python's operators and NumPy's functions, so that a
+    model's own formula runs on it.
+    """
 
     __array_priority__ = 2000
 
@@ -78,7 +83,12 @@ class Series:
             return inputs[0].compose(FUNCTIONS[name])
         left = inputs[0] if isinstance(inputs[0], Series) else self._other(float(inputs[0]))
         if len(inputs) == 1:
-            return {"absolute": abs, "negative": lambda x: -x, "positive": lambda x: x, "square": lambda x: x * x}[name](left)
+            return {
+                "absolute": abs,
+                "negative": lambda x: -x,
+                "positive": lambda x: x,
+                "square": lambda x: x * x,
+            }[name](left)
         operations = {
             "add": lambda a, b: a + b,
             "subtract": lambda a, b: a - b,
@@ -91,7 +101,9 @@ class Series:
 
 
 def solution(acceleration, position, velocity, t0, order):
-    """The Taylor coefficients about t0 of q'' = acceleration(t, q, v), a function of `Series`; tuples for several coordinates."""
+    """The Taylor coefficients about t0 of q'' = acceleration(t, q, v), a function of `Series`;
+    tuples for several coordinates.
+    """
     several = isinstance(position, tuple)
     starts = list(zip(position, velocity, strict=True)) if several else [(position, velocity)]
     with mp.workdps(DIGITS):
@@ -100,8 +112,12 @@ def solution(acceleration, position, velocity, t0, order):
             place = tuple(Series(c[:n]) for c in q)
             speed = tuple(Series([k * c[k] for k in range(1, n + 1)]) for c in q)
             t = Series([t0, 1, *[0] * n][:n])
-            rates = acceleration(t, place, speed) if several else (acceleration(t, place[0], speed[0]),)
+            rates = (
+                acceleration(t, place, speed) if several else (acceleration(t, place[0], speed[0]),)
+            )
             for c, rate in zip(q, rates, strict=True):
-                c.append((rate.c[n - 1] if isinstance(rate, Series) else rate * (n == 1)) / (n * (n + 1)))
+                c.append(
+                    (rate.c[n - 1] if isinstance(rate, Series) else rate * (n == 1)) / (n * (n + 1))
+                )
         coefficients = np.array([[float(x) for x in c] for c in q])
     return coefficients if several else coefficients[0]

@@ -1,4 +1,6 @@
-"""Compiled code is run only from a folder of the user's own, and only as it was written; what is damaged is made again."""
+"""Compiled code is run only from a folder of the user's own, and only as it was written; what is
+damaged is made again.
+"""
 
 import hashlib
 import os
@@ -44,8 +46,14 @@ def home(tmp_path, monkeypatch):
 
 def run(home, **more):
     """The printed number and the remarks of a process that loads the module."""
-    environment = os.environ | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)} | more
-    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=False)
+    environment = (
+        os.environ
+        | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+        | more
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=False
+    )
     assert done.returncode == 0, done.stderr
     return float(done.stdout), done.stderr
 
@@ -62,7 +70,11 @@ def run_here(caplog):
 
 def kept(home):
     """What is in the cache, without the files that are only locked."""
-    return {path: path.read_bytes() for path in (home / "cache").rglob("*") if path.is_file() and path.suffix != ".lock"}
+    return {
+        path: path.read_bytes()
+        for path in (home / "cache").rglob("*")
+        if path.is_file() and path.suffix != ".lock"
+    }
 
 
 @pytest.mark.parametrize("umask", [0o022, 0o002, 0o000])
@@ -97,11 +109,16 @@ GROUPS = {100: ("users", []), 1000: ("me", []), 1001: ("me", ["me", "you"]), 0: 
         (0, 0, 0o1777, False),  # a temporary directory
     ],
 )
-def test_a_folder_above_in_which_others_can_rename_is_known(monkeypatch, owner, group, mode, others_can):
+def test_a_folder_above_in_which_others_can_rename_is_known(
+    monkeypatch, owner, group, mode, others_can
+):
     import grp
     import pwd
 
-    groups = {number: SimpleNamespace(gr_name=name, gr_mem=members) for number, (name, members) in GROUPS.items()}
+    groups = {
+        number: SimpleNamespace(gr_name=name, gr_mem=members)
+        for number, (name, members) in GROUPS.items()
+    }
     monkeypatch.setattr(os, "getuid", lambda: 1000)
     monkeypatch.setattr(pwd, "getpwuid", {1000: SimpleNamespace(pw_name="me")}.__getitem__)
     monkeypatch.setattr(grp, "getgrgid", groups.__getitem__)
@@ -153,7 +170,10 @@ def test_another_text_under_the_name_of_a_source_is_not_run(home):
     del sys.modules[name]
 
 
-@pytest.mark.parametrize("change", ["flip", "pickle", *(pytest.param(c, marks=pytest.mark.thorough) for c in ("cut", "empty"))])
+@pytest.mark.parametrize(
+    "change",
+    ["flip", "pickle", *(pytest.param(c, marks=pytest.mark.thorough) for c in ("cut", "empty"))],
+)
 def test_damaged_compiled_code_is_made_again_with_a_remark(home, caplog, change):
     """Every file of the cache in turn; a pickle that runs a command when it is read is not read."""
     assert run_here(caplog) == (6.0, "")
@@ -174,13 +194,17 @@ def test_damaged_compiled_code_is_made_again_with_a_remark(home, caplog, change)
 
 
 def forged(path, planted):
-    """What a stranger writes: a pickle that makes a file when it is read, with the digest of its bytes."""
+    """What a stranger writes: a pickle that makes a file when it is read, with the digest of its
+    bytes.
+    """
     content = pickle.dumps(Planted(str(planted)))
     path.write_bytes(content + hashlib.sha256(content).digest())
 
 
 def test_numba_s_own_setting_of_a_folder_is_not_followed(home):
-    """Compiled code lies beside its source, in the folder that was looked at, wherever else numba is told to keep it."""
+    """Compiled code lies beside its source, in the folder that was looked at, wherever else numba
+    is told to keep it.
+    """
     elsewhere = home / "elsewhere"
     elsewhere.mkdir()
     assert run(home, NUMBA_CACHE_DIR=str(elsewhere)) == (6.0, "")
@@ -191,7 +215,11 @@ def test_numba_s_own_setting_of_a_folder_is_not_followed(home):
 
 
 @pytest.mark.parametrize(
-    "change", ["link", pytest.param("owner", marks=pytest.mark.skipif(os.getuid() != 0, reason="root alone"))]
+    "change",
+    [
+        "link",
+        pytest.param("owner", marks=pytest.mark.skipif(os.getuid() != 0, reason="root alone")),
+    ],
 )
 def test_compiled_code_of_somebody_else_is_not_read(home, caplog, change):
     """As was planted while the folder was open to all, with a digest that is right."""
@@ -254,12 +282,18 @@ class Planted:
 
 
 def test_of_processes_that_want_the_same_code_at_once_one_compiles_it(home):
-    environment = os.environ | {"SALTUS_CACHE_DIR": str(home / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = os.environ | {
+        "SALTUS_CACHE_DIR": str(home / "cache"),
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
     script = SCRIPT.replace("print(", "function = ").replace(".doubled(3.0))", ".doubled") + (
         "print(sum(function.stats.cache_misses.values()), function(3.0))"
     )
     begun = [
-        subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment) for _ in range(3)
+        subprocess.Popen(
+            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=environment
+        )
+        for _ in range(3)
     ]
     said = [process.communicate()[0].split() for process in begun]
     assert sorted(misses for misses, _ in said) == ["0", "0", "1"]
@@ -267,15 +301,21 @@ def test_of_processes_that_want_the_same_code_at_once_one_compiles_it(home):
 
 
 def objects(home, system):
-    """The object files of a structure, which is loaded as if it had not been before, and a coefficient of its series."""
+    """The object files of a structure, which is loaded as if it had not been before, and a
+    coefficient of its series.
+    """
     generated._loaded.clear()
     made = Generated(system)
-    return list((home / "cache" / "kernels").glob("structure_*.o")), made.coefficients(0.0, 0.1, 0.2, 6)[0, 5]
+    return list((home / "cache" / "kernels").glob("structure_*.o")), made.coefficients(
+        0.0, 0.1, 0.2, 6
+    )[0, 5]
 
 
 @pytest.mark.parametrize("change", ["flip", "cut", "link"])
 def test_a_damaged_object_file_is_made_again_with_a_remark(home, caplog, change):
-    system = System(model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8))
+    system = System(
+        model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8)
+    )
     (path,), value = objects(home, system)
     content = path.read_bytes()
     assert undamaged(str(path)) == content[:-32]
@@ -287,14 +327,19 @@ def test_a_damaged_object_file_is_made_again_with_a_remark(home, caplog, change)
         path.symlink_to(target)
     else:
         middle = len(content) // 2
-        path.write_bytes(content[:middle] + (bytes([content[middle] ^ 1]) + content[middle + 1 :] if change == "flip" else b""))
+        path.write_bytes(
+            content[:middle]
+            + (bytes([content[middle] ^ 1]) + content[middle + 1 :] if change == "flip" else b"")
+        )
     assert objects(home, system) == ([path], value)
     assert f"{path} is {'not the user' if change == 'link' else 'damaged'}" in caplog.text
     assert path.read_bytes() == content
 
 
 def test_an_object_file_is_named_by_the_processor_and_by_llvm_s_version(home, monkeypatch):
-    system = System(model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8))
+    system = System(
+        model=WallOscillator(damping=0.1), load=Load(frequency=1.0), impact=VelocityReduction(0.8)
+    )
     (first,), value = objects(home, system)
     generated.written_by.cache_clear()
     monkeypatch.setattr(generated, "made_for", lambda: "another machine")

@@ -1,4 +1,6 @@
-"""One expression in the place of several has the value of each where that one is chosen, and what they share is there once."""
+"""One expression in the place of several has the value of each where that one is chosen, and what
+they share is there once.
+"""
 
 import math
 
@@ -12,11 +14,27 @@ q, v, t = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time")
 a, b, c = (Expr("parameter", (), i) for i in range(3))
 FREE = [Expr("free", (), i) for i in range(3)]
 CASES = {
-    "angles on both sides": [a * np.sin(b + q) - c * v, b * np.sin(a - q) - v / c, np.cos(2 * a + q) * np.sin(a + b - q)],
-    "products of sums": [(a + np.sin(c * t)) * np.sin(b + q) * v * v, np.cos(t) * np.sin(b - q), (q + v) * (q - v) / (1 + q * q)],
+    "angles on both sides": [
+        a * np.sin(b + q) - c * v,
+        b * np.sin(a - q) - v / c,
+        np.cos(2 * a + q) * np.sin(a + b - q),
+    ],
+    "products of sums": [
+        (a + np.sin(c * t)) * np.sin(b + q) * v * v,
+        np.cos(t) * np.sin(b - q),
+        (q + v) * (q - v) / (1 + q * q),
+    ],
     "constants among them": [a + 0 * q, q / b, np.sin(a) * np.cos(b)],
-    "functions": [np.exp(-a * q) * np.sqrt(2 + q * q), np.exp(b * v) - 3, (2 + q) ** 1.5 / (3 + np.tanh(v))],
-    "of one kind twice": [np.exp(q) * 2 + a * np.exp(v + q) - np.exp(2 * q + v), np.exp(b * q), np.exp(v + a) - np.exp(v - q)],
+    "functions": [
+        np.exp(-a * q) * np.sqrt(2 + q * q),
+        np.exp(b * v) - 3,
+        (2 + q) ** 1.5 / (3 + np.tanh(v)),
+    ],
+    "of one kind twice": [
+        np.exp(q) * 2 + a * np.exp(v + q) - np.exp(2 * q + v),
+        np.exp(b * q),
+        np.exp(v + a) - np.exp(v - q),
+    ],
 }
 
 
@@ -27,7 +45,11 @@ def value(root, leaves):
 
 def leaves(rng, chosen):
     numbers = {q: rng.uniform(-0.9, 0.9), v: rng.uniform(-0.9, 0.9), t: rng.uniform(-0.9, 0.9)}
-    return numbers | dict(zip((a, b, c), rng.uniform(0.3, 1.5, 3), strict=True)) | {f: float(f.value == chosen) for f in FREE}
+    return (
+        numbers
+        | dict(zip((a, b, c), rng.uniform(0.3, 1.5, 3), strict=True))
+        | {f: float(f.value == chosen) for f in FREE}
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -41,8 +63,12 @@ def test_the_common_form_has_the_value_of_what_is_chosen(name, chosen):
 
 
 def test_angles_that_differ_by_constants_share_one_sine_and_one_cosine():
-    common = CommonForm(FREE[:2]).of([np.sin(a + q) * b + np.cos(2 * a + q), c * np.cos(b - q) - np.sin(c - q)])
-    functions = [node for node in ordered([common]) if node.op in ("sin", "cos") and node.degree is None]
+    common = CommonForm(FREE[:2]).of(
+        [np.sin(a + q) * b + np.cos(2 * a + q), c * np.cos(b - q) - np.sin(c - q)]
+    )
+    functions = [
+        node for node in ordered([common]) if node.op in ("sin", "cos") and node.degree is None
+    ]
     assert {node.args[0] for node in functions} == {q}
     assert len(functions) == 2
 
@@ -53,6 +79,8 @@ def test_the_integral_of_sines_and_cosines_is_one():
     integral = form.integral(integrand, q)
     for _ in range(20):
         at = leaves(rng, 0)
-        assert math.isclose(value(differentiate(integral, q), at), value(integrand, at), abs_tol=1e-14)
+        assert math.isclose(
+            value(differentiate(integral, q), at), value(integrand, at), abs_tol=1e-14
+        )
     assert form.integral(np.cos(2 * q), q) is None
     assert form.integral(np.cos(q) * v, q) is None

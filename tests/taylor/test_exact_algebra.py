@@ -1,4 +1,6 @@
-"""Equality of traced expressions: proved in exact arithmetic by identities of algebra, and never claimed of what differs."""
+"""Equality of traced expressions: proved in exact arithmetic by identities of algebra, and never
+claimed of what differs.
+"""
 
 import numpy as np
 import pytest
@@ -6,7 +8,12 @@ import pytest
 from saltus.taylor.exact_algebra import NoNormalForm, constant, constant_value, normal_form
 from saltus.taylor.graph import Expr, combine, number, substitute
 
-X, V, P, Q = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("parameter", (), 0), Expr("parameter", (), 1)
+X, V, P, Q = (
+    Expr("coordinate", (), 0),
+    Expr("velocity", (), 0),
+    Expr("parameter", (), 0),
+    Expr("parameter", (), 1),
+)
 
 
 def provably_equal(one, other, leaves=None):
@@ -73,13 +80,20 @@ def random_expression(rng, depth):
     return combine(operation, random_expression(rng, depth - 1), random_expression(rng, depth - 1))
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 8))])
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 8))]
+)
 def test_what_is_proved_equal_has_equal_values(seed):
     """Random pairs of small expressions, and each with its own terms turned round, at a point."""
     rng, at, proved = np.random.default_rng(seed), {X: 0.37, V: -1.21, P: 0.83}, 0
     for _ in range(300):
         one, other = (random_expression(rng, 3) for _ in range(2))
-        pairs = [(one, other), (one * (other - 1), other * one - one), (one - other, -(other - one)), (one / 2 + one / 2, one)]
+        pairs = [
+            (one, other),
+            (one * (other - 1), other * one - one),
+            (one - other, -(other - one)),
+            (one / 2 + one / 2, one),
+        ]
         for a, b in pairs:
             first, second = (substitute(combine("add", e, 0.0), at).value for e in (a, b))
             if provably_equal(a, b) and np.isfinite(first) and np.isfinite(second):

@@ -1,4 +1,6 @@
-"""What is private of numba: where it is missing, and on the oldest and the newest numba that pyproject.toml allows."""
+"""What is private of numba: where it is missing, and on the oldest and the newest numba that
+pyproject.toml allows.
+"""
 
 import ast
 import json
@@ -34,8 +36,13 @@ BOTH = SYSTEM + (
 
 def run(script, cache, *paths):
     """The numbers that a script prints, in a process of its own."""
-    environment = os.environ | {"SALTUS_CACHE_DIR": str(cache), "PYTHONPATH": os.pathsep.join(map(str, [*paths, SOURCE]))}
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False)
+    environment = os.environ | {
+        "SALTUS_CACHE_DIR": str(cache),
+        "PYTHONPATH": os.pathsep.join(map(str, [*paths, SOURCE])),
+    }
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False
+    )
     assert result.returncode == 0, result.stderr[-4000:]
     return json.loads(result.stdout.splitlines()[-1])
 
@@ -91,7 +98,9 @@ def total(x):
 """
 
 
-def test_a_tuple_by_reference_has_the_tuples_values_and_a_function_is_compiled_once_for_all_numbers(tmp_path, monkeypatch):
+def test_a_tuple_by_reference_has_the_tuples_values_and_a_function_is_compiled_once_for_all_numbers(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
     made = load_module("reference", REFERENCE)
     assert made.total(5.0) == 2.0 * (0 + 1 + 2 + 3 + 4 + 5)
@@ -128,14 +137,31 @@ def test_an_environment_without_a_compiler_is_refused_in_a_sentence(name, value,
 
 def allowed():
     """The oldest numba and the bound that its versions stay below."""
-    dependencies = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"]["dependencies"]
-    (found,) = [re.fullmatch(r"numba>=([\d.]+),<([\d.]+)", text) for text in dependencies if text.startswith("numba")]
+    dependencies = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"][
+        "dependencies"
+    ]
+    (found,) = [
+        re.fullmatch(r"numba>=([\d.]+),<([\d.]+)", text)
+        for text in dependencies
+        if text.startswith("numba")
+    ]
     return found.groups()
 
 
 def install(requirement, folder):
-    """Put a numba, and the NumPy that goes with it, into a folder that Python can be told of; skip where that cannot be had."""
-    command = ["-m", "pip", "install", "--quiet", "--only-binary=:all:", "--target", str(folder), requirement]
+    """Put a numba, and the NumPy that goes with it, into a folder that Python can be told of; skip
+    where that cannot be had.
+    """
+    command = [
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--only-binary=:all:",
+        "--target",
+        str(folder),
+        requirement,
+    ]
     for python in (sys.executable, "python3"):
         result = subprocess.run([python, *command], capture_output=True, text=True, check=False)
         if result.returncode == 0:
@@ -148,7 +174,9 @@ def install(requirement, folder):
 def test_motions_are_the_same_on_every_numba_allowed(which, tmp_path):
     oldest, bound = allowed()
     install(f"numba=={oldest}.*" if which == "oldest" else f"numba<{bound}", tmp_path / "packages")
-    version = run("import json, numba; print(json.dumps(numba.__version__))", tmp_path, tmp_path / "packages")
+    version = run(
+        "import json, numba; print(json.dumps(numba.__version__))", tmp_path, tmp_path / "packages"
+    )
     assert version.startswith(f"{oldest}.") if which == "oldest" else version >= numba.__version__
     there = run(BOTH, tmp_path / "cache", tmp_path / "packages")
     assert there == pytest.approx(run(BOTH, cache_directory().parent), rel=1e-12, abs=1e-12)
@@ -170,7 +198,9 @@ print(json.dumps(["call" in begun, called, twice(address, 3.0)]))
 
 def test_a_function_is_called_through_its_address_without_a_line_of_python():
     """In which a Ctrl-C would become another error."""
-    result = subprocess.run([sys.executable, "-c", CALLED], capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", CALLED], capture_output=True, text=True, check=True
+    )
     assert json.loads(result.stdout) == [False, 81.0, 81.0]
     assert not result.stderr
 
@@ -191,7 +221,9 @@ PARTS = {  # and the methods of each that are called, or replaced in a class tha
     "CompilerBase": ["__init__", "compile_extra"],
     "DefaultPassBuilder": ["define_nopython_pipeline"],
 }
-CHANGES = [  # absent, and with another method; the other ways are thorough, as functions are compiled anew for each
+# absent, and with another method; the other ways are thorough, as functions are compiled anew for
+# each
+CHANGES = [
     pytest.param(part, how, marks=() if how in ("absent", *methods[-1:]) else pytest.mark.thorough)
     for part, methods in PARTS.items()
     for how in ("absent", "a function", *methods)
@@ -221,7 +253,9 @@ def changed(part, how):
 
 
 @pytest.mark.parametrize(("name", "how"), CHANGES)
-def test_with_another_private_part_functions_are_compiled_in_the_plain_way(name, how, unused, monkeypatch, caplog):
+def test_with_another_private_part_functions_are_compiled_in_the_plain_way(
+    name, how, unused, monkeypatch, caplog
+):
     whole = private_numba._private
 
     def other(module, wanted):
@@ -233,7 +267,11 @@ def test_with_another_private_part_functions_are_compiled_in_the_plain_way(name,
     for _ in range(2):  # compiled, and from the cache
         made = load_module("within", WITHIN + CALLER)
         given = pointer(made.four_times)
-        assert [made.eight_times(1.5), entry_point(made.call)(given, 1.25), made.call(given, 2.5)] == [12.0, 20.0, 40.0]
+        assert [
+            made.eight_times(1.5),
+            entry_point(made.call)(given, 1.25),
+            made.call(given, 2.5),
+        ] == [12.0, 20.0, 40.0]
         del sys.modules[made.__name__]
     assert private_numba.is_plain()
     assert len(caplog.messages) == 1
@@ -261,7 +299,11 @@ def test_what_is_private_of_numba_is_imported_in_one_file():
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
-            names += [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []
+            names += (
+                [node.value]
+                if isinstance(node, ast.Constant) and isinstance(node.value, str)
+                else []
+            )
             if any(re.fullmatch(r"numba\.(?!extending$|types$)[\w.]+", name) for name in names):
                 found.add(path.name)
     assert found == {"private_numba.py"}

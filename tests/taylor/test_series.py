@@ -1,4 +1,5 @@
-"""The generated functions of one motion: every operation and function against power series composed in 40 digits.
+"""The generated functions of one motion: every operation and function against power series composed
+in 40 digits.
 
 A new elementary function is tested by itself, as the tests go through the table of rules.
 """
@@ -34,33 +35,45 @@ from saltus.taylor.tracing import trace
 
 def of_function(f):
     """An elementary function of the state, of the load, of both and of parameters alone."""
-    return lambda q, v, f_, a, b: f(2 + q) * f(1.5 + v * f_) - f(1.2 + 0.5 * f_) * q + f(a) + f(2 + f(b) * 0.1 * v)
+    return lambda q, v, f_, a, b: (
+        f(2 + q) * f(1.5 + v * f_) - f(1.2 + 0.5 * f_) * q + f(a) + f(2 + f(b) * 0.1 * v)
+    )
 
 
-# Each operation as a function of the coordinate q, the velocity v, the load f and the parameters a, b. Where a function has a
-# restricted domain its argument is kept inside it.
+# Each operation as a function of the coordinate q, the velocity v, the load f and the parameters a,
+# b. Where a function has a restricted domain its argument is kept inside it.
 OPERATIONS = {
     **{name: of_function(rule.numpy) for name, rule in FUNCTIONS.items()},
     "add": lambda q, v, f, a, b: q + v + f + a + 2,
     "subtract": lambda q, v, f, a, b: 3 - q - (v - f) - (a - q),
     "multiply": lambda q, v, f, a, b: q * v * f * a * 2.5,
-    "divide": lambda q, v, f, a, b: (q - 1) / (2 + v * v) / a / 1.7 + b / (3 + f) + 1 / (2 + q) + f / (2 - f),
+    "divide": lambda q, v, f, a, b: (
+        (q - 1) / (2 + v * v) / a / 1.7 + b / (3 + f) + 1 / (2 + q) + f / (2 - f)
+    ),
     "negative": lambda q, v, f, a, b: -q + +v + np.negative(f) + np.positive(q),
-    "numpy": lambda q, v, f, a, b: np.add(q, 1.5) * np.subtract(2, v) + np.divide(np.multiply(a, f), 3) + np.square(q + f),
+    "numpy": lambda q, v, f, a, b: (
+        np.add(q, 1.5) * np.subtract(2, v) + np.divide(np.multiply(a, f), 3) + np.square(q + f)
+    ),
     "whole power": lambda q, v, f, a, b: q**3 - v**2 + (q + 2) ** -2 + q**0 + v**1 + f**5,
     "high power": lambda q, v, f, a, b: (1 + 0.1 * q) ** 70 + (1.5 + q) ** -66 + q**19,
     "broken power": lambda q, v, f, a, b: (2 + q) ** 1.5 + (2 + v) ** -0.3 + (1.5 + f) ** 0.5,
-    "power of a parameter": lambda q, v, f, a, b: (2 + q) ** a + (2 + v) ** (a - b) + a**b + a ** (1 / 3),
+    "power of a parameter": lambda q, v, f, a, b: (
+        (2 + q) ** a + (2 + v) ** (a - b) + a**b + a ** (1 / 3)
+    ),
     "power of the state": lambda q, v, f, a, b: (2 + q) ** v + 2**q + a**f,
     "tan": lambda q, v, f, a, b: np.tan(q) + np.tan(0.5 * v + f) + np.tan(b),
-    "nested": lambda q, v, f, a, b: np.exp(np.sin(np.sqrt(2 + np.tanh(q * v)) / (2 + np.cos(f)))) - np.log(2 + np.sin(q) ** 2),
+    "nested": lambda q, v, f, a, b: (
+        np.exp(np.sin(np.sqrt(2 + np.tanh(q * v)) / (2 + np.cos(f)))) - np.log(2 + np.sin(q) ** 2)
+    ),
 }
 LOAD = Load(frequency=1.3, force=Harmonic(0.4, phase=0.7) + Harmonic(0.2, mean=0.1, order=3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Many(Model):
-    """x_i'' = operation i of x_i, x_i' and the load, all in one structure, as compiling it is what takes time."""
+    """x_i'' = operation i of x_i, x_i' and the load, all in one structure, as compiling it is what
+    takes time.
+    """
 
     a: float = 1.3
     b: float = 0.6
@@ -96,10 +109,17 @@ def force(t):
 
 
 def agrees(computed, expected, digits=14):
-    """Whether coefficients agree, relative to the largest at the radius at which the last one contributes as the first."""
-    radius = (np.abs(expected).max() / np.abs(expected[..., -3:]).max()) ** (1 / (expected.shape[-1] - 1))
+    """Whether coefficients agree, relative to the largest at the radius at which the last one
+    contributes as the first.
+    """
+    radius = (np.abs(expected).max() / np.abs(expected[..., -3:]).max()) ** (
+        1 / (expected.shape[-1] - 1)
+    )
     weight = radius ** np.arange(expected.shape[-1])
-    return np.abs((computed - expected) * weight).max() <= 10.0**-digits * expected.shape[-1] * np.abs(expected * weight).max()
+    return (
+        np.abs((computed - expected) * weight).max()
+        <= 10.0**-digits * expected.shape[-1] * np.abs(expected * weight).max()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -107,10 +127,15 @@ def many():
     return Generated(System(model=Many(), load=LOAD))
 
 
-@pytest.mark.parametrize(("x", "v", "t"), [(0.35, 0.55, 0.0), pytest.param(-0.45, -0.3, 2.1, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    ("x", "v", "t"), [(0.35, 0.55, 0.0), pytest.param(-0.45, -0.3, 2.1, marks=pytest.mark.thorough)]
+)
 def test_taylor_coefficients_of_each_operation_and_elementary_function(many, x, v, t):
     computed, rows = many.coefficients(t, x, v, 12), enumerate(OPERATIONS)
-    expected = {name: solution(lambda t, q, w, f=f: f(q, w, force(t), 1.3, 0.6), x, v, t, 12) for name, f in OPERATIONS.items()}
+    expected = {
+        name: solution(lambda t, q, w, f=f: f(q, w, force(t), 1.3, 0.6), x, v, t, 12)
+        for name, f in OPERATIONS.items()
+    }
     assert [name for row, name in rows if not agrees(computed[row], expected[name])] == []
 
 
@@ -118,7 +143,9 @@ def test_every_order_has_the_coefficients_below_it(many):
     q, v, a, _, _ = many.all(0.4, 0.3, -0.2, 21)
     assert np.allclose(v[:, :-1], q[:, 1:] * np.arange(1, 23), rtol=1e-15, atol=0.0)
     for order in range(21):
-        for part, whole, last in zip(many.all(0.4, 0.3, -0.2, order), (q, v, a), (order + 1, order + 1, order), strict=False):
+        for part, whole, last in zip(
+            many.all(0.4, 0.3, -0.2, order), (q, v, a), (order + 1, order + 1, order), strict=False
+        ):
             assert np.array_equal(part[:, : last + 1], whole[:, : last + 1])
             assert np.isnan(part[:, last + 1 :]).all()
 
@@ -127,14 +154,18 @@ def test_every_order_has_the_coefficients_below_it(many):
 def test_the_slope_of_each_elementary_function(name):
     rule = FUNCTIONS[name]
     for u in (0.3, 1.7):
-        assert rule.slope(u, rule.numpy(u)) == pytest.approx(float(mp.diff(getattr(mp, name), u)), rel=1e-14)
+        assert rule.slope(u, rule.numpy(u)) == pytest.approx(
+            float(mp.diff(getattr(mp, name), u)), rel=1e-14
+        )
         expression = rule.numpy(Expr("coordinate", (), 0))
         assert differentiate(expression, Expr("coordinate", (), 0)).degree is None
 
 
 @pytest.mark.parametrize("x", [0.35, -0.45])
 def test_taylor_coefficients_of_abs(x):
-    computed = Generated(System(model=TwoSided(), load=LOAD)).coefficients(2.1, x, -0.3, 10, side=math.copysign(1.0, x))[0]
+    computed = Generated(System(model=TwoSided(), load=LOAD)).coefficients(
+        2.1, x, -0.3, 10, side=math.copysign(1.0, x)
+    )[0]
     assert agrees(computed, solution(lambda t, q, w: with_abs(q, w, force(t)), x, -0.3, 2.1, 10))
 
 
@@ -154,13 +185,19 @@ ALL_CHANNELS = Load(
     ground_horizontal=Harmonic(0.2),
     ground_vertical=Harmonic(0.1, phase=0.3),
 )
-GROUND = Load(frequency=0.9, ground_horizontal=Harmonic(0.2), ground_vertical=Harmonic(0.1, phase=0.3))
+GROUND = Load(
+    frequency=0.9, ground_horizontal=Harmonic(0.2), ground_vertical=Harmonic(0.1, phase=0.3)
+)
 SYSTEMS = {
-    "metainterface": System(model=Metainterface(**LAYERS), load=ALL_CHANNELS, impact=EnergyRestitution(0.9)),
+    "metainterface": System(
+        model=Metainterface(**LAYERS), load=ALL_CHANNELS, impact=EnergyRestitution(0.9)
+    ),
     "smoothed": System(model=Metainterface(beta0=1.4, damping=0.1, smoothing=10.0), load=GROUND),
     "block": System(model=RockingBlock(alpha=0.3), load=GROUND, impact=InelasticImpact()),
     "wall": System(
-        model=WallOscillator(damping=0.1), load=Load(frequency=2.0, force=Harmonic(0.3)), impact=VelocityReduction(0.8)
+        model=WallOscillator(damping=0.1),
+        load=Load(frequency=2.0, force=Harmonic(0.3)),
+        impact=VelocityReduction(0.8),
     ),
 }
 
@@ -168,16 +205,27 @@ SYSTEMS = {
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("theta", [0.25, -0.4])
 def test_taylor_coefficients_of_the_models(name, theta):
-    system, side = SYSTEMS[name], math.copysign(1.0, theta) if len(SYSTEMS[name].model.sides) == 2 else 1.0
+    system, side = (
+        SYSTEMS[name],
+        math.copysign(1.0, theta) if len(SYSTEMS[name].model.sides) == 2 else 1.0,
+    )
     computed = Generated(system).coefficients(1.7, theta, -0.6, 10, side)[0]
-    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, side, system.load), theta, -0.6, 1.7, 10)
+    expected = solution(
+        lambda t, q, v: system.model.acceleration(t, q, v, side, system.load), theta, -0.6, 1.7, 10
+    )
     assert agrees(computed, expected)
 
 
 def test_taylor_coefficients_of_both_layers():
     system = System(model=TwoLayer(**LAYERS), load=ALL_CHANNELS)
     computed = Generated(system).coefficients(0.4, (0.3, -0.5), (0.7, 0.2), 10)
-    expected = solution(lambda t, q, v: system.model.acceleration(t, q, v, 1, system.load), (0.3, -0.5), (0.7, 0.2), 0.4, 10)
+    expected = solution(
+        lambda t, q, v: system.model.acceleration(t, q, v, 1, system.load),
+        (0.3, -0.5),
+        (0.7, 0.2),
+        0.4,
+        10,
+    )
     assert agrees(computed, expected)
 
 
@@ -190,8 +238,12 @@ def test_series_of_gap_and_margins_are_those_of_the_motion(side):
     state = [np.polynomial.polynomial.polyval(h, c[0, : order + 1]) for c in (q, v, a)]
     expected = system.model.margins(t + h, *state, side, system.load)
     for row, name in zip(margins, names, strict=True):
-        assert np.polynomial.polynomial.polyval(h, row[: order + 1]) == pytest.approx(expected[name], abs=1e-14)
-    assert np.polynomial.polynomial.polyval(h, gap[: order + 1]) == pytest.approx(side * state[0], abs=1e-15)
+        assert np.polynomial.polynomial.polyval(h, row[: order + 1]) == pytest.approx(
+            expected[name], abs=1e-14
+        )
+    assert np.polynomial.polynomial.polyval(h, gap[: order + 1]) == pytest.approx(
+        side * state[0], abs=1e-15
+    )
 
 
 @pytest.mark.parametrize("name", ["metainterface", "block", "wall"])
@@ -227,14 +279,18 @@ def test_text_depends_on_the_structure_alone():
 
 
 def test_equal_expressions_are_computed_once():
-    bare = System(model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5)))
+    bare = System(
+        model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5))
+    )
     series = text(bare).splitlines()[0]
     assert series.count("('sin',") == 2  # of the load's phase and of the layer's angle
     assert series.count("('cos',") == 2
 
 
 def test_terms_that_are_literally_zero_cost_nothing():
-    bare = System(model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5)))
+    bare = System(
+        model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5))
+    )
     assert len(text(bare)) < len(text(bare.with_({"load.vertical": -0.5})))
 
 

@@ -1,4 +1,6 @@
-"""Tracing a model: what is folded and shared, what is refused and how, and that numbers are never part of a structure."""
+"""Tracing a model: what is folded and shared, what is refused and how, and that numbers are never
+part of a structure.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,14 +12,33 @@ import pytest
 from saltus import OneContactModel
 from saltus.checks import LIMITS
 from saltus.errors import ParameterError, TraceError
-from saltus.systems import Harmonic, Load, Metainterface, Model, Record, System, VelocityReduction, WallOscillator
+from saltus.systems import (
+    Harmonic,
+    Load,
+    Metainterface,
+    Model,
+    Record,
+    System,
+    VelocityReduction,
+    WallOscillator,
+)
 from saltus.taylor import structure_key
-from saltus.taylor.graph import FRICTION, Expr, combine, differentiate, number, ordered, power, substitute
+from saltus.taylor.graph import (
+    FRICTION,
+    Expr,
+    combine,
+    differentiate,
+    number,
+    ordered,
+    power,
+    substitute,
+)
 from saltus.taylor.tracing import check_size, trace
 
 X, V, T, SIDE = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time"), Expr("side")
 ALLOWED = (
-    "allowed are + - * /, powers, NumPy's sqrt, exp, log, sin, cos, sinh, cosh, tanh, arctan, tan, and abs of the coordinate"
+    "allowed are + - * /, powers, NumPy's sqrt, exp, log, sin, cos, sinh, cosh, tanh, "
+    "arctan, tan, and abs of the coordinate"
 )
 
 
@@ -27,12 +48,17 @@ def traced(formula, load=None, sensitivities=None, **more):
     def acceleration(self, t, x, velocity, side, load):
         return formula(t, x, velocity, side, load)
 
-    attributes = {"coordinates": ("x",), "channels": ("force",), "acceleration": acceleration, **more}
+    attributes = {
+        "coordinates": ("x",),
+        "channels": ("force",),
+        "acceleration": acceleration,
+        **more,
+    }
     model = type("Small", (OneContactModel if "sides" in more else Model,), attributes)()
     return trace(System(model=model, load=load or Load(force=1.0)), sensitivities=sensitivities)
 
 
-# --- the graph -----------------------------------------------------------------------------------------------------------
+# --- the graph ---------------------------------------------------------------
 
 
 def test_literals_are_folded():
@@ -66,9 +92,9 @@ def test_operands_come_before_what_uses_them():
 
 def test_degree_in_the_time_is_known_where_it_ends():
     p = Expr("parameter", (), 0)
-    assert [e.degree for e in (p, np.sin(p), T, T * T + p, T * T / p, np.sin(T), T / (1 + T), X, T**3)] == [
-        *(0, 0, 1, 2, 2, None, None, None, 3)
-    ]
+    assert [
+        e.degree for e in (p, np.sin(p), T, T * T + p, T * T / p, np.sin(T), T / (1 + T), X, T**3)
+    ] == [*(0, 0, 1, 2, 2, None, None, None, 3)]
 
 
 @pytest.mark.parametrize(
@@ -95,7 +121,7 @@ def test_power_of_a_variable_exponent_is_an_exponential():
     assert power(X, Expr("parameter", (), 0)).op == "pow"
 
 
-# --- refusals ------------------------------------------------------------------------------------------------------------
+# --- refusals ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -113,18 +139,33 @@ def test_power_of_a_variable_exponent_is_an_exponential():
         (lambda t, x, v, s, load: np.clip(x, 0, 1), "np.clip cannot be traced"),
         (lambda t, x, v, s, load: np.dot(x, v), "np.dot cannot be traced"),
         (lambda t, x, v, s, load: np.add.reduce(x), "np.add cannot be traced"),
-        (lambda t, x, v, s, load: -x if x > 0 else x, "may not branch on its state or parameters (if, and, or, min, max)"),
-        (lambda t, x, v, s, load: min(x, 0.0), "may not branch on its state or parameters (if, and, or, min, max)"),
+        (
+            lambda t, x, v, s, load: -x if x > 0 else x,
+            "may not branch on its state or parameters (if, and, or, min, max)",
+        ),
+        (
+            lambda t, x, v, s, load: min(x, 0.0),
+            "may not branch on its state or parameters (if, and, or, min, max)",
+        ),
         (lambda t, x, v, s, load: max(x * x, x), "use `side`"),
         (lambda t, x, v, s, load: x > 0 and v, "may not branch"),
         (lambda t, x, v, s, load: x % 1, "%, //, @ and round cannot be traced; " + ALLOWED),
         (lambda t, x, v, s, load: 1 // x, "%, //, @ and round cannot be traced"),
         (lambda t, x, v, s, load: round(x), "%, //, @ and round cannot be traced"),
-        (lambda t, x, v, s, load: abs(v), "abs of an expression that is not a coordinate cannot be traced; " + FRICTION),
+        (
+            lambda t, x, v, s, load: abs(v),
+            "abs of an expression that is not a coordinate cannot be traced; " + FRICTION,
+        ),
         (lambda t, x, v, s, load: -np.sign(v), "np.sign cannot be traced; " + FRICTION),
         (lambda t, x, v, s, load: -1.0 if v > x else 1.0, "(if, and, or, min, max); " + FRICTION),
-        (lambda t, x, v, s, load: np.abs(2 * x), "abs of an expression that is not a coordinate cannot be traced"),
-        (lambda t, x, v, s, load: abs(x), "abs of the coordinate can be traced only where the gap is side"),
+        (
+            lambda t, x, v, s, load: np.abs(2 * x),
+            "abs of an expression that is not a coordinate cannot be traced",
+        ),
+        (
+            lambda t, x, v, s, load: abs(x),
+            "abs of the coordinate can be traced only where the gap is side",
+        ),
         (lambda t, x, v, s, load: sum(x), "a scalar: it cannot be unpacked or looped ove"),
         (lambda t, x, v, s, load: x.sin(), "a traced quantity has no 'sin'; " + ALLOWED),
         (lambda t, x, v, s, load: x.real, "a traced quantity has no 'real'"),
@@ -169,7 +210,10 @@ def test_what_has_no_taylor_series_is_refused_by_name(formula, sentence):
     ],
 )
 def test_time_outside_the_load_is_refused(formula):
-    with pytest.raises(TraceError, match=r"the time may only be handed to a load channel, such as load.horizontal\(t\)"):
+    with pytest.raises(
+        TraceError,
+        match=r"the time may only be handed to a load channel, such as load.horizontal\(t\)",
+    ):
         traced(formula, Load(frequency=1.0, force=Harmonic(1.0)))
 
 
@@ -210,7 +254,14 @@ def test_abs_in_a_margin_is_refused_alike():
         return {"far": 3.0 - abs(x)}
 
     model = type(
-        "Small", (Model,), {"coordinates": ("x",), "sides": (), "acceleration": lambda self, *_: -1.0, "margins": margins}
+        "Small",
+        (Model,),
+        {
+            "coordinates": ("x",),
+            "sides": (),
+            "acceleration": lambda self, *_: -1.0,
+            "margins": margins,
+        },
     )
     with pytest.raises(TraceError, match="abs of the coordinate can be traced only where the gap"):
         trace(System(model=model()), ("far",))
@@ -222,13 +273,22 @@ def test_gap_of_velocity_or_time_is_refused():
         def gap(self, x, side, more=more):
             return side * x + (more if isinstance(x, Expr) else 0.0)
 
-        with pytest.raises(TraceError, match=r"Small.gap may depend on the coordinate, the side and the parameters only"):
+        with pytest.raises(
+            TraceError,
+            match=r"Small.gap may depend on the coordinate, the side and the parameters only",
+        ):
             traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=gap)
 
 
 def test_comparison_in_a_gap_is_refused():
-    with pytest.raises(TraceError, match="Small uses maximum in an acceleration, a gap or a margin"):
-        traced(lambda t, x, v, s, load: -x, sides=(1, -1), gap=lambda self, x, side: np.maximum(side * x, 0.0))
+    with pytest.raises(
+        TraceError, match="Small uses maximum in an acceleration, a gap or a margin"
+    ):
+        traced(
+            lambda t, x, v, s, load: -x,
+            sides=(1, -1),
+            gap=lambda self, x, side: np.maximum(side * x, 0.0),
+        )
 
 
 def nested(count):
@@ -247,16 +307,24 @@ def nested(count):
     [
         (
             nested(3000),
-            "have 3003 operations, 3000 of them functions, products and quotients, .* take about 25 minutes to compile",
+            (
+                "have 3003 operations, 3000 of them functions, products and quotients, .* take about "
+                "25 minutes to compile"
+            ),
         ),
-        (lambda t, x, *_: sum(np.sin(i * x) for i in range(20_000)), "19999 of them functions, .* about 1.1e.03 minutes"),
+        (
+            lambda t, x, *_: sum(np.sin(i * x) for i in range(20_000)),
+            "19999 of them functions, .* about 1.1e.03 minutes",
+        ),
         (
             lambda t, x, *_: sum(x / (i + 2.0) for i in range(40_000)),
             "have 120000 operations, 0 of them functions, .* about 1.4 minutes",
         ),
     ],
 )
-def test_equations_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(formula, sentence):
+def test_equations_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(
+    formula, sentence
+):
     with pytest.raises(TraceError, match=sentence):
         traced(formula)
 
@@ -266,9 +334,15 @@ def test_equations_that_are_compiled_within_minutes_are_not_refused():
 
 
 def test_derivatives_that_would_be_compiled_for_minutes_are_refused_with_the_estimate(monkeypatch):
-    """The columns of sin(sin(... x)) share one chain of products of cosines: three loops for each sine, and one more."""
+    """The columns of sin(sin(...
+
+    x)) share one chain of products of cosines: three loops for each sine, and one more.
+    """
     monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, compiling=1.0))
-    sentence = "Small with 2 columns of derivatives .* 1801 of them .* about 1.3 minutes to compile; what takes more than 1 is"
+    sentence = (
+        "Small with 2 columns of derivatives .* 1801 of them .* about 1.3 minutes to "
+        "compile; what takes more than 1 is"
+    )
     with pytest.raises(TraceError, match=sentence):
         traced(nested(600), sensitivities=())
     traced(nested(500), sensitivities=())
@@ -278,17 +352,25 @@ def test_lanes_take_three_times_as_long_to_compile(monkeypatch):
     monkeypatch.setattr("saltus.taylor.graph.LIMITS", replace(LIMITS, compiling=2.0))
     small, large = traced(nested(400)), traced(nested(600))
     check_size(small, lanes=True)
-    with pytest.raises(TraceError, match="about 3 minutes to compile for an ensemble; what takes more than 2 is refused"):
+    with pytest.raises(
+        TraceError,
+        match="about 3 minutes to compile for an ensemble; what takes more than 2 is refused",
+    ):
         check_size(large, lanes=True)
 
 
 def test_misspelt_channel_is_refused_with_the_near_ones():
-    with pytest.raises(TraceError, match=r"Small reads load.forse, not one of its channels; did you mean 'force'"):
+    with pytest.raises(
+        TraceError, match=r"Small reads load.forse, not one of its channels; did you mean 'force'"
+    ):
         traced(lambda t, x, v, s, load: load.forse(t) - x)
 
 
 def test_channel_that_is_not_called_is_refused():
-    with pytest.raises(TraceError, match=r"cannot use a load channel .call it with the time, as in load.horizontal.t.."):
+    with pytest.raises(
+        TraceError,
+        match=r"cannot use a load channel .call it with the time, as in load.horizontal.t..",
+    ):
         traced(lambda t, x, v, s, load: load.force * x)
 
 
@@ -300,41 +382,67 @@ def test_what_cannot_be_told_apart_is_refused_in_a_model():
         def acceleration(self, t, theta, velocity, side, load):
             return -self.factors[0] * theta
 
-    with pytest.raises(ParameterError, match=r"a model cannot keep a list, got \[1.0\]; give it numbers, an array or a tuple"):
+    with pytest.raises(
+        ParameterError,
+        match=r"a model cannot keep a list, got \[1.0\]; give it numbers, an array or a tuple",
+    ):
         structure_key(System(model=Listed([1.0])))
 
 
 def test_dry_friction_is_refused_as_friction():
-    with pytest.raises(TraceError, match=r"Small uses greater in an acceleration, a gap or a margin; a force that jumps"):
+    with pytest.raises(
+        TraceError,
+        match=r"Small uses greater in an acceleration, a gap or a margin; a force that jumps",
+    ):
         traced(lambda t, x, v, s, load: np.where(v > 0, -1.0, 1.0) - x, sides=(1, -1))
 
 
 def test_wrong_number_of_accelerations_is_refused():
     for result in ((1.0,), (1.0, 2.0, 3.0), 1.0, X):
-        with pytest.raises(ParameterError, match=r"Small.acceleration must return 2 value\(s\), got "):
+        with pytest.raises(
+            ParameterError, match=r"Small.acceleration must return 2 value\(s\), got "
+        ):
             traced(lambda t, x, v, s, load, result=result: result, coordinates=("x", "y"))
     with pytest.raises(ParameterError, match=r"Small.acceleration must return 1 value\(s\), got "):
         traced(lambda t, x, v, s, load: (x, v))
 
 
 def test_sides_with_two_coordinates_are_refused():
-    with pytest.raises(ParameterError, match="Small has one contact and the coordinates x, y, which must be one"):
+    with pytest.raises(
+        ParameterError, match="Small has one contact and the coordinates x, y, which must be one"
+    ):
         traced(lambda t, x, v, s, load: (x[0], x[1]), coordinates=("x", "y"), sides=(1, -1))
 
 
 def test_unknown_margin_is_answered_with_the_near_ones():
-    with pytest.raises(ParameterError, match="Metainterface has no margin 'line_limits' to stop at; did you mean 'line_limit'"):
+    with pytest.raises(
+        ParameterError,
+        match="Metainterface has no margin 'line_limits' to stop at; did you mean 'line_limit'",
+    ):
         trace(System(model=Metainterface(beta0=1.4)), ("line_limits",))
 
 
-# --- structures ----------------------------------------------------------------------------------------------------------
+# --- structures --------------------------------------------------------------
 
-BASE = System(model=Metainterface(beta0=1.4), load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5))
+BASE = System(
+    model=Metainterface(beta0=1.4),
+    load=Load(frequency=1.0, horizontal=Harmonic(0.5), vertical=-0.5),
+)
 
 
 def test_numbers_are_not_part_of_the_structure():
-    changes: dict[str, Any] = {"model.beta0": 1.2, "model.damping": 0, "load.frequency": 3, "load.horizontal.amplitude": 0.0}
-    changes |= {"load.horizontal.order": 4, "load.vertical": 0, "impact.e": 0, "model.mass_ratio": 2}
+    changes: dict[str, Any] = {
+        "model.beta0": 1.2,
+        "model.damping": 0,
+        "load.frequency": 3,
+        "load.horizontal.amplitude": 0.0,
+    }
+    changes |= {
+        "load.horizontal.order": 4,
+        "load.vertical": 0,
+        "impact.e": 0,
+        "model.mass_ratio": 2,
+    }
     for path, value in changes.items():
         assert structure_key(BASE.with_({path: value})) == structure_key(BASE), path
 
@@ -347,7 +455,9 @@ def test_whole_numbers_are_numbers():
         def acceleration(self, t, theta, velocity, side, load):
             return -self.stiffness * theta
 
-    assert structure_key(System(model=Spring(stiffness=2))) == structure_key(System(model=Spring(stiffness=2.5)))
+    assert structure_key(System(model=Spring(stiffness=2))) == structure_key(
+        System(model=Spring(stiffness=2.5))
+    )
 
 
 def test_whatever_changes_the_expressions_is_part_of_the_structure():
@@ -369,12 +479,16 @@ def test_whatever_changes_the_expressions_is_part_of_the_structure():
 def test_samples_of_a_record_are_numbers_and_its_source_does_not_matter():
     a = Load(force=Record([0.0, 1.0], [0.0, 1.0], source="a.csv"))
     b = Load(force=Record(np.linspace(0, 3, 9), np.ones(9), scale=2.0, source="b.csv"))
-    assert structure_key(System(model=WallOscillator(), load=a)) == structure_key(System(model=WallOscillator(), load=b))
+    assert structure_key(System(model=WallOscillator(), load=a)) == structure_key(
+        System(model=WallOscillator(), load=b)
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tabulated(Model):
-    """A model whose formula depends on an array and a switch: those are read while tracing, so they are its structure."""
+    """A model whose formula depends on an array and a switch: those are read while tracing, so they
+    are its structure.
+    """
 
     factors: np.ndarray
     cubic: bool = False
@@ -385,7 +499,11 @@ class Tabulated(Model):
 
 
 def test_arrays_and_switches_of_a_model_are_part_of_its_structure():
-    models = [Tabulated(factors=np.array(f), cubic=c) for f in ([1.0], [2.0], [1.0, 2.0]) for c in (False, True)]
+    models = [
+        Tabulated(factors=np.array(f), cubic=c)
+        for f in ([1.0], [2.0], [1.0, 2.0])
+        for c in (False, True)
+    ]
     assert len({structure_key(System(model=m)) for m in models}) == 6
     again = Tabulated(factors=np.array([2.0]))
     assert structure_key(System(model=again)) == structure_key(System(model=models[2]))

@@ -1,4 +1,6 @@
-"""Linearised equilibria and the divergence conditions, against SymPy and motions of the linearised equation."""
+"""Linearised equilibria and the divergence conditions, against SymPy and motions of the linearised
+equation.
+"""
 
 import math
 
@@ -24,8 +26,15 @@ def test_linear_equilibria_solve_the_first_order_expansion():
     slope = sp.series(k * x - v * sp.cos(b + x), x, 0, 2).removeO()
     root = sp.solve(slope, x)[0]
     energy = sp.integrate(slope, (x, 0, root))
-    for degrees, vertical, ratio in [(85, -1.7, 1.3), (85, -1.7, 0.4), (100, -0.8, 0.5), (70, 0.4, 2.0)]:
-        found = {e.theta: e for e in linear_equilibria(cell(degrees, vertical, ratio)) if e.theta != 0}
+    for degrees, vertical, ratio in [
+        (85, -1.7, 1.3),
+        (85, -1.7, 0.4),
+        (100, -0.8, 0.5),
+        (70, 0.4, 2.0),
+    ]:
+        found = {
+            e.theta: e for e in linear_equilibria(cell(degrees, vertical, ratio)) if e.theta != 0
+        }
         for side, stiffness in ((1, ratio), (-1, 1.0)):
             values = {b: math.radians(degrees), k: stiffness, v: vertical}
             theta = side * float(root.subs(values))
@@ -38,17 +47,25 @@ def test_linear_equilibria_solve_the_first_order_expansion():
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.floats(30, 150).filter(lambda d: abs(d - 90) > 1), st.floats(-3, 3).filter(lambda v: abs(v) > 1e-6), st.floats(0.2, 4))
+@given(
+    st.floats(30, 150).filter(lambda d: abs(d - 90) > 1),
+    st.floats(-3, 3).filter(lambda v: abs(v) > 1e-6),
+    st.floats(0.2, 4),
+)
 def test_deformed_states_are_unstable_where_the_undeformed_one_is_stable(degrees, vertical, k):
     system = cell(degrees, vertical, k)
     deformed = [e for e in linear_equilibria(system) if e.theta != 0]
-    assert all(e.stable != undeformed_stability(system).value.startswith("stable") for e in deformed)
+    assert all(
+        e.stable != undeformed_stability(system).value.startswith("stable") for e in deformed
+    )
     if undeformed_stability(system).value == "stable":
         assert all(e.energy > 0 for e in deformed)
 
 
 def test_erratum_15_both_equilibria_need_the_greater_stiffness():
-    """Between -max(1, k)/sin(beta0) and -min(1, k)/sin(beta0), which the paper's `minmin` admits, only one of them exists."""
+    """Between -max(1, k)/sin(beta0) and -min(1, k)/sin(beta0), which the paper's `minmin` admits,
+    only one of them exists.
+    """
     for k in (0.6, 1.8):
         sine = math.sin(math.radians(88))
         between, below = -(1 + k) / 2 / sine, -(max(1, k) + 0.1) / sine
@@ -71,7 +88,10 @@ def test_linear_equilibria_tend_to_the_full_ones_as_beta0_tends_to_the_right_ang
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.05)
 
 
-@pytest.mark.parametrize(("vertical", "k", "h"), [(-1.5, 1.0, 0.0), (-1.5, 0.6, 0.0), (-1.5, 1.2, 0.02), (-1.2, 1.3, 0.0)])
+@pytest.mark.parametrize(
+    ("vertical", "k", "h"),
+    [(-1.5, 1.0, 0.0), (-1.5, 0.6, 0.0), (-1.5, 1.2, 0.02), (-1.2, 1.3, 0.0)],
+)
 def test_motions_diverge_just_beyond_the_thresholds(by_scipy, vertical, k, h):
     system = cell(86, vertical, k, horizontal=h)
     limits = divergence(system)
@@ -79,8 +99,12 @@ def test_motions_diverge_just_beyond_the_thresholds(by_scipy, vertical, k, h):
     acceleration = linear_acceleration(system)
     assert (limits.above is None) == (k > -vertical * math.sin(math.radians(86)))
     for threshold in filter(None, (limits.above, limits.below)):
-        inside = by_scipy(system, 0.999 * threshold, impacts=1, until=60.0, acceleration=acceleration)
-        beyond = by_scipy(system, 1.001 * threshold, impacts=1, until=30.0, acceleration=acceleration)
+        inside = by_scipy(
+            system, 0.999 * threshold, impacts=1, until=60.0, acceleration=acceleration
+        )
+        beyond = by_scipy(
+            system, 1.001 * threshold, impacts=1, until=30.0, acceleration=acceleration
+        )
         assert len(inside.before) == 1
         assert beyond.before == []
         assert abs(beyond.state[0]) > 10 * abs(threshold)
@@ -93,7 +117,9 @@ def test_divergence_from_the_undeformed_state():
     assert divergence(cell(80, -0.5)) == divergence(cell(100, 0.5))
 
 
-@pytest.mark.parametrize(("vertical", "above", "below"), [(-0.9, 0.0, None), (-1.1, 0.0, 0.0), (-0.5, None, None)])
+@pytest.mark.parametrize(
+    ("vertical", "above", "below"), [(-0.9, 0.0, None), (-1.1, 0.0, 0.0), (-0.5, None, None)]
+)
 def test_upright_cell_diverges_below_minus_k_and_minus_one(vertical, above, below):
     limits = divergence(cell(90, vertical, 0.8))
     assert (limits.above, limits.below) == (above, below)

@@ -1,4 +1,6 @@
-"""All equilibria and their stability, against dense scans, mpmath, numerical Jacobians and SciPy motions."""
+"""All equilibria and their stability, against dense scans, mpmath, numerical Jacobians and SciPy
+motions.
+"""
 
 import math
 
@@ -9,14 +11,24 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from saltus.systems import Load, Metainterface, System
-from saltus.theory import Stability, equilibria, fold_curve, potential_energy, potential_slope, undeformed_stability
+from saltus.theory import (
+    Stability,
+    equilibria,
+    fold_curve,
+    potential_energy,
+    potential_slope,
+    undeformed_stability,
+)
 
 BETA = math.radians(80)
 V_PORTRAITS = -1.5 / math.sin(BETA)
 
 
 def portrait(k=1.0, damping=0.0):
-    return System(model=Metainterface(beta0=BETA, stiffness_ratio=k, damping=damping), load=Load(vertical=V_PORTRAITS))
+    return System(
+        model=Metainterface(beta0=BETA, stiffness_ratio=k, damping=damping),
+        load=Load(vertical=V_PORTRAITS),
+    )
 
 
 @pytest.mark.parametrize(("k", "paper"), [(1.0, 1.46272), (0.5, 2.40575), (1.1, 1.13346)])
@@ -37,13 +49,23 @@ def test_erratum_09_the_printed_angle_belongs_to_another_stiffness():
 
 def test_three_stable_states_between_two_saddles():
     five = equilibria(portrait())
-    assert [e.stability.value for e in five] == ["stable", "unstable", "stable", "unstable", "stable"]
+    assert [e.stability.value for e in five] == [
+        "stable",
+        "unstable",
+        "stable",
+        "unstable",
+        "stable",
+    ]
     assert [e.theta for e in five] == pytest.approx([-e.theta for e in five][::-1])
-    assert [e.energy for e in five] == pytest.approx([float(potential_energy(portrait(), e.theta)) for e in five])
+    assert [e.energy for e in five] == pytest.approx(
+        [float(potential_energy(portrait(), e.theta)) for e in five]
+    )
 
 
 def test_soft_lower_layer_rests_beyond_the_straight_line():
-    """Errata 19: for beta0 = 80 deg the line is at 100 deg; theta_I = 137.8 deg of k = 0.5 lies beyond it."""
+    """Errata 19: for beta0 = 80 deg the line is at 100 deg; theta_I = 137.8 deg of k = 0.5 lies
+    beyond it.
+    """
     assert [e.within_line for e in equilibria(portrait(0.5))] == [True, True, True, True, False]
 
 
@@ -73,16 +95,27 @@ def test_no_equilibrium_is_missed(beta0, k, h, v, h1, v1):
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.floats(0.3, 2.8), st.floats(0.3, 3), st.floats(0, 2), st.floats(0.01, 3), st.floats(0, 2), forces, forces)
+@given(
+    st.floats(0.3, 2.8),
+    st.floats(0.3, 3),
+    st.floats(0, 2),
+    st.floats(0.01, 3),
+    st.floats(0, 2),
+    forces,
+    forces,
+)
 def test_eigenvalues_are_those_of_the_numerical_jacobian(beta0, k, m, damping, c, h, v):
-    model = Metainterface(beta0=beta0, stiffness_ratio=k, mass_ratio=m, damping=damping, dissipation_ratio=c)
+    model = Metainterface(
+        beta0=beta0, stiffness_ratio=k, mass_ratio=m, damping=damping, dissipation_ratio=c
+    )
     system = System(model=model, load=Load(horizontal=h, vertical=v))
     for e in equilibria(system):
         if e.theta == 0 or abs(e.curvature) < 1e-3:
             continue
         side, d = math.copysign(1, e.theta), 1e-6
         by_theta = (
-            model.acceleration(0, e.theta + d, 0, side, system.load) - model.acceleration(0, e.theta - d, 0, side, system.load)
+            model.acceleration(0, e.theta + d, 0, side, system.load)
+            - model.acceleration(0, e.theta - d, 0, side, system.load)
         ) / (2 * d)
         by_velocity = model.acceleration(0, e.theta, 1.0, side, system.load) - model.acceleration(
             0, e.theta, 0, side, system.load
@@ -98,15 +131,22 @@ def test_eigenvalues_are_those_of_the_numerical_jacobian(beta0, k, m, damping, c
     ("degrees", "vertical", "expected"),
     [(80, -0.5, "stable"), (80, 0.5, "unstable"), (100, 0.5, "stable"), (100, -0.5, "unstable")],
 )
-def test_undeformed_state_is_stable_for_v_cos_beta0_below_zero(by_scipy, degrees, vertical, expected):
-    system = System(model=Metainterface(beta0=math.radians(degrees), damping=0.1), load=Load(vertical=vertical))
+def test_undeformed_state_is_stable_for_v_cos_beta0_below_zero(
+    by_scipy, degrees, vertical, expected
+):
+    system = System(
+        model=Metainterface(beta0=math.radians(degrees), damping=0.1), load=Load(vertical=vertical)
+    )
     assert undeformed_stability(system) is Stability(expected)
     peaks = by_scipy(system, 1e-4, until=3.0).peaks
     if expected == "stable":
         assert len(peaks) > 10
         assert abs(peaks[-1]) < 0.99e-4
     else:
-        assert max((abs(p) for p in peaks), default=abs(by_scipy(system, 1e-4, until=3.0).state[0])) > 0.01
+        assert (
+            max((abs(p) for p in peaks), default=abs(by_scipy(system, 1e-4, until=3.0).state[0]))
+            > 0.01
+        )
 
 
 def test_undeformed_state_is_none_where_the_load_opens_one_layer():
@@ -118,7 +158,8 @@ def test_undeformed_state_is_none_where_the_load_opens_one_layer():
 
 
 @pytest.mark.parametrize(
-    ("vertical", "expected"), [(-0.9, Stability.STABLE), (-1.1, Stability.UNSTABLE), (0.0, Stability.STABLE)]
+    ("vertical", "expected"),
+    [(-0.9, Stability.STABLE), (-1.1, Stability.UNSTABLE), (0.0, Stability.STABLE)],
 )
 def test_upright_cell_buckles_at_v_equal_to_minus_one(vertical, expected):
     system = System(model=Metainterface(beta0=math.pi / 2), load=Load(vertical=vertical))
@@ -132,7 +173,9 @@ def test_upright_cell_buckles_at_v_equal_to_minus_one(vertical, expected):
 
 
 def test_undeformed_state_with_the_lower_layer_alone_past_buckling_is_unstable():
-    system = System(model=Metainterface(beta0=math.pi / 2, stiffness_ratio=0.5), load=Load(vertical=-0.7))
+    system = System(
+        model=Metainterface(beta0=math.pi / 2, stiffness_ratio=0.5), load=Load(vertical=-0.7)
+    )
     assert undeformed_stability(system) is Stability.UNSTABLE
     assert [e.theta > 0 for e in equilibria(system) if e.theta != 0] == [True]
 
@@ -151,4 +194,8 @@ def test_two_equilibria_meet_in_a_fold(opening):
     assert [e.theta for e in pair] == pytest.approx([opening, opening], abs=1e-3)
     at = near(0.0)
     assert all(e.theta == pytest.approx(opening, abs=1e-6) for e in at)
-    assert [e.stability for e in at] in ([Stability.FOLD], [Stability.UNSTABLE, Stability.STABLE], [])
+    assert [e.stability for e in at] in (
+        [Stability.FOLD],
+        [Stability.UNSTABLE, Stability.STABLE],
+        [],
+    )

@@ -1,4 +1,6 @@
-"""Closed forms refuse what has no meaning in one sentence with the argument's name, and never give a number for it."""
+"""Closed forms refuse what has no meaning in one sentence with the argument's name, and never give
+a number for it.
+"""
 
 import math
 
@@ -41,9 +43,15 @@ NAN = math.nan
         (lambda: theory.linear_period(NAN, beta0=1.3, vertical=-0.5), "theta0"),
         (lambda: theory.rocking_period(NAN, alpha=0.3), "theta0"),
         (lambda: theory.rocking_energy_jump(NAN, alpha=0.3, e=0.5), "velocity"),
-        (lambda: theory.rocking_energy_decreases(1.0, alpha=0.3, e=0.5, ground_velocity=NAN), "ground_velocity"),
+        (
+            lambda: theory.rocking_energy_decreases(1.0, alpha=0.3, e=0.5, ground_velocity=NAN),
+            "ground_velocity",
+        ),
         (lambda: theory.unloaded_peak_ratio(NAN), "stiffness_ratio"),
-        (lambda: theory.unloaded_period([[1.0, 2.0], [3.0, 4.0]], [1.0, 2.0, 3.0]), "stiffness_ratio"),
+        (
+            lambda: theory.unloaded_period([[1.0, 2.0], [3.0, 4.0]], [1.0, 2.0, 3.0]),
+            "stiffness_ratio",
+        ),
         (lambda: theory.unloaded_peak_ratio(np.broadcast_to(1.0, 10**12)), "stiffness_ratio"),
         (lambda: theory.unloaded_peak_ratio(range(10**9)), "stiffness_ratio"),
         (lambda: theory.unloaded_period(10**400), "stiffness_ratio"),
@@ -63,7 +71,8 @@ def test_it_is_refused_by_its_name(call, argument):
 
 def test_a_small_integer_does_not_wrap_around():
     assert theory.reciprocal(CELL, np.uint8(3))[1] == -3.0
-    assert theory.unloaded_period(np.uint8(4)) == pytest.approx(math.pi / 2 + math.pi)  # sqrt(1 / k) and 1 half periods
+    # sqrt(1 / k) and 1 half periods
+    assert theory.unloaded_period(np.uint8(4)) == pytest.approx(math.pi / 2 + math.pi)
 
 
 def test_unequal_masses_may_bring_the_factor_of_the_velocity_above_1():

@@ -1,4 +1,6 @@
-"""The piecewise-linear motion impact by impact, against the paper's formula in 40 digits and SciPy with restarts."""
+"""The piecewise-linear motion impact by impact, against the paper's formula in 40 digits and SciPy
+with restarts.
+"""
 
 import math
 
@@ -17,16 +19,27 @@ from saltus.theory import linear_motion
 def cell(degrees=80, vertical=-0.5, e=1.0, law=None, h=0.0, **model):
     impact = law or VelocityReduction(e)
     return System(
-        model=Metainterface(beta0=math.radians(degrees), **model), load=Load(vertical=vertical, horizontal=h), impact=impact
+        model=Metainterface(beta0=math.radians(degrees), **model),
+        load=Load(vertical=vertical, horizontal=h),
+        impact=impact,
     )
 
 
 def paper_solution(system, theta0, impacts):
-    """`linsol_theta1` as printed, its constants A_i, B_i fitted at each impact and its zeros found in 40 digits."""
+    """`linsol_theta1` as printed, its constants A_i, B_i fitted at each impact and its zeros found
+    in 40 digits.
+    """
     model = system.model
     with mp.workdps(40):
         b, v, k, m, damping = (
-            mp.mpf(x) for x in (model.beta0, system.load.vertical(0), model.stiffness_ratio, model.mass_ratio, model.damping)
+            mp.mpf(x)
+            for x in (
+                model.beta0,
+                system.load.vertical(0),
+                model.stiffness_ratio,
+                model.mass_ratio,
+                model.damping,
+            )
         )
         start, position, velocity, times = mp.mpf(0), mp.mpf(theta0), mp.mpf(0), []
         sign0 = 1 if theta0 > 0 else -1
@@ -40,7 +53,10 @@ def paper_solution(system, theta0, impacts):
             matrix = mp.matrix(
                 [
                     [decay * cosine, decay * sine],
-                    [decay * (-mu * omega * cosine - w * sine), decay * (-mu * omega * sine + w * cosine)],
+                    [
+                        decay * (-mu * omega * cosine - w * sine),
+                        decay * (-mu * omega * sine + w * cosine),
+                    ],
                 ]
             )
             a_i, b_i = mp.lu_solve(matrix, mp.matrix([position - rest, velocity]))
@@ -61,11 +77,17 @@ def paper_solution(system, theta0, impacts):
 @pytest.mark.parametrize("theta0", [0.3, pytest.param(-0.3, marks=pytest.mark.thorough), 1e-4])
 @pytest.mark.parametrize(
     "system",
-    [cell(), cell(e=0.8, damping=0.1), cell(60, -0.9, 0.9, damping=0.3, stiffness_ratio=2.0, mass_ratio=0.5)],
+    [
+        cell(),
+        cell(e=0.8, damping=0.1),
+        cell(60, -0.9, 0.9, damping=0.3, stiffness_ratio=2.0, mass_ratio=0.5),
+    ],
     ids=["conservative", "lossy", "unequal"],
 )
 def test_impacts_are_the_zeros_of_the_printed_solution(system, theta0):
-    """`linsol_theta1` has c^P = 1; every impact to a few units in the last place of the 40-digit ones."""
+    """`linsol_theta1` has c^P = 1; every impact to a few units in the last place of the 40-digit
+    ones.
+    """
     motion = linear_motion(system, theta0, 12)
     times, last = paper_solution(system, theta0, 12)
     np.testing.assert_allclose(motion.impact_times, times, rtol=2e-14)
@@ -85,10 +107,21 @@ def test_impacts_are_the_zeros_of_the_printed_solution(system, theta0):
     st.sampled_from([1, -1]),
     st.floats(-0.5, 0.5),
 )
-def test_agrees_with_scipy_for_random_layers(degrees, load, e, damping, c, k, m, theta0, sign, share):
+def test_agrees_with_scipy_for_random_layers(
+    degrees, load, e, damping, c, k, m, theta0, sign, share
+):
     vertical = -load * 0.5 * math.copysign(1, math.cos(math.radians(degrees)))
     h = 0.5 * share * abs(vertical / math.tan(math.radians(degrees)))
-    system = cell(degrees, vertical, e, h=h, damping=damping, dissipation_ratio=c, stiffness_ratio=k, mass_ratio=m)
+    system = cell(
+        degrees,
+        vertical,
+        e,
+        h=h,
+        damping=damping,
+        dissipation_ratio=c,
+        stiffness_ratio=k,
+        mass_ratio=m,
+    )
     mine = linear_motion(system, sign * theta0, 5)
     scipy = integrate(system, sign * theta0, impacts=5, acceleration=linear_acceleration(system))
     np.testing.assert_allclose(mine.impact_times, scipy.impact_times, rtol=1e-9)
@@ -116,12 +149,16 @@ def test_solves_its_equation_between_impacts():
         d = 1e-4
         (left, here, right), (_, velocity, _) = motion(np.array([t - d, t, t + d]))
         side = 1 if here > 0 else -1
-        assert (left - 2 * here + right) / d**2 == pytest.approx(linear_acceleration(system)(t, here, velocity, side), abs=1e-6)
+        assert (left - 2 * here + right) / d**2 == pytest.approx(
+            linear_acceleration(system)(t, here, velocity, side), abs=1e-6
+        )
 
 
 def test_energy_restitution_runs_through_the_same_law():
     motion = linear_motion(cell(law=EnergyRestitution(1.0), mass_ratio=3.0), 0.2, 4)
-    np.testing.assert_allclose(motion.velocity_after / motion.velocity_before, [2.0, 0.5, 2.0, 0.5], rtol=1e-13)
+    np.testing.assert_allclose(
+        motion.velocity_after / motion.velocity_before, [2.0, 0.5, 2.0, 0.5], rtol=1e-13
+    )
 
 
 def test_ends_where_a_layer_stays_open_and_where_an_impact_stops_it():

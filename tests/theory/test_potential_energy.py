@@ -44,7 +44,9 @@ def test_potential_is_minus_the_work_of_the_moment(system, theta):
 
 
 def test_potential_is_the_papers_under_a_vertical_load_alone(beta80):
-    system = System(model=Metainterface(beta0=beta80, stiffness_ratio=0.5), load=Load(vertical=-1.523))
+    system = System(
+        model=Metainterface(beta0=beta80, stiffness_ratio=0.5), load=Load(vertical=-1.523)
+    )
     theta = np.linspace(-2, 2, 41)
     k = np.where(theta > 0, 0.5, 1.0)
     printed = k * theta**2 / 2 - 1.523 * (math.sin(beta80) - np.sin(beta80 + np.abs(theta)))
@@ -68,10 +70,15 @@ def test_slope_at_contact_is_the_mean_of_both_sides(beta80):
     assert potential_slope(system, 0.0) == pytest.approx(just.mean())
 
 
-def test_energy_is_constant_on_each_side_of_a_scipy_motion_and_jumps_with_the_moving_mass(by_scipy, beta80):
-    """Errata 7: with m > 0 and e = 1 the energy jumps by m v^2 / 2 at each impact, down and up in turn."""
+def test_energy_is_constant_on_each_side_of_a_scipy_motion_and_jumps_with_the_moving_mass(
+    by_scipy, beta80
+):
+    """Errata 7: with m > 0 and e = 1 the energy jumps by m v^2 / 2 at each impact, down and up in
+    turn.
+    """
     system = System(
-        model=Metainterface(beta0=beta80, stiffness_ratio=2.0, mass_ratio=0.7), load=Load(horizontal=0.02, vertical=-0.5)
+        model=Metainterface(beta0=beta80, stiffness_ratio=2.0, mass_ratio=0.7),
+        load=Load(horizontal=0.02, vertical=-0.5),
     )
     motion = by_scipy(system, 0.4, impacts=4)
     energy = total_energy(system, 0.4, 0.0)
@@ -79,7 +86,9 @@ def test_energy_is_constant_on_each_side_of_a_scipy_motion_and_jumps_with_the_mo
         side = 1 if i % 2 == 0 else -1
         assert total_energy(system, 0.0, before, side) == pytest.approx(energy, abs=1e-11)
         energy = total_energy(system, 0.0, after, -side)
-        assert energy - total_energy(system, 0.0, before, side) == pytest.approx(-side * 0.7 * before**2 / 2, abs=1e-14)
+        assert energy - total_energy(system, 0.0, before, side) == pytest.approx(
+            -side * 0.7 * before**2 / 2, abs=1e-14
+        )
 
 
 def test_total_energy_broadcasts_and_takes_the_moving_mass():
@@ -91,7 +100,9 @@ def test_total_energy_broadcasts_and_takes_the_moving_mass():
 
 
 def test_erratum_05_kinetic_energy_on_a_still_ground_is_that_of_the_masses_that_move():
-    """From the positions of both masses, with SymPy: (1+m)/2 v^2 on the lower layer, v^2/2 on the upper one."""
+    """From the positions of both masses, with SymPy: (1+m)/2 v^2 on the lower layer, v^2/2 on the
+    upper one.
+    """
     t, b, m, v = sp.symbols("t b m v", positive=True)
     angle = sp.Function("theta")(t)
     for side in (1, -1):
@@ -102,13 +113,20 @@ def test_erratum_05_kinetic_energy_on_a_still_ground_is_that_of_the_masses_that_
         kinetic = sp.simplify(kinetic.subs(angle.diff(t), v))
         assert sp.simplify(kinetic - ((1 + m) if side > 0 else 1) * v**2 / 2) == 0
         system = System(model=Metainterface(beta0=1.2, mass_ratio=0.6))
-        assert total_energy(system, 0.0, 0.3, side) == pytest.approx(float(kinetic.subs({m: 0.6, v: 0.3})))
+        assert total_energy(system, 0.0, 0.3, side) == pytest.approx(
+            float(kinetic.subs({m: 0.6, v: 0.3}))
+        )
 
 
 @pytest.mark.parametrize(
     ("system", "message"),
     [
-        (System(model=Metainterface(beta0=1.2), load=Load(frequency=1.0, horizontal=Harmonic(0.1))), "varies in time"),
+        (
+            System(
+                model=Metainterface(beta0=1.2), load=Load(frequency=1.0, horizontal=Harmonic(0.1))
+            ),
+            "varies in time",
+        ),
         (System(model=Metainterface(beta0=1.2, smoothing=50.0)), "smoothing"),
         (System(model=RockingBlock(alpha=0.2)), "RockingBlock"),
     ],

@@ -1,4 +1,6 @@
-"""The monostable domain with both of its borders, and the static angles, against minimisation and the list of equilibria."""
+"""The monostable domain with both of its borders, and the static angles, against minimisation and
+the list of equilibria.
+"""
 
 import math
 
@@ -30,7 +32,9 @@ def cell(beta0, h, v):
 
 
 def least_horizontal(beta0, vertical):
-    """The least H with a deformed equilibrium: x is one under H = (x - V cos(beta0 + x)) / sin(beta0 + x), minimised over x."""
+    """The least H with a deformed equilibrium: x is one under H = (x - V cos(beta0 + x)) /
+    sin(beta0 + x), minimised over x.
+    """
 
     def horizontal(x):
         return (x - vertical * math.cos(beta0 + x)) / math.sin(beta0 + x)
@@ -38,7 +42,12 @@ def least_horizontal(beta0, vertical):
     grid = np.linspace(1e-6, math.pi - beta0 - 1e-3, 2000)
     best = grid[np.argmin([horizontal(x) for x in grid])]
     step = grid[1]
-    return minimize_scalar(horizontal, bounds=(max(best - step, 0), best + step), method="bounded", options={"xatol": 1e-12}).fun
+    return minimize_scalar(
+        horizontal,
+        bounds=(max(best - step, 0), best + step),
+        method="bounded",
+        options={"xatol": 1e-12},
+    ).fun
 
 
 def printed(beta0, horizontal, vertical):
@@ -91,7 +100,8 @@ def test_both_borders_meet_and_touch_at_the_start_of_the_fold():
     h, v = fold_curve(BETA, steps)
     gap = critical_horizontal(BETA, v) - h
     assert np.all(gap > 0)
-    assert np.log2(gap[:-1] / gap[1:]) == pytest.approx([3, 3], abs=0.05)  # tangent, and parted only at third order
+    # tangent, and parted only at third order
+    assert np.log2(gap[:-1] / gap[1:]) == pytest.approx([3, 3], abs=0.05)
     vertical = np.linspace(-1.5, -math.sin(BETA), 50)
     assert np.all(fold_horizontal(BETA, vertical) <= critical_horizontal(BETA, vertical) + 1e-12)
 
@@ -101,20 +111,28 @@ def test_both_borders_meet_and_touch_at_the_start_of_the_fold():
 def test_fold_is_the_least_load_with_a_deformed_equilibrium(beta0, share):
     low, high = unloaded_fold(beta0)[0], -math.sin(beta0)
     vertical = high + share * (low - high)
-    assert fold_horizontal(beta0, vertical) == pytest.approx(least_horizontal(beta0, vertical), abs=1e-9)
+    assert fold_horizontal(beta0, vertical) == pytest.approx(
+        least_horizontal(beta0, vertical), abs=1e-9
+    )
 
 
 def test_supercritical_buckling_has_no_fold():
-    """V > -sin(beta0): just below Hcr nothing else exists, just above the new state is close to theta = 0."""
+    """V > -sin(beta0): just below Hcr nothing else exists, just above the new state is close to
+    theta = 0.
+    """
     critical = critical_horizontal(BETA, -0.5)
     assert critical == pytest.approx(0.5 / math.tan(BETA))
     assert [e.theta for e in equilibria(cell(BETA, critical - 1e-6, -0.5))] == [0.0]
     assert static_angle(BETA, critical + 1e-6, -0.5) < 1e-5
 
 
-@pytest.mark.parametrize(("h", "v"), [(0.2, -0.5), (0.5, -0.5), (1.0, -0.5), (3.0, -0.5), (0.23, -1.2)])
+@pytest.mark.parametrize(
+    ("h", "v"), [(0.2, -0.5), (0.5, -0.5), (1.0, -0.5), (3.0, -0.5), (0.23, -1.2)]
+)
 def test_static_angle_is_reached_by_loading_slowly(by_scipy, h, v):
-    system = System(model=Metainterface(beta0=BETA, damping=2.0), load=Load(horizontal=h, vertical=v))
+    system = System(
+        model=Metainterface(beta0=BETA, damping=2.0), load=Load(horizontal=h, vertical=v)
+    )
     rest = by_scipy(system, 1e-9, until=150.0)
     assert rest.state[1] == pytest.approx(0.0, abs=1e-9)
     assert static_angle(BETA, h, v) == pytest.approx(rest.state[0], abs=1e-8)
@@ -152,7 +170,9 @@ def test_erratum_35_an_ellipse_of_loads_leaves_the_domain_before_the_printed_amp
     assert critical == pytest.approx(0.07635, abs=5e-6)
     for amplitude, inside in ((critical * (1 - 1e-6), True), (critical * (1 + 1e-6), False)):
         vertical, horizontal = -0.5 + swing * np.cos(tau), amplitude * np.sin(tau)
-        assert bool((vertical * math.cos(BETA) < -np.abs(horizontal) * math.sin(BETA)).all()) is inside
+        assert (
+            bool((vertical * math.cos(BETA) < -np.abs(horizontal) * math.sin(BETA)).all()) is inside
+        )
     assert critical_horizontal(BETA, -0.5, 0.0) == pytest.approx(0.5 / math.tan(BETA), rel=1e-15)
     with pytest.raises(ParameterError, match="swing must be at most"):
         critical_horizontal(BETA, -0.5, 0.6)

@@ -24,7 +24,9 @@ def test_reduced_equation_is_the_pendulum():
     rng = np.random.default_rng(5)
     tau, theta, velocity = rng.uniform(-3, 3, (3, 200))
     reduced = system.model.acceleration(tau, theta, velocity, np.sign(theta), system.load)
-    np.testing.assert_allclose(pendulum_acceleration(system, tau, theta, velocity), reduced, atol=1e-14)
+    np.testing.assert_allclose(
+        pendulum_acceleration(system, tau, theta, velocity), reduced, atol=1e-14
+    )
 
 
 def test_the_sign_of_theta_drops_out():
@@ -45,7 +47,10 @@ def test_only_the_right_angle_is_smooth():
     [
         (System(model=Metainterface(beta0=1.5)), "beta0 = pi/2"),
         (System(model=Metainterface(beta0=math.pi / 2, stiffness_ratio=2.0)), "equal layers"),
-        (System(model=Metainterface(beta0=math.pi / 2), load=Load(lower_vertical=0.1)), "upper mass only"),
+        (
+            System(model=Metainterface(beta0=math.pi / 2), load=Load(lower_vertical=0.1)),
+            "upper mass only",
+        ),
     ],
 )
 def test_refuses_other_cells(system, message):

@@ -1,4 +1,6 @@
-"""The closed form of the impact oscillator's orbits: against SymPy, the matrix exponential, the exact flow and its tangent."""
+"""The closed form of the impact oscillator's orbits: against SymPy, the matrix exponential, the
+exact flow and its tangent.
+"""
 
 import math
 
@@ -38,7 +40,12 @@ def flown(system, orbit, start=0.0, tangent=False):
     """The exact motion over one orbit from the closed form's state at the time `start`."""
     x, velocity = orbit.state(start)
     run = saltus.sensitivities if tangent else saltus.simulate
-    arguments = {"x": float(x), "velocity": float(velocity), "time": start, "duration": orbit.family.duration}
+    arguments = {
+        "x": float(x),
+        "velocity": float(velocity),
+        "time": start,
+        "duration": orbit.family.duration,
+    }
     return run(loaded(system, orbit), tol=1e-14, **arguments)
 
 
@@ -68,7 +75,9 @@ def cases(draw):
 @settings(deadline=None, max_examples=100)
 @given(cases())
 def test_one_impact_later_the_matrix_exponential_brings_the_state_back(case):
-    """x, x', sin, cos and 1 obey one linear equation; its exponential knows nothing of the closed form."""
+    """x, x', sin, cos and 1 obey one linear equation; its exponential knows nothing of the closed
+    form.
+    """
     system, period, speed = case
     orbit = wall_orbits(system, period).orbit(speed)
     model, load = system.model, loaded(system, orbit).load
@@ -97,7 +106,9 @@ def test_an_orbit_is_admissible_exactly_when_the_exact_flow_has_its_one_impact(c
     if not orbit.admissible and x >= system.model.wall:
         return
     motion = flown(system, orbit, start)
-    returned = math.hypot(motion.x - x, motion.velocity - velocity) < 1e-10 * (1 + np.abs(orbit.multipliers).max())
+    returned = math.hypot(motion.x - x, motion.velocity - velocity) < 1e-10 * (
+        1 + np.abs(orbit.multipliers).max()
+    )
     assert (returned and len(motion.impacts) == 1) == orbit.admissible
 
 
@@ -114,7 +125,9 @@ def test_the_exact_flow_returns_and_has_the_impact_and_the_multipliers(system, p
         assert motion.impacts.velocity_before == pytest.approx([speed], abs=1e-11)
         away = (motion.impacts.time - orbit.impact_time) % (2 * math.pi / family.frequency)
         assert min(away[0], 2 * math.pi / family.frequency - away[0]) < 1e-11
-        assert np.poly(derived.state) == pytest.approx(np.poly(orbit.multipliers), rel=1e-10, abs=1e-10)
+        assert np.poly(derived.state) == pytest.approx(
+            np.poly(orbit.multipliers), rel=1e-10, abs=1e-10
+        )
         assert derived.determinant == pytest.approx(family.determinant, rel=1e-10)
 
 
@@ -129,7 +142,9 @@ def test_issue_4_grazing_and_fold():
 def test_at_the_fold_the_amplitude_is_least_two_speeds_meet_and_a_multiplier_is_1(system, period):
     family = wall_orbits(system, period)
     fold, least = family.fold_speed, family.amplitude(family.fold_speed)
-    found = minimize_scalar(family.amplitude, bounds=(0, 3 * fold), method="bounded", options={"xatol": 1e-10 * fold})
+    found = minimize_scalar(
+        family.amplitude, bounds=(0, 3 * fold), method="bounded", options={"xatol": 1e-10 * fold}
+    )
     assert found.x == pytest.approx(fold, rel=1e-5)
     assert found.fun == pytest.approx(least, rel=1e-12)
     assert family.speeds(least * (1 - 1e-9)) == ()
@@ -158,7 +173,13 @@ def test_beyond_the_doubling_the_flow_settles_on_two_impacts_that_alternate(inde
         orbit = family.orbit(factor * family.doubling_speed)
         assert orbit.stable != alternates
         x, velocity = orbit.state(0.0)
-        motion = saltus.simulate(loaded(system, orbit), x=float(x) - 1e-5, velocity=float(velocity), periods=3000, dense=False)
+        motion = saltus.simulate(
+            loaded(system, orbit),
+            x=float(x) - 1e-5,
+            velocity=float(velocity),
+            periods=3000,
+            dense=False,
+        )
         speeds = motion.impacts.velocity_before[-4:] / orbit.speed
         assert speeds[:2] == pytest.approx(speeds[2:], abs=1e-8)
         assert (abs(speeds[1] - speeds[0]) > 0.01) == alternates
@@ -174,11 +195,15 @@ def test_speeds_are_the_inverse_of_the_amplitude(case):
     speeds = family.speeds(amplitude)
     assume(family.fold_speed is None or abs(speed / family.fold_speed - 1) > 1e-3)
     assert min(abs(v - speed) for v in speeds) < 1e-9 * (1 + speed)
-    assert [family.amplitude(v) for v in speeds] == pytest.approx([amplitude] * len(speeds), rel=1e-12)
+    assert [family.amplitude(v) for v in speeds] == pytest.approx(
+        [amplitude] * len(speeds), rel=1e-12
+    )
 
 
 def test_another_grazing_ends_the_admissible_orbits():
-    """Two forcing periods an impact: once the maximum between impacts reaches the wall, the exact flow has its impact there."""
+    """Two forcing periods an impact: once the maximum between impacts reaches the wall, the exact
+    flow has its impact there.
+    """
     family = wall_orbits(walled(W=0.7, wall=0.5, e=0.6), 2)
     speeds = np.linspace(0.05, 1.5, 30)
     clear = np.array([family.orbit(v).clearance for v in speeds])
@@ -193,14 +218,22 @@ def test_another_grazing_ends_the_admissible_orbits():
 
 
 def test_the_energy_restitution_of_a_wall_is_a_factor_of_the_velocity():
-    by_energy = wall_orbits(System(model=KNOWN.model, load=KNOWN.load, impact=EnergyRestitution(0.64)))
+    by_energy = wall_orbits(
+        System(model=KNOWN.model, load=KNOWN.load, impact=EnergyRestitution(0.64))
+    )
     assert by_energy.fold_speed == pytest.approx(wall_orbits(KNOWN).fold_speed, rel=1e-12)
 
 
 def symbols_of_the_family():
-    """The docstring's quantities from Phi = e^(-c t / 2) [...], with C, S and E for its cosine, sine and exponential."""
-    k, c, d, big, e, v, cosine, sine, shrink, w = sp.symbols("k c d Omega e v C S E w", positive=True)
-    phi = shrink * sp.Matrix([[cosine + c * sine / (2 * w), sine / w], [-k * sine / w, cosine - c * sine / (2 * w)]])
+    """The docstring's quantities from Phi = e^(-c t / 2) [...], with C, S and E for its cosine,
+    sine and exponential.
+    """
+    k, c, d, big, e, v, cosine, sine, shrink, w = sp.symbols(
+        "k c d Omega e v C S E w", positive=True
+    )
+    phi = shrink * sp.Matrix(
+        [[cosine + c * sine / (2 * w), sine / w], [-k * sine / w, cosine - c * sine / (2 * w)]]
+    )
     det, trace = shrink**2, 2 * shrink * cosine
     delta = 1 - trace + det
     alpha, beta = -(1 + e) * phi[0, 1] / delta, (1 + e) * (det - phi[1, 1]) / delta
@@ -245,20 +278,32 @@ def test_the_derivation_in_symbols():
     assert vanishes(monodromy.trace() - stated) == 0
     assert vanishes(monodromy.trace() - stated + e * det) != 0  # the simplification is not blind
     assert vanishes(monodromy.det() - e**2 * det) == 0
-    # a multiplier of 1 and dA/dv = 0 are one condition: 1 - trace + det is the slope of A^2, up to a factor without zeros
+    # a multiplier of 1 and dA/dv = 0 are one condition: 1 - trace + det is the slope of A^2, up to
+    # a factor without zeros
     fold = alpha * d / (alpha**2 + gamma**2)
     assert sp.simplify(sp.diff(square, v).subs(v, fold)) == 0
-    assert vanishes(sp.together((1 - stated + e**2 * det) * v - sp.diff(square, v) / 2 * big**2 * delta)) == 0
+    assert (
+        vanishes(
+            sp.together((1 - stated + e**2 * det) * v - sp.diff(square, v) / 2 * big**2 * delta)
+        )
+        == 0
+    )
 
 
 def test_the_saltation_matrix_is_the_first_order_of_the_moved_impact():
-    """Neighbours meet the wall at dt = -u / v; both sides of the impact expanded to first order in a small h."""
+    """Neighbours meet the wall at dt = -u / v; both sides of the impact expanded to first order in
+    a small h.
+    """
     h, u, du, e, v, a, b = sp.symbols("h u du e v a b")  # a, b: accelerations before and after
     dt = -u / v
     reached = (v + h * du) + a * h * dt  # its velocity when it gets to the wall
-    back_position = 0 - (-e * reached) * h * dt + b * (h * dt) ** 2 / 2  # carried back to the reference's instant
+    # carried back to the reference's instant
+    back_position = 0 - (-e * reached) * h * dt + b * (h * dt) ** 2 / 2
     back_velocity = -e * reached - b * h * dt
-    linear = [sp.series(f, h, 0, 2).removeO().coeff(h, 1) for f in (sp.expand(back_position), sp.expand(back_velocity))]
+    linear = [
+        sp.series(f, h, 0, 2).removeO().coeff(h, 1)
+        for f in (sp.expand(back_position), sp.expand(back_velocity))
+    ]
     expected = sp.Matrix([[-e, 0], [(b + e * a) / v, -e]]) * sp.Matrix([u, du])
     assert sp.simplify(sp.Matrix(linear) - expected) == sp.zeros(2, 1)
 

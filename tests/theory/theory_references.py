@@ -1,4 +1,6 @@
-"""References for the closed forms: SciPy's DOP853 restarted at each impact, and the linearised equation."""
+"""References for the closed forms: SciPy's DOP853 restarted at each impact, and the linearised
+equation.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -19,13 +21,18 @@ class Record:
 
 
 def integrate(system, theta, velocity=0.0, *, impacts=10**9, until=1e3, acceleration=None):
-    """Impacts, peaks and the last state of a motion, from the model's acceleration or another (tau, theta, velocity, side)."""
+    """Impacts, peaks and the last state of a motion, from the model's acceleration or another (tau,
+    theta, velocity, side).
+    """
     if acceleration is None:
 
         def acceleration(t, th, v, s):
             return system.model.acceleration(t, th, v, s, system.load)
 
-    side, out = (1 if theta > 0 or (theta == 0 and velocity > 0) else -1), Record(state=(theta, velocity))
+    side, out = (
+        (1 if theta > 0 or (theta == 0 and velocity > 0) else -1),
+        Record(state=(theta, velocity)),
+    )
     while out.time < until:
 
         def flow(t, y, side=side):
@@ -44,7 +51,9 @@ def integrate(system, theta, velocity=0.0, *, impacts=10**9, until=1e3, accelera
             out.time, out.state = until, tuple(arc.y[:, -1])
             break
         out.time, before = float(arc.t_events[0][0]), float(arc.y_events[0][0][1])
-        after = float(system.impact.velocity_after(system.model, out.time, before, side, -side, system.load))
+        after = float(
+            system.impact.velocity_after(system.model, out.time, before, side, -side, system.load)
+        )
         out.impact_times.append(out.time)
         out.before.append(before)
         out.after.append(after)
@@ -60,8 +69,14 @@ def linear_acceleration(system):
     b, v, h = model.beta0, load.vertical(0), load.horizontal(0)
 
     def acceleration(t, theta, velocity, side):
-        k, mass, c = (model.stiffness_ratio, 1 + model.mass_ratio, model.dissipation_ratio) if side > 0 else (1.0, 1.0, 1.0)
-        push = h * (math.sin(b) + side * theta * math.cos(b)) + side * v * (math.cos(b) - side * theta * math.sin(b))
+        k, mass, c = (
+            (model.stiffness_ratio, 1 + model.mass_ratio, model.dissipation_ratio)
+            if side > 0
+            else (1.0, 1.0, 1.0)
+        )
+        push = h * (math.sin(b) + side * theta * math.cos(b)) + side * v * (
+            math.cos(b) - side * theta * math.sin(b)
+        )
         return (push - c * model.damping * velocity - k * theta) / mass
 
     return acceleration

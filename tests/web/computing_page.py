@@ -1,4 +1,6 @@
-"""A page that computes, open in a Chromium without a window: what its tests do to it, and what they read of it."""
+"""A page that computes, open in a Chromium without a window: what its tests do to it, and what they
+read of it.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +10,29 @@ from typing import Any
 
 from browser_page import BrowserPage
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
+NAMES = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "msedge",
+)
 BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
-SETTLED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0))))"
-READY = "new Promise((done) => { const look = () => (globalThis.saltusPage ? done() : requestAnimationFrame(look)); look(); })"
+SETTLED = (
+    "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => "
+    "setTimeout(done, 0))))"
+)
+READY = (
+    "new Promise((done) => { const look = () => (globalThis.saltusPage ? done() : "
+    "requestAnimationFrame(look)); look(); })"
+)
 
 
 class ComputingPage(BrowserPage):
-    """A page that has unpacked itself once it is open; `requests` are the addresses that it has asked for."""
+    """A page that has unpacked itself once it is open; `requests` are the addresses that it has
+    asked for.
+    """
 
     def __init__(self, *arguments: Any) -> None:
         self.requests: list[str] = []

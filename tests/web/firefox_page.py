@@ -1,4 +1,6 @@
-"""A page in a Firefox without a window, by its Marionette protocol: the second engine in which pages are tested."""
+"""A page in a Firefox without a window, by its Marionette protocol: the second engine in which
+pages are tested.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,17 @@ class FirefoxPage:
             port = free.getsockname()[1]
         names = {"marionette.port": port, "browser.shell.checkDefaultBrowser": False}
         settings = names | {"datareporting.policy.dataSubmissionEnabled": False}
-        lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});" for name, value in settings.items()]
+        lines = [
+            f"user_pref({json.dumps(name)}, {json.dumps(value)});"
+            for name, value in settings.items()
+        ]
         (profile / "user.js").write_text("\n".join(lines) + "\n")
         command = [browser, "--headless", "--marionette", "--no-remote", "--profile", str(profile)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         assert self._process.stdout
-        assert any(b"Listening on port" in line for line in self._process.stdout), "the browser has ended"
+        assert any(b"Listening on port" in line for line in self._process.stdout), (
+            "the browser has ended"
+        )
         self._socket = socket.create_connection(("127.0.0.1", port))
         self._buffer, self._number = b"", 0
         self._message()  # its greeting

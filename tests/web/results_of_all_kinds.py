@@ -10,7 +10,9 @@ SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
     load=saltus.Load(frequency=0.9, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
 )  # beyond its resonance, where three orbits are beside one another
-RESTING = saltus.System(model=SYSTEM.model, load=saltus.Load(vertical=-1.5 / np.sin(np.deg2rad(80))))
+RESTING = saltus.System(
+    model=SYSTEM.model, load=saltus.Load(vertical=-1.5 / np.sin(np.deg2rad(80)))
+)
 FREQUENCY, AMPLITUDE = "load.frequency", "load.horizontal.amplitude"
 
 

@@ -1,4 +1,6 @@
-"""Descriptions of systems for tests of the page alone, with a plain integrator in the place of the engine."""
+"""Descriptions of systems for tests of the page alone, with a plain integrator in the place of the
+engine.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +14,22 @@ HERE = Path(__file__).parent
 
 
 def number(path: str, value: float, low: float, high: float, **more: Any) -> dict[str, Any]:
-    return {"path": path, "unit": "rad" if more.get("angle") else "1", "value": value, "low": low, "high": high, **more}
+    return {
+        "path": path,
+        "unit": "rad" if more.get("angle") else "1",
+        "value": value,
+        "low": low,
+        "high": high,
+        **more,
+    }
 
 
 def frequency(value: float) -> dict[str, Any]:
-    return {"channel": "", "kind": "frequency", "parameters": [number("load.frequency", value, 0.1, 3.0)]}
+    return {
+        "channel": "",
+        "kind": "frequency",
+        "parameters": [number("load.frequency", value, 0.1, 3.0)],
+    }
 
 
 def harmonic(channel: str, amplitude: float) -> dict[str, Any]:
@@ -51,7 +64,11 @@ def wall() -> dict[str, Any]:
         "load": [frequency(0.8), harmonic("force", 0.8)],
         "start": {"time": 0.0, "x": 0.0, "x_velocity": 0.0},
         "study": {
-            "system": {"model": model, "load": load, "impact": {"type": "VelocityReduction", "e": 0.8}},
+            "system": {
+                "model": model,
+                "load": load,
+                "impact": {"type": "VelocityReduction", "e": 0.8},
+            },
             "simulate": {"x": 0.0, "periods": 12},
         },
         "digest": "stand-in-wall",
@@ -63,9 +80,20 @@ def cell() -> dict[str, Any]:
     """The metainterface under load (i) of the paper."""
     beta0 = math.radians(80)
     model = {"type": "Metainterface", "beta0": beta0, "damping": 0.1}
-    load = {"frequency": 1.0, "horizontal": {"amplitude": 0.5, "mean": 0.0, "phase": 0.0, "order": 1}, "vertical": -0.5}
-    numbers = [number("model.beta0", beta0, 0.8, 2.4, angle=True), number("model.damping", 0.1, 0.0, 1.0)]
-    vertical = {"channel": "vertical", "kind": "Constant", "parameters": [number("load.vertical", -0.5, -2.0, 0.5)]}
+    load = {
+        "frequency": 1.0,
+        "horizontal": {"amplitude": 0.5, "mean": 0.0, "phase": 0.0, "order": 1},
+        "vertical": -0.5,
+    }
+    numbers = [
+        number("model.beta0", beta0, 0.8, 2.4, angle=True),
+        number("model.damping", 0.1, 0.0, 1.0),
+    ]
+    vertical = {
+        "channel": "vertical",
+        "kind": "Constant",
+        "parameters": [number("load.vertical", -0.5, -2.0, 0.5)],
+    }
     return {
         "version": 1,
         "title": "The metainterface, Fig. 4",
@@ -80,7 +108,11 @@ def cell() -> dict[str, Any]:
         "load": [frequency(1.0), harmonic("horizontal", 0.5), vertical],
         "start": {"time": 0.0, "theta": 0.3, "theta_velocity": 0.0},
         "study": {
-            "system": {"model": model, "load": load, "impact": {"type": "VelocityReduction", "e": 1.0}},
+            "system": {
+                "model": model,
+                "load": load,
+                "impact": {"type": "VelocityReduction", "e": 1.0},
+            },
             "simulate": {"theta": 0.3, "velocity": 0.0, "periods": 20},
         },
         "digest": "stand-in-cell",

@@ -1,4 +1,6 @@
-"""What a page refuses is what Python refuses, in the same sentence: the bounds of every number, and how a page reads them."""
+"""What a page refuses is what Python refuses, in the same sentence: the bounds of every number, and
+how a page reads them.
+"""
 
 from __future__ import annotations
 
@@ -16,23 +18,35 @@ from saltus.web.accepted import accepted
 
 NODE = shutil.which("node")
 Harmonic = saltus.Harmonic
-HARD, PULSED = saltus.NewtonImpact(e=0.4), saltus.OneSine(amplitude=0.6, frequency=2.0, start=0.5, quantity="acceleration")
+HARD, PULSED = (
+    saltus.NewtonImpact(e=0.4),
+    saltus.OneSine(amplitude=0.6, frequency=2.0, start=0.5, quantity="acceleration"),
+)
 SYSTEMS = {
     "cell": saltus.System(
         model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
-        load=saltus.Load(frequency=0.9, horizontal=[Harmonic(0.5), Harmonic(0.1, order=3)], vertical=-0.5),
+        load=saltus.Load(
+            frequency=0.9, horizontal=[Harmonic(0.5), Harmonic(0.1, order=3)], vertical=-0.5
+        ),
     ),
     "block": saltus.System(
-        model=saltus.RockingBlock(alpha=0.2), load=saltus.Load(ground_horizontal=PULSED), impact=saltus.VelocityReduction(0.9)
+        model=saltus.RockingBlock(alpha=0.2),
+        load=saltus.Load(ground_horizontal=PULSED),
+        impact=saltus.VelocityReduction(0.9),
     ),
     "stops": saltus.System(
-        model=saltus.TwoStops(left=-0.5, right=1.25), load=saltus.Load(frequency=1.0, force=Harmonic(0.3)), impact=HARD
+        model=saltus.TwoStops(left=-0.5, right=1.25),
+        load=saltus.Load(frequency=1.0, force=Harmonic(0.3)),
+        impact=HARD,
     ),
     "belt": saltus.System(
-        model=saltus.BeltOscillator(kinetic=0.2, static=0.3), load=saltus.Load(frequency=1.0, force=Harmonic(0.3))
+        model=saltus.BeltOscillator(kinetic=0.2, static=0.3),
+        load=saltus.Load(frequency=1.0, force=Harmonic(0.3)),
     ),
     "pair": saltus.System(
-        model=saltus.ImpactPair(clearance=0.5), load=saltus.Load(frequency=1.0, force=Harmonic(0.3)), impact=HARD
+        model=saltus.ImpactPair(clearance=0.5),
+        load=saltus.Load(frequency=1.0, force=Harmonic(0.3)),
+        impact=HARD,
     ),
 }  # with numbers that bound one another: stops, and static and kinetic friction
 
@@ -74,10 +88,25 @@ def test_the_page_refuses_what_python_refuses_in_the_same_sentence():
     asked = []
     for name, system in SYSTEMS.items():
         entries = [{"path": path, "accepted": bounds} for path, bounds in BOUNDS[name].items()]
-        asked.append({"entries": entries, "values": dict(system.parameters), "tried": list(tried(system, BOUNDS[name], rng))})
+        asked.append(
+            {
+                "entries": entries,
+                "values": dict(system.parameters),
+                "tried": list(tried(system, BOUNDS[name], rng)),
+            }
+        )
     script = ASK % (one_file.PAGE.as_uri(), json.dumps(asked))
-    command = [str(NODE), "--no-warnings", "--experimental-default-type=module", "--input-type=module", "-e", script]
-    answers = json.loads(subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout)
+    command = [
+        str(NODE),
+        "--no-warnings",
+        "--experimental-default-type=module",
+        "--input-type=module",
+        "-e",
+        script,
+    ]
+    answers = json.loads(
+        subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
+    )
     refused, counted = 0, 0
     for (name, system), given, answer in zip(SYSTEMS.items(), asked, answers, strict=True):
         for (path, value), said in zip(given["tried"], answer, strict=True):
@@ -94,5 +123,8 @@ def test_bounds_that_move_with_another_number_name_it():
     assert stops["model.left"]["most"]["of"] == "model.right"
     assert stops["model.right"]["least"]["of"] == "model.left"
     for side, end in (("least", 0.0), ("most", math.pi)):
-        assert (cell["model.beta0"][side]["end"], cell["model.beta0"][side]["taken"]) == (end, False)
+        assert (cell["model.beta0"][side]["end"], cell["model.beta0"][side]["taken"]) == (
+            end,
+            False,
+        )
     assert (cell["impact.e"]["most"]["end"], cell["impact.e"]["most"]["taken"]) == (1.0, True)

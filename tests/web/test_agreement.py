@@ -1,7 +1,8 @@
 """The page's engine in node against Python: random systems of all models, event by event.
 
-Both follow the same equations, and round differently. By how much rounding grows along a motion is measured in Python, by
-starting it again beside its start; a motion is compared as long as this stays small.
+Both follow the same equations, and round differently. By how much rounding grows along a motion is
+measured in Python, by starting it again beside its start; a motion is compared as long as this
+stays small.
 """
 
 from __future__ import annotations
@@ -29,14 +30,22 @@ AT = [1.0, 5.0]  # times at which energies are compared
 
 def shaken(rng, channel, **more):
     return Load(
-        frequency=rng.uniform(0.5, 2.0), **{channel: Harmonic(rng.uniform(0.1, 1.0), phase=rng.uniform(0.0, 6.0))}, **more
+        frequency=rng.uniform(0.5, 2.0),
+        **{channel: Harmonic(rng.uniform(0.1, 1.0), phase=rng.uniform(0.0, 6.0))},
+        **more,
     )
 
 
 def cell(rng):
     load = shaken(rng, "horizontal", vertical=rng.uniform(-0.8, -0.2))
-    model = saltus.Metainterface(beta0=rng.uniform(1.2, 1.5), damping=rng.uniform(0.02, 0.3), mass_ratio=rng.uniform(0.0, 0.5))
-    return System(model=model, load=load, impact=saltus.VelocityReduction(rng.uniform(0.5, 1.0))), {"theta": 0.3}
+    model = saltus.Metainterface(
+        beta0=rng.uniform(1.2, 1.5),
+        damping=rng.uniform(0.02, 0.3),
+        mass_ratio=rng.uniform(0.0, 0.5),
+    )
+    return System(model=model, load=load, impact=saltus.VelocityReduction(rng.uniform(0.5, 1.0))), {
+        "theta": 0.3
+    }
 
 
 def inelastic_cell(rng):
@@ -46,14 +55,22 @@ def inelastic_cell(rng):
 
 
 def wall(rng):
-    load = Load(frequency=rng.uniform(0.6, 2.0), force=[Harmonic(rng.uniform(0.2, 1.0)), Harmonic(0.2, order=2), 0.1])
+    load = Load(
+        frequency=rng.uniform(0.6, 2.0),
+        force=[Harmonic(rng.uniform(0.2, 1.0)), Harmonic(0.2, order=2), 0.1],
+    )
     model = saltus.WallOscillator(damping=rng.uniform(0.0, 0.3), wall=rng.uniform(-0.2, 0.5))
-    return System(model=model, load=load, impact=saltus.EnergyRestitution(rng.uniform(0.3, 1.0))), {"x": -0.3}
+    return System(model=model, load=load, impact=saltus.EnergyRestitution(rng.uniform(0.3, 1.0))), {
+        "x": -0.3
+    }
 
 
 def block(rng):
     pulse = saltus.OneSine(
-        amplitude=rng.uniform(1.0, 2.0), frequency=rng.uniform(2.0, 6.0), start=rng.uniform(0.0, 1.0), quantity="acceleration"
+        amplitude=rng.uniform(1.0, 2.0),
+        frequency=rng.uniform(2.0, 6.0),
+        start=rng.uniform(0.0, 1.0),
+        quantity="acceleration",
     )
     system = System(
         model=saltus.RockingBlock(alpha=rng.uniform(0.1, 0.3)),
@@ -67,7 +84,9 @@ def recorded(rng):
     """A block on a measured ground, whose scale and the block's slenderness are those of the page."""
     times = np.linspace(0.0, 12.0, 61)
     values = np.sin(1.3 * times) * np.exp(-0.1 * times) + 0.4 * np.cos(3.1 * times)
-    record = saltus.Record(time=times, value=values - values[0], quantity="acceleration", scale=rng.uniform(0.2, 0.5))
+    record = saltus.Record(
+        time=times, value=values - values[0], quantity="acceleration", scale=rng.uniform(0.2, 0.5)
+    )
     system = System(
         model=saltus.RockingBlock(alpha=rng.uniform(0.2, 0.35)),
         load=Load(ground_horizontal=record),
@@ -77,44 +96,75 @@ def recorded(rng):
 
 
 def stops(rng):
-    model = saltus.TwoStops(damping=rng.uniform(0.0, 0.2), left=-rng.uniform(0.2, 1.0), right=rng.uniform(0.3, 1.0))
+    model = saltus.TwoStops(
+        damping=rng.uniform(0.0, 0.2), left=-rng.uniform(0.2, 1.0), right=rng.uniform(0.3, 1.0)
+    )
     law = saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))
     return System(model=model, load=shaken(rng, "force"), impact=law), {"x": 0.1, "velocity": 0.3}
 
 
 def pair(rng):
-    model = saltus.ImpactPair(damping=rng.uniform(0.05, 0.3), mass_ratio=rng.uniform(0.05, 0.5), clearance=rng.uniform(0.3, 1.0))
-    system = System(model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.4, 0.8)))
+    model = saltus.ImpactPair(
+        damping=rng.uniform(0.05, 0.3),
+        mass_ratio=rng.uniform(0.05, 0.5),
+        clearance=rng.uniform(0.3, 1.0),
+    )
+    system = System(
+        model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.4, 0.8))
+    )
     return system, {"z": 0.1, "x": 0.1}
 
 
 def belt(rng):
     kinetic = rng.uniform(0.1, 0.4)
-    model = saltus.BeltOscillator(kinetic=kinetic, static=kinetic + rng.uniform(0.0, 0.3), belt_speed=rng.uniform(-0.3, 0.5))
+    model = saltus.BeltOscillator(
+        kinetic=kinetic, static=kinetic + rng.uniform(0.0, 0.3), belt_speed=rng.uniform(-0.3, 0.5)
+    )
     return System(model=model, load=shaken(rng, "force")), {"x": 0.0, "velocity": 0.05}
 
 
 def layers(rng):
     load = shaken(rng, "horizontal", vertical=rng.uniform(-0.6, -0.3))
-    model = saltus.TwoLayer(beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), mass_ratio=rng.uniform(0.0, 0.5))
+    model = saltus.TwoLayer(
+        beta0=rng.uniform(1.3, 1.5),
+        damping=rng.uniform(0.05, 0.3),
+        mass_ratio=rng.uniform(0.0, 0.5),
+    )
     law = saltus.NewtonImpact(e=rng.uniform(0.0, 0.5), transfer=rng.uniform(0.3, 0.9))
     return System(model=model, load=load, impact=law), {"theta_1": 0.2, "theta_2": 0.0}
 
 
 def cells(rng):
     load = shaken(rng, "horizontal", vertical=rng.uniform(-0.6, -0.3))
-    model = saltus.CellChain(cells=2, beta0=rng.uniform(1.3, 1.5), damping=rng.uniform(0.05, 0.3), coupling=rng.uniform(0.0, 0.3))
+    model = saltus.CellChain(
+        cells=2,
+        beta0=rng.uniform(1.3, 1.5),
+        damping=rng.uniform(0.05, 0.3),
+        coupling=rng.uniform(0.0, 0.3),
+    )
     law = saltus.NewtonImpact(e=rng.uniform(0.0, 0.5), transfer=rng.uniform(0.3, 0.9))
-    return System(model=model, load=load, impact=law), {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0}
+    return System(model=model, load=load, impact=law), {
+        "lower_1": 0.2,
+        "upper_1": 0.0,
+        "lower_2": 0.1,
+        "upper_2": 0.0,
+    }
 
 
 def masses(rng):
     stiffness = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
     stop = saltus.Contact(name="stop", coordinate=3, position=rng.uniform(0.1, 0.5), sign=-1)
     model = saltus.Structure(
-        mass=np.eye(4), damping=0.05 * stiffness, stiffness=stiffness, contacts=[stop], forces={"force": 0}, names=tuple("abcd")
+        mass=np.eye(4),
+        damping=0.05 * stiffness,
+        stiffness=stiffness,
+        contacts=[stop],
+        forces={"force": 0},
+        names=tuple("abcd"),
     )
-    return System(model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))), {"d": 0.0}
+    return System(
+        model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))
+    ), {"d": 0.0}
 
 
 KINDS = (cell, inelastic_cell, wall, block, recorded, stops, pair, belt, layers, cells, masses)
@@ -136,14 +186,24 @@ def started(system, start, shift=0.0):
 
 def as_start(system, start):
     names = system.model.coordinates
-    return {name: value for name, value in start.items() if name in names} | {f"{names[0]}_velocity": start.get("velocity", 0.0)}
+    return {name: value for name, value in start.items() if name in names} | {
+        f"{names[0]}_velocity": start.get("velocity", 0.0)
+    }
 
 
 def run_node(script, address, given, folder):
-    """What a script beside this file prints as JSON, which is given an address and a file; bytes are given in base64."""
+    """What a script beside this file prints as JSON, which is given an address and a file; bytes
+    are given in base64.
+    """
     file = Path(folder) / "given.json"
     file.write_text(json.dumps(given, default=lambda content: base64.b64encode(content).decode()))
-    command = [str(NODE), "--experimental-default-type=module", str(Path(__file__).parent / script), address, str(file)]
+    command = [
+        str(NODE),
+        "--experimental-default-type=module",
+        str(Path(__file__).parent / script),
+        address,
+        str(file),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout)
@@ -158,7 +218,9 @@ def events_of(motion):
 
 
 def compared(motion, beside, other):
-    """How many events of a motion agree with those of the page, all of them as far as rounding lets them be known."""
+    """How many events of a motion agree with those of the page, all of them as far as rounding lets
+    them be known.
+    """
     own, page, count = events_of(motion), other["events"], 0
     known = [events_of(each) for each in beside]
     for i, (time, kind) in enumerate(own):
@@ -170,7 +232,13 @@ def compared(motion, beside, other):
             return count, False
         assert len(page) > i, (i, time, kind)
         assert page[i][1] == kind, (i, time, kind, page[i])
-        assert abs(page[i][0] - time) <= NEAR * max(1.0, time) + 30.0 * spread, (i, time, kind, page[i], spread)
+        assert abs(page[i][0] - time) <= NEAR * max(1.0, time) + 30.0 * spread, (
+            i,
+            time,
+            kind,
+            page[i],
+            spread,
+        )
         count += 1
     return count, True
 
@@ -180,20 +248,37 @@ def check_whole(system, motion, beside, other):
     assert other["stop"] == motion.stop
     ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
     spread = max(np.max(np.abs(end - ends[0])) for end in ends[1:])
-    assert np.max(np.abs(other["end"] - ends[0])) <= NEAR + 100.0 * spread, (system, other["end"], ends)
+    assert np.max(np.abs(other["end"] - ends[0])) <= NEAR + 100.0 * spread, (
+        system,
+        other["end"],
+        ends,
+    )
     allowed = 1e-9 + 1e4 * spread  # a margin that is passed slantwise is passed later or earlier
     for name, share in other["validity"]["share"].items():
-        assert abs(share - motion.validity.share[name]) <= allowed, (system, name, other["validity"], motion.validity)
+        assert abs(share - motion.validity.share[name]) <= allowed, (
+            system,
+            name,
+            other["validity"],
+            motion.validity,
+        )
         if name != motion.limit:  # at which it ends, so that rounding decides on which side
-            assert (other["validity"]["first"][name] is None) == (motion.validity.first[name] is None), (system, name)
+            assert (other["validity"]["first"][name] is None) == (
+                motion.validity.first[name] is None
+            ), (system, name)
     for time, energy in zip(AT, other["energies"], strict=True):
-        assert time > motion.time or abs(energy - kinetic_energy(system, motion, time)) <= allowed, (system, time)
+        assert (
+            time > motion.time or abs(energy - kinetic_energy(system, motion, time)) <= allowed
+        ), (system, time)
 
 
 def kinetic_energy(system, motion, time):
     """Of the model itself, at Python's state."""
     position, velocity = (np.reshape(each, (-1, 1))[:, 0] for each in motion.at([time])[:2])
-    side = motion.side if not system.model.sides else float(motion.dense.states(np.array([time]))[2][0]) or 1.0
+    side = (
+        motion.side
+        if not system.model.sides
+        else float(motion.dense.states(np.array([time]))[2][0]) or 1.0
+    )
     state = (position[0], velocity[0]) if len(position) == 1 else (tuple(position), tuple(velocity))
     return system.model.kinetic_energy(time, *state, side, system.load)
 
@@ -205,7 +290,12 @@ def check(seed, each, kinds, folder):
         made = [kind(rng) for _ in range(each)]
         wasm, description = page_parts(made[0][0])
         motions = [
-            {"values": system.parameters, "start": as_start(system, start), **length_of(system), "at": AT}
+            {
+                "values": system.parameters,
+                "start": as_start(system, start),
+                **length_of(system),
+                "at": AT,
+            }
             for system, start in made
         ]
         tasks.append({"wasm": wasm, "description": description, "motions": motions})
@@ -213,7 +303,9 @@ def check(seed, each, kinds, folder):
     counts, whole = 0, 0
     for made, found in zip(known, in_node(tasks, folder), strict=True):
         for (system, start), other in zip(made, found, strict=True):
-            motion, *beside = (started(system, start, shift) for shift in (0.0, 1e-14, -1e-14, 3e-14))
+            motion, *beside = (
+                started(system, start, shift) for shift in (0.0, 1e-14, -1e-14, 3e-14)
+            )
             if isinstance(motion, str):
                 assert other["reason"] == motion
                 continue
@@ -262,10 +354,14 @@ def test_a_drawing_of_the_models_own_is_traced_with_all_of_its_numbers(tmp_path)
     longer = system.with_({"model.length": 1.7})
     wasm, description = page_parts(system)
     motion = {"values": longer.parameters, "start": {"phi": 0.4}, "periods": 3, "at": AT}
-    ((found,),) = in_node([{"wasm": wasm, "description": description, "motions": [motion]}], tmp_path)
+    ((found,),) = in_node(
+        [{"wasm": wasm, "description": description, "motions": [motion]}], tmp_path
+    )
     for state, drawing in zip(found["states"], found["drawings"], strict=True):
         known = saltus.systems.drawing_of(longer, state[:1])
-        assert [(shape["kind"], shape["role"]) for shape in drawing] == [(shape.kind, shape.role) for shape in known]
+        assert [(shape["kind"], shape["role"]) for shape in drawing] == [
+            (shape.kind, shape.role) for shape in known
+        ]
         for shape, one in zip(drawing, known, strict=True):
             np.testing.assert_allclose(shape["points"], one.points, atol=1e-15)
         assert drawing[1]["radius"] == known[1].radius == 0.1 * 1.7

@@ -19,7 +19,9 @@ from saltus.web import elementary, linker, object_files, objects
 RNG = np.random.default_rng(5)
 NODE = shutil.which("node")
 ARGUMENTS = {
-    "sin": lambda n: np.concatenate([RNG.uniform(-10, 10, n), RNG.uniform(-1e5, 1e5, n), 10.0 ** RNG.uniform(5, 308, n)]),
+    "sin": lambda n: np.concatenate(
+        [RNG.uniform(-10, 10, n), RNG.uniform(-1e5, 1e5, n), 10.0 ** RNG.uniform(5, 308, n)]
+    ),
     "exp": lambda n: np.concatenate([RNG.uniform(-745, 709.7, n), RNG.uniform(-1, 1, n)]),
     "log": lambda n: np.concatenate([10.0 ** RNG.uniform(-320, 308, n), RNG.uniform(0.5, 2, n)]),
     "sinh": lambda n: np.concatenate([RNG.uniform(-710, 710, n), RNG.uniform(-2, 2, n)]),
@@ -46,13 +48,17 @@ def compiled():
 
 def error(found: float, exact: mpmath.mpf) -> float:
     """The error in units in the last place."""
-    return float(abs(mpmath.mpf(found) - exact) / math.ulp(float(abs(exact)))) if exact else abs(found)
+    return (
+        float(abs(mpmath.mpf(found) - exact) / math.ulp(float(abs(exact)))) if exact else abs(found)
+    )
 
 
 def errors_of(functions, name, count):
     function, exact = functions[f"{name}_function"], getattr(mpmath, name)
     with mpmath.workdps(350):
-        return max(error(function(x), exact(mpmath.mpf(x))) for x in map(float, ARGUMENTS[name](count)))
+        return max(
+            error(function(x), exact(mpmath.mpf(x))) for x in map(float, ARGUMENTS[name](count))
+        )
 
 
 @pytest.mark.parametrize("name", ["sin", "exp", "log"])
@@ -70,12 +76,17 @@ def test_elementary_functions_of_100000_arguments(compiled, name):
 def test_powers_are_good_to_a_unit_in_the_last_place(compiled):
     pairs = zip(10.0 ** RNG.uniform(-10, 10, 20_000), RNG.uniform(-30, 30, 20_000), strict=True)
     with mpmath.workdps(60):
-        worst = max(error(compiled["pow_function"](x, y), mpmath.power(mpmath.mpf(x), mpmath.mpf(y))) for x, y in pairs)
+        worst = max(
+            error(compiled["pow_function"](x, y), mpmath.power(mpmath.mpf(x), mpmath.mpf(y)))
+            for x, y in pairs
+        )
     assert worst < 1.0
 
 
 def test_sines_near_their_zeros_keep_all_digits(functions):
-    """The double nearest to a multiple of pi / 2 that is hardest to reduce (Kahan), and 355, which is near 113 pi."""
+    """The double nearest to a multiple of pi / 2 that is hardest to reduce (Kahan), and 355, which
+    is near 113 pi.
+    """
     hardest = 6381956970095103.0 * 2.0**797
     with mpmath.workdps(400):
         for x in (hardest, 355.0, 1e22):
@@ -86,7 +97,15 @@ def test_sines_near_their_zeros_keep_all_digits(functions):
 def test_neighbours_and_powers_of_special_numbers(functions):
     for x, y in [(1.0, 2.0), (-1.0, 2.0), (1.0, 0.0), (5e-324, 0.0), (0.0, -1.0), (2.0, 2.0)]:
         assert functions["nextafter_function"](x, y) == math.nextafter(x, y)
-    for x, y in [(-8.0, 3.0), (math.inf, -1.0), (0.5, math.inf), (1e300, 1.0), (-2.0, 1023.0), (5e-324, 0.5), (3.0, 0.0)]:
+    for x, y in [
+        (-8.0, 3.0),
+        (math.inf, -1.0),
+        (0.5, math.inf),
+        (1e300, 1.0),
+        (-2.0, 1023.0),
+        (5e-324, 0.5),
+        (3.0, 0.0),
+    ]:
         assert functions["pow_function"](x, y) == math.pow(x, y)
     assert math.isnan(functions["pow_function"](-8.0, 0.5))
 
@@ -120,7 +139,10 @@ OTHER = "define i32 @other(i32 %x) {\n  %y = add i32 %x, 7\n  ret i32 %y\n}\n"
 
 def test_two_object_files_become_one_module(tmp_path):
     """Data, a call across the files, and a call through the table."""
-    parts = [objects.object_code([TEXT], ["added", "through"]), objects.object_code([OTHER], ["other"])]
+    parts = [
+        objects.object_code([TEXT], ["added", "through"]),
+        objects.object_code([OTHER], ["other"]),
+    ]
     made = linker.link(parts, ["added", "through"], ["other"])
     if NODE is None:
         pytest.skip("node is not installed here")

@@ -1,4 +1,6 @@
-"""A page in a notebook: Python's half by its traits, the notebook's half in Chromium with a stand-in for the widget's model."""
+"""A page in a notebook: Python's half by its traits, the notebook's half in Chromium with a
+stand-in for the widget's model.
+"""
 
 from __future__ import annotations
 
@@ -63,22 +65,37 @@ def test_python_changes_the_page(explorer):
 
 def test_the_page_changes_what_python_has(explorer):
     """`set_state` takes what a notebook sends."""
-    explorer.widget.set_state({"values": {**explorer.widget.values, "model.damping": 0.2, "load.horizontal.order": 1}})
-    explorer.widget.set_state({"start": {"time": 0.5, "theta": 0.25, "theta_velocity": -1}, "periods": 20})
+    explorer.widget.set_state(
+        {"values": {**explorer.widget.values, "model.damping": 0.2, "load.horizontal.order": 1}}
+    )
+    explorer.widget.set_state(
+        {"start": {"time": 0.5, "theta": 0.25, "theta_velocity": -1}, "periods": 20}
+    )
     assert explorer.system == DAMPED
     assert explorer.state == {"theta": 0.25, "velocity": -1.0, "time": 0.5, "periods": 20.0}
 
 
 def test_a_system_with_several_coordinates_has_as_many_velocities(monkeypatch):
-    """What Python knows of the page; the kernel for several contacts, of a minute of compiling, is that of test_agreement.py."""
-    monkeypatch.setattr("saltus.web.study_page.page_parts", lambda system: (b"", description(PortableMotion(system))))
+    """What Python knows of the page; the kernel for several contacts, of a minute of compiling, is
+    that of test_agreement.py.
+    """
+    monkeypatch.setattr(
+        "saltus.web.study_page.page_parts",
+        lambda system: (b"", description(PortableMotion(system))),
+    )
     system = saltus.System(
         model=saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1),
         load=saltus.Load(vertical=-0.5),
         impact=saltus.NewtonImpact(e=0.4),
     )
     explorer = saltus.explore(system, theta_1=0.2, theta_2=0.0, velocity=(0.3, 0.1), duration=9)
-    assert explorer.state == {"theta_1": 0.2, "theta_2": 0.0, "velocity": (0.3, 0.1), "time": 0.0, "duration": 9.0}
+    assert explorer.state == {
+        "theta_1": 0.2,
+        "theta_2": 0.0,
+        "velocity": (0.3, 0.1),
+        "time": 0.0,
+        "duration": 9.0,
+    }
     explorer.state = {"velocity": (0.0, 0.0)}
     assert explorer.widget.start == {
         "time": 0.0,
@@ -91,8 +108,13 @@ def test_a_system_with_several_coordinates_has_as_many_velocities(monkeypatch):
 
 
 def test_what_python_cannot_show_is_refused_and_changes_nothing(explorer):
-    other = saltus.System(model=saltus.WallOscillator(damping=0.1), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5)))
-    with pytest.raises(saltus.ParameterError, match="system must differ from the explorer's in its numbers alone"):
+    other = saltus.System(
+        model=saltus.WallOscillator(damping=0.1),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5)),
+    )
+    with pytest.raises(
+        saltus.ParameterError, match="system must differ from the explorer's in its numbers alone"
+    ):
         explorer.system = other
     with pytest.raises(saltus.ParameterError, match="no coordinate 'tetha'"):
         explorer.state = {"tetha": 1.0}
@@ -107,14 +129,19 @@ def test_what_python_cannot_show_is_refused_and_changes_nothing(explorer):
 
 def test_without_anywidget_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
-    with pytest.raises(saltus.SaltusError, match=r'through the package anywidget: pip install "saltus\[explore\]"'):
+    with pytest.raises(
+        saltus.SaltusError, match=r'through the package anywidget: pip install "saltus\[explore\]"'
+    ):
         saltus.explore(SYSTEM, theta=0.3)
 
 
 def test_a_branch_appears_while_it_grows(explorer, monkeypatch):
-    monkeypatch.setattr("saltus.web.study_page.monotonic", iter(range(1000)).__next__)  # a second between any two orbits
+    # a second between any two orbits
+    monkeypatch.setattr("saltus.web.study_page.monotonic", iter(range(1000)).__next__)
     seen = []
-    explorer.widget.observe(lambda change: seen.append(change.new[0]["branches"][0]["parameter"]), "results")
+    explorer.widget.observe(
+        lambda change: seen.append(change.new[0]["branches"][0]["parameter"]), "results"
+    )
     orbit = saltus.find_orbit(SYSTEM, theta=0.3)
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92), growing=explorer.add)
     assert seen[-1] == branch.parameters.tolist()
@@ -133,7 +160,10 @@ def test_growing_changes_no_branch_and_is_told_the_whole_one():
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92), growing=told.append)
     assert told[-1] is branch
     assert all(str(each.ends[0]) == "is still followed" for each in told[:-1])
-    assert saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92)).parameters.tolist() == branch.parameters.tolist()
+    assert (
+        saltus.continue_orbit(orbit, "load.frequency", (0.88, 0.92)).parameters.tolist()
+        == branch.parameters.tolist()
+    )
 
 
 STUDY = """
@@ -151,8 +181,12 @@ periods = 5
 """
 
 
-@pytest.mark.parametrize(("opens", "said"), [(True, "your browser opens it"), (False, "open it in a browser")])
-def test_the_command_makes_the_page_among_the_results_and_opens_it(tmp_path, monkeypatch, opens, said):
+@pytest.mark.parametrize(
+    ("opens", "said"), [(True, "your browser opens it"), (False, "open it in a browser")]
+)
+def test_the_command_makes_the_page_among_the_results_and_opens_it(
+    tmp_path, monkeypatch, opens, said
+):
     opened = []
     monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or opens)
     monkeypatch.chdir(tmp_path)
@@ -163,7 +197,7 @@ def test_the_command_makes_the_page_among_the_results_and_opens_it(tmp_path, mon
     assert "<title>cell</title>" in (tmp_path / "results" / "cell" / "cell.html").read_text()
 
 
-# --- the notebook's half ---------------------------------------------------------------------------------------------------
+# --- the notebook's half -----------------------------------------------------
 
 NOTEBOOK = """<!doctype html><meta charset="utf-8"><body style="margin: 0; color: white; background: black"><div id="cell"></div>
 <script type="application/json" id="traits">%s</script><script type="text/plain" id="module">%s</script><script type="module">
@@ -204,7 +238,9 @@ def notebook(window, tmp_path):
     }
     traits |= {"title": "A wall", "height": 900, "page": stand_in.page_of(described)}
     module = (one_file.PAGE / "notebook.js").read_text()
-    (tmp_path / "notebook.html").write_text(NOTEBOOK % (json.dumps(traits).replace("<", "\\u003c"), module))
+    (tmp_path / "notebook.html").write_text(
+        NOTEBOOK % (json.dumps(traits).replace("<", "\\u003c"), module)
+    )
     window.errors.clear()
     window.open(tmp_path / "notebook.html", 1300, 940)
     told(window, "values.load.frequency", 0.8, 'model.python("periods", 11)')  # the page is there
@@ -223,14 +259,23 @@ def told(window, name, value, act="0"):
 
 
 def test_the_page_in_its_frame_and_the_notebook_tell_each_other(notebook):
-    assert notebook.evaluate("document.querySelector('iframe').getAttribute('sandbox')") == "allow-scripts allow-downloads"
-    assert notebook.evaluate("document.querySelector('iframe').contentDocument") is None  # neither reaches into the other
+    assert (
+        notebook.evaluate("document.querySelector('iframe').getAttribute('sandbox')")
+        == "allow-scripts allow-downloads"
+    )
+    # neither reaches into the other
+    assert notebook.evaluate("document.querySelector('iframe').contentDocument") is None
     damped = 'model.python("values", {...model.get("values"), "model.damping": 0.4})'
     assert told(notebook, "values.model.damping", 0.4, damped)["periods"] == 11
     refused = 'model.python("values", {...model.get("values"), "model.damping": -1})'
-    assert told(notebook, "values.model.damping", 0.4, refused)["values"]["model.damping"] == 0.4  # what is still shown
+    # what is still shown
+    assert told(notebook, "values.model.damping", 0.4, refused)["values"]["model.damping"] == 0.4
     started = 'model.python("start", {time: 0, x: 0.25, x_velocity: 0.5})'
-    assert told(notebook, "start.x", 0.25, started)["start"] == {"time": 0, "x": 0.25, "x_velocity": 0.5}
+    assert told(notebook, "start.x", 0.25, started)["start"] == {
+        "time": 0,
+        "x": 0.25,
+        "x_velocity": 0.5,
+    }
 
 
 def test_a_click_in_the_frame_reaches_python_and_the_view_can_be_closed(notebook):
@@ -242,7 +287,9 @@ def test_a_click_in_the_frame_reaches_python_and_the_view_can_be_closed(notebook
     assert heard["x"] != 0
     assert heard["x_velocity"] != 0
     assert notebook.evaluate("model.listeners()") == 4
-    assert notebook.evaluate("(end(), [model.listeners(), document.querySelectorAll('iframe').length])") == [0, 0]
+    assert notebook.evaluate(
+        "(end(), [model.listeners(), document.querySelectorAll('iframe').length])"
+    ) == [0, 0]
 
 
 class Backlash(saltus.ContactModel):
@@ -256,8 +303,12 @@ class Backlash(saltus.ContactModel):
 
 
 @pytest.mark.parametrize("show", [saltus.page, saltus.explore])
-def test_surfaces_which_a_page_does_not_follow_are_refused_by_both_doors(show, tmp_path, monkeypatch):
+def test_surfaces_which_a_page_does_not_follow_are_refused_by_both_doors(
+    show, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(saltus.ParameterError, match="a page follows no surfaces so far, and Backlash has some"):
+    with pytest.raises(
+        saltus.ParameterError, match="a page follows no surfaces so far, and Backlash has some"
+    ):
         show(saltus.System(model=Backlash()), x=0.0)
     assert list(tmp_path.iterdir()) == []

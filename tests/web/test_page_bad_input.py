@@ -1,4 +1,6 @@
-"""What the page makes of damaged links, and of links that ask for what cannot be: in node, with the engine of a real page."""
+"""What the page makes of damaged links, and of links that ask for what cannot be: in node, with the
+engine of a real page.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,17 @@ def answers(kind, folder, damaged, extremes):
     wasm, description = page_parts(system)
     bounds = accepted(system)
     simulate = {"periods": 20} if system.load.period else {"duration": 20.0}
-    names = [name for each in description["model"]["coordinates"] for name in (each["name"], each["velocity"])]
+    names = [
+        name
+        for each in description["model"]["coordinates"]
+        for name in (each["name"], each["velocity"])
+    ]
     description |= {
-        "numbers": [entry | {"accepted": bounds[entry["path"]]} for entry in description["numbers"]],
-        "start": dict.fromkeys(["time", *names], 0.0) | {name: value for name, value in start.items() if name in names},
+        "numbers": [
+            entry | {"accepted": bounds[entry["path"]]} for entry in description["numbers"]
+        ],
+        "start": dict.fromkeys(["time", *names], 0.0)
+        | {name: value for name, value in start.items() if name in names},
         "study": {"system": system.to_dict(), "simulate": simulate},
         "digest": "of the page",
     }
@@ -36,7 +45,8 @@ def check(found, damaged, extremes):
     assert sum(found["kinds"].values()) == extremes
     assert found["kinds"]["refused"] > 0
     assert found["kinds"]["whole"] > 0  # whether one ends early depends on the machine's time
-    assert found["slowest"] < 15_000  # milliseconds; two of them are computed, more where the machine does other things
+    # milliseconds; two of them are computed, more where the machine does other things
+    assert found["slowest"] < 15_000
 
 
 def test_damaged_links_are_refused_and_extreme_numbers_break_nothing(tmp_path):

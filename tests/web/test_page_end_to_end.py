@@ -1,4 +1,6 @@
-"""Pages as saltus writes them, opened from disk in a real browser: what a reader does on them, against Python."""
+"""Pages as saltus writes them, opened from disk in a real browser: what a reader does on them,
+against Python.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +9,23 @@ import re
 
 import numpy as np
 import pytest
-from computing_page import BROWSER, SETTLED, ComputingPage, click_at, field, place, saved, state, text
+from computing_page import (
+    BROWSER,
+    SETTLED,
+    ComputingPage,
+    click_at,
+    field,
+    place,
+    saved,
+    state,
+    text,
+)
 
 import saltus
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium, Chrome or Edge is installed here")
+pytestmark = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium, Chrome or Edge is installed here"
+)
 
 CELL = saltus.System(
     model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
@@ -38,7 +52,10 @@ def window(tmp_path_factory, file):
 def page(window):
     """The page in the state in which it opens."""
     window.errors.clear()
-    window.evaluate("saltusPage.replaceState(saltusPage.first), saltusPage.choice && document.activeElement.blur()")
+    window.evaluate(
+        "saltusPage.replaceState(saltusPage.first), saltusPage.choice && "
+        "document.activeElement.blur()"
+    )
     window.evaluate(SETTLED)
     yield window
     assert window.errors == []  # of its scripts, or of what its policy refused
@@ -62,20 +79,27 @@ def simulated(page, system=CELL, **more):
 def check_same_motion(page, motion, allowed=ROUNDING):
     """The page's motion is Python's, in its states, its events and its end."""
     times = np.linspace(motion.start, motion.time, 23)
-    found = np.array(page.evaluate(f"{times.tolist()}.map((t) => [...saltusPage.session.motion.state(t)])"))
+    found = np.array(
+        page.evaluate(f"{times.tolist()}.map((t) => [...saltusPage.session.motion.state(t)])")
+    )
     angle, velocity = motion.at(times)[:2]
     before = np.abs(times[:, None] - np.append(motion.impacts.time, -1.0)).min(axis=1) > 1e-9
     np.testing.assert_allclose(found[:, 0], angle, atol=allowed, rtol=0)
     np.testing.assert_allclose(found[before, 1], velocity[before], atol=allowed, rtol=0)
     events = page.evaluate("saltusPage.session.motion.events.map(({kind, time}) => [kind, time])")
     assert [kind for kind, _ in events] == [str(event.kind) for event in motion.events]
-    np.testing.assert_allclose([time for _, time in events], [event.time for event in motion.events], atol=allowed, rtol=0)
+    np.testing.assert_allclose(
+        [time for _, time in events], [event.time for event in motion.events], atol=allowed, rtol=0
+    )
     assert page.evaluate("saltusPage.session.motion.time.last") == motion.time
 
 
 def numbers_in(said):
     """The numbers of a text, by the names before their signs of equality."""
-    return {name: float(value) for name, value in re.findall(r"(\S+) = ([-+.\de]+)", said.replace("−", "-"))}
+    return {
+        name: float(value)
+        for name, value in re.findall(r"(\S+) = ([-+.\de]+)", said.replace("−", "-"))
+    }
 
 
 def test_the_page_works_from_disk_and_asks_for_nothing(page, file):
@@ -84,7 +108,9 @@ def test_the_page_works_from_disk_and_asks_for_nothing(page, file):
     assert [address for address in page.requests if address.startswith("file:")] == [file.as_uri()]
     check_same_motion(page, simulated(page))
     motion = simulated(page)
-    assert text(page, "#summary").startswith(f"{len(motion.impacts)} impacts up to time {motion.time:.6g}.")
+    assert text(page, "#summary").startswith(
+        f"{len(motion.impacts)} impacts up to time {motion.time:.6g}."
+    )
     assert "The model holds at this moment." in text(page, "#validity")
 
 
@@ -96,7 +122,12 @@ def test_every_number_is_typed_and_the_motion_is_that_of_python(page):
     for path, degrees in (("model.beta0", 79.0), ("load.horizontal.phase", 30.0)):
         page.type(field(path), repr(degrees))
         changes[path] = np.deg2rad(degrees)
-    for path, value in (("start.theta", 0.25), ("start.theta_velocity", 0.1), ("start.time", 0.3), ("start.periods", 15)):
+    for path, value in (
+        ("start.theta", 0.25),
+        ("start.theta_velocity", 0.1),
+        ("start.time", 0.3),
+        ("start.periods", 15),
+    ):
         page.type(field(path), repr(value))
     assert {path: state(page)["values"][path] for path in changes} == changes
     assert set(state(page)["values"]) == set(CELL.parameters)
@@ -104,7 +135,8 @@ def test_every_number_is_typed_and_the_motion_is_that_of_python(page):
 
 
 @pytest.mark.parametrize(
-    ("path", "value"), [("model.damping", -0.5), ("model.beta0", 4), ("impact.e", -1), ("load.frequency", 0)]
+    ("path", "value"),
+    [("model.damping", -0.5), ("model.beta0", 4), ("impact.e", -1), ("load.frequency", 0)],
 )
 def test_what_python_refuses_is_refused_beside_its_field_in_the_same_sentence(page, path, value):
     before = page.evaluate("saltusPage.session.motion.end")
@@ -120,8 +152,16 @@ def test_what_python_refuses_is_refused_beside_its_field_in_the_same_sentence(pa
     ("path", "typed", "said"),
     [
         ("load.frequency", "1e300", "load.frequency must be at most 1e+100 in size, got 1e+300"),
-        ("load.horizontal.amplitude", "-1e120", "load.horizontal.amplitude must be at most 1e+100 in size, got -1e+120"),
-        ("start.time", "1e99", "the motion must start and end within 2^53 forcing periods, got 1.59155e+98 of them"),
+        (
+            "load.horizontal.amplitude",
+            "-1e120",
+            "load.horizontal.amplitude must be at most 1e+100 in size, got -1e+120",
+        ),
+        (
+            "start.time",
+            "1e99",
+            "the motion must start and end within 2^53 forcing periods, got 1.59155e+98 of them",
+        ),
         ("start.periods", "1e9", "periods must lie in (0, 2000] on this page, got 1000000000"),
         ("model.damping", "NaN", "damping must be a finite number, got 'NaN'"),
         ("impact.e", "<b>", "e must be a finite number, got '<b>'"),
@@ -147,7 +187,9 @@ def test_a_motion_that_leaves_the_range_of_numbers_is_said_to_end(page):
 def test_a_slider_is_dragged_and_moved_by_keys(page):
     slider = f"document.querySelector('{field('model.damping', '.slider')}')"
     page.evaluate(f"{slider}.scrollIntoView({{block: 'center'}})")
-    box = page.evaluate(f"(({{x, y, width, height}}) => [x, y, width, height])({slider}.getBoundingClientRect())")
+    box = page.evaluate(
+        f"(({{x, y, width, height}}) => [x, y, width, height])({slider}.getBoundingClientRect())"
+    )
     thumb = page.evaluate(f"{slider}.value / 1000")
     left, top = box[0] + 8 + thumb * (box[2] - 16), box[1] + box[3] / 2
     page.point("mousePressed", left, top)
@@ -173,8 +215,12 @@ def test_what_is_selected_in_one_view_is_marked_in_all(page):
     angle, velocity = (float(each[0]) for each in motion.at([hovered])[:2])
     assert said["τ"] == hovered
     assert [said["θ"], said["θ̇"]] == pytest.approx([angle, velocity], abs=ROUNDING)
-    kinetic = CELL.model.kinetic_energy(hovered, angle, velocity, math.copysign(1.0, angle), CELL.load)
-    assert page.evaluate(f"saltusPage.session.motion.energy({hovered!r})") == pytest.approx(kinetic, rel=1e-10)
+    kinetic = CELL.model.kinetic_energy(
+        hovered, angle, velocity, math.copysign(1.0, angle), CELL.load
+    )
+    assert page.evaluate(f"saltusPage.session.motion.energy({hovered!r})") == pytest.approx(
+        kinetic, rel=1e-10
+    )
     changed = [a != b for a, b in zip(before, page.evaluate(pictures), strict=True)]
     assert changed[:2] == [True, True]
     page.press("Escape", 27)
@@ -212,7 +258,10 @@ def test_what_is_not_to_be_believed_is_said_there_and_then(page):
         page.evaluate(SETTLED)
         assert text(page, "#validity").startswith("Past ") == known
     said = "document.querySelector('#summary').textContent.includes('passed first')"
-    page.evaluate(f"new Promise((done) => {{ const look = () => ({said} ? done() : setTimeout(look, 20)); look(); }})")
+    page.evaluate(
+        f"new Promise((done) => {{ const look = () => ({said} ? done() : setTimeout(look, 20)); "
+        f"look(); }})"
+    )
     assert f"line limit passed first at {first:.6g}" in text(page, "#summary")
 
 
@@ -232,7 +281,13 @@ def test_a_click_starts_a_motion_and_keys_do_the_same(page):
 
 def test_two_fingers_zoom(page):
     left, top = place(page, "phase", 0.0, 0.0)
-    points = lambda apart: [{"x": left - apart, "y": top, "id": 0}, {"x": left + apart, "y": top, "id": 1}]  # noqa: E731
+
+    def points(apart):
+        return [
+            {"x": left - apart, "y": top, "id": 0},
+            {"x": left + apart, "y": top, "id": 1},
+        ]
+
     whole = page.evaluate("saltusPage.plotOf('phase').seen()")
     page("Input.dispatchTouchEvent", type="touchStart", touchPoints=points(20))
     page("Input.dispatchTouchEvent", type="touchMove", touchPoints=points(40))
@@ -276,21 +331,35 @@ def test_the_link_opens_the_same_motion_and_exports_make_it_in_python(page, file
 def test_basins_are_those_of_motions_in_python(page):
     page.evaluate("saltusPage.store.set({windows: {phase: [-1.8, 1.8, -1, 1]}})")
     page.click("#basins-run")
-    looking = "const look = () => saltusPage.basins.counted > 600 ? done() : setTimeout(look, 20); look();"
+    looking = (
+        "const look = () => saltusPage.basins.counted > 600 ? done() : setTimeout(look, "
+        "20); look();"
+    )
     page.evaluate(f"new Promise((done) => {{ {looking} }})")
     page.evaluate("saltusPage.toggleBasins()")
-    found = page.evaluate("saltusPage.basins.attractors.map(({name, period, section}) => [name, period, section])")
+    found = page.evaluate(
+        "saltusPage.basins.attractors.map(({name, period, section}) => [name, period, section])"
+    )
     assert len(found) == 4
     assert sorted(period for _, period, _ in found) == [0, 1, 1, 1]
     assert all(re.fullmatch(r"rest|period 1, amplitude [\d.]+", name) for name, _, _ in found)
     assert text(page, "#basins-legend").count("period 1") == 3
-    known = "[...saltusPage.basins.labels.entries()].filter(([, label]) => label >= 0).filter((_, i) => i % 29 === 0)"
-    cells = page.evaluate(f"{known}.map(([cell, label]) => (({{x, y}}) => [x, y, label])(saltusPage.basins.centre(cell)))")
+    known = (
+        "[...saltusPage.basins.labels.entries()].filter(([, label]) => label >= "
+        "0).filter((_, i) => i % 29 === 0)"
+    )
+    cells = page.evaluate(
+        f"{known}.map(([cell, label]) => (({{x, y}}) => [x, y, "
+        "label])(saltusPage.basins.centre(cell)))"
+    )
     assert len(cells) > 15
     assert len({label for _, _, label in cells}) > 2
     for angle, velocity, label in cells:
         motion = saltus.simulate(CELL, theta=angle, velocity=velocity, periods=100)
-        ends = [max(abs(motion.theta - section[0]), abs(motion.velocity - section[1])) for _, _, section in found]
+        ends = [
+            max(abs(motion.theta - section[0]), abs(motion.velocity - section[1]))
+            for _, _, section in found
+        ]
         assert int(np.argmin(ends)) == label
         assert min(ends) < 1e-3
 

@@ -1,4 +1,6 @@
-"""The page in a real browser, with a plain integrator in the place of the engine: clicks, typing, keys, links, exports."""
+"""The page in a real browser, with a plain integrator in the place of the engine: clicks, typing,
+keys, links, exports.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ import pytest
 import stand_in
 from computing_page import BROWSER, SETTLED, ComputingPage, click_at, field, place, saved, state
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium, Chrome or Edge is installed here")
+pytestmark = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium, Chrome or Edge is installed here"
+)
 
 
 def spectrum() -> dict[str, Any]:
@@ -51,7 +55,10 @@ def window(tmp_path_factory):
 def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "page.html"
     path.write_text(
-        stand_in.page_of(stand_in.wall() | {"results": [spectrum(), spectrum() | {"digest": "foreign", "title": "Other"}]})
+        stand_in.page_of(
+            stand_in.wall()
+            | {"results": [spectrum(), spectrum() | {"digest": "foreign", "title": "Other"}]}
+        )
     )
     return path
 
@@ -59,7 +66,9 @@ def file(tmp_path_factory):
 @pytest.fixture
 def page(window, file):
     window.errors.clear()
-    window("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
+    window(
+        "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}]
+    )
     window.go("about:blank")
     window.open(file, 1440, 1000)
     yield window
@@ -67,11 +76,19 @@ def page(window, file):
 
 
 def test_the_page_opens_from_disk_and_asks_for_nothing_else(page):
-    assert page.evaluate("performance.getEntriesByType('resource').every(({name}) => name.startsWith('blob:'))")  # its own text
+    # its own text
+    assert page.evaluate(
+        "performance.getEntriesByType('resource').every(({name}) => name.startsWith('blob:'))"
+    )
     assert page.evaluate("document.querySelector('#notice').hidden")
     assert page.evaluate("document.title") == "An oscillator at a wall"
-    assert "default-src 'none'" in page.evaluate("document.querySelector('meta[http-equiv]').content")
-    assert page.evaluate("fetch('data:text/plain,x').then(() => 'reached', () => 'refused')") == "refused"
+    assert "default-src 'none'" in page.evaluate(
+        "document.querySelector('meta[http-equiv]').content"
+    )
+    assert (
+        page.evaluate("fetch('data:text/plain,x').then(() => 'reached', () => 'refused')")
+        == "refused"
+    )
     page.errors.clear()  # of the policy, which the line above went against
 
 
@@ -89,10 +106,14 @@ def test_a_typed_number_changes_the_motion_and_a_refused_one_says_why_beside_the
     before = page.evaluate("saltusPage.session.motion.state(50)")
     page.type(field("model.damping"), "-1")
     assert state(page)["values"]["model.damping"] == 0.25
-    said = page.evaluate(f"document.querySelector('{field('model.damping', '.refusal')}').textContent")
+    said = page.evaluate(
+        f"document.querySelector('{field('model.damping', '.refusal')}').textContent"
+    )
     assert said == "damping must lie in [0, inf), got -1. The page still shows 0.25."
     page.type(field("model.damping"), "abc")
-    said = page.evaluate(f"document.querySelector('{field('model.damping', '.refusal')}').textContent")
+    said = page.evaluate(
+        f"document.querySelector('{field('model.damping', '.refusal')}').textContent"
+    )
     assert said.startswith("damping must be a finite number, got 'abc'")
     assert page.evaluate("saltusPage.session.motion.state(50)") == before
     page.click(field("model.damping", ".reset"))
@@ -106,14 +127,19 @@ def test_a_slider_moves_the_number_and_its_range_can_be_changed(page):
     assert state(page)["values"]["impact.e"] == 0.9
     assert page.evaluate(f"document.querySelector('{field('impact.e')}').value") == "0.9"
     page.type(field("impact.e", ".low"), "2")
-    assert "lower end" in page.evaluate(f"document.querySelector('{field('impact.e', '.refusal')}').textContent")
+    assert "lower end" in page.evaluate(
+        f"document.querySelector('{field('impact.e', '.refusal')}').textContent"
+    )
 
 
 def test_angles_are_degrees_or_radians(page):
     page.type(field("load.force.phase"), "90")
     assert state(page)["values"]["load.force.phase"] == math.pi / 2
     page.click("#degrees")
-    assert page.evaluate(f"document.querySelector('{field('load.force.phase')}').value") == "1.5707963267948966"
+    assert (
+        page.evaluate(f"document.querySelector('{field('load.force.phase')}').value")
+        == "1.5707963267948966"
+    )
     page.type(field("load.force.phase"), "45 deg")
     assert state(page)["values"]["load.force.phase"] == math.pi / 4
 
@@ -159,9 +185,13 @@ def test_wheel_dragging_and_keys_zoom_and_pan(page):
     assert state(page)["windows"]["history"] is None
     page.press("+", 187)
     page.press("ArrowRight", 39)
-    assert page.evaluate("document.querySelector('#view-history + .readout').textContent").startswith("τ = ")
+    assert page.evaluate(
+        "document.querySelector('#view-history + .readout').textContent"
+    ).startswith("τ = ")
     page.press("Enter", 13)
-    assert state(page)["cursor"] == pytest.approx(page.evaluate("saltusPage.plotOf('history').cursor.x"))
+    assert state(page)["cursor"] == pytest.approx(
+        page.evaluate("saltusPage.plotOf('history').cursor.x")
+    )
 
 
 def test_the_readout_has_all_digits_of_the_motion(page):
@@ -187,7 +217,9 @@ def test_the_link_opens_the_same_state_and_a_damaged_one_is_refused(page, file):
         told = page.evaluate("document.querySelector('#notice').textContent")
         assert ("damaged" in told) == refused
         kept = ("values", "start", "cursor", "periods")
-        assert [after[name] == before[name] for name in kept] == ([False, False, False, True] if refused else [True] * 4)
+        assert [after[name] == before[name] for name in kept] == (
+            [False, False, False, True] if refused else [True] * 4
+        )
 
 
 def test_a_click_on_a_branch_shows_its_orbit_and_arrow_keys_step_along(page):
@@ -224,9 +256,13 @@ def test_a_result_of_another_system_is_not_shown(page):
 def test_a_sweep_carries_the_motion_up_and_down(page):
     for name, value in (("values", 5), ("periods at each", 10)):
         script = (
-            f"[...document.querySelectorAll('.setting')].find((l) => l.textContent.startsWith({name!r})).querySelector('input')"
+            "[...document.querySelectorAll('.setting')].find((l) => "
+            f"l.textContent.startsWith({name!r})).querySelector('input')"
         )
-        page.evaluate(f"(() => {{ const i = {script}; i.value = '{value}'; i.dispatchEvent(new Event('change')); }})()")
+        page.evaluate(
+            f"(() => {{ const i = {script}; i.value = '{value}'; i.dispatchEvent(new "
+            f"Event('change')); }})()"
+        )
     page.click("#sweep-controls .run")
     done = """new Promise((done) => { const look = () => saltusPage.sweep.result.done
     ? done(saltusPage.sweep.result) : setTimeout(look, 20); look(); })"""
@@ -240,7 +276,10 @@ def test_pictures_and_columns_are_exported(page):
     svg = saved(page, '[aria-label="Phase plane as SVG"]')
     assert svg.startswith("<svg")
     assert svg.count("<path") > 8
-    columns = page.evaluate("saltusPage.plots.map(({view}) => Object.entries(view.csv()).map(([n, c]) => [n, c.length]))")
+    columns = page.evaluate(
+        "saltusPage.plots.map(({view}) => Object.entries(view.csv()).map(([n, c]) => [n, "
+        "c.length]))"
+    )
     phase = dict(columns[0])
     assert set(phase) == {"time", "x", "x_velocity"}
     assert len(set(phase.values())) == 1 < phase["time"]
@@ -254,7 +293,8 @@ def test_the_colours_follow_the_reader_and_the_switch(page, file, scheme):
     background = "getComputedStyle(document.documentElement).backgroundColor"
     assert page.evaluate(background) == paper[scheme]
     page.evaluate(
-        "(() => { const s = document.querySelector('#theme'); s.value = 'dark'; s.dispatchEvent(new Event('change')); })()"
+        "(() => { const s = document.querySelector('#theme'); s.value = 'dark'; "
+        "s.dispatchEvent(new Event('change')); })()"
     )
     assert page.evaluate(background) == paper["dark"]
 
@@ -263,15 +303,24 @@ def test_everything_has_a_name_for_screen_readers(page):
     page("Accessibility.enable")
     nodes = page("Accessibility.getFullAXTree")["nodes"]
     named = ("button", "slider", "textbox", "combobox", "checkbox", "application", "img")
-    nameless = [n for n in nodes if n.get("role", {}).get("value") in named and not n.get("name", {}).get("value")]
+    nameless = [
+        n
+        for n in nodes
+        if n.get("role", {}).get("value") in named and not n.get("name", {}).get("value")
+    ]
     assert not nameless
     assert len([n for n in nodes if n.get("role", {}).get("value") == "slider"]) > 8
     page("Accessibility.disable")
 
 
 def test_a_hostile_study_is_text(window, tmp_path):
-    hostile = stand_in.wall() | {"title": "<img src=x onerror=alert(1)></title><script>alert(1)</script>"}
-    hostile["results"] = [spectrum() | {"title": "<b>bold</b>"}, spectrum() | {"title": "<i>second</i>"}]
+    hostile = stand_in.wall() | {
+        "title": "<img src=x onerror=alert(1)></title><script>alert(1)</script>"
+    }
+    hostile["results"] = [
+        spectrum() | {"title": "<b>bold</b>"},
+        spectrum() | {"title": "<i>second</i>"},
+    ]
     (tmp_path / "page.html").write_text(stand_in.page_of(hostile))
     window.errors.clear()
     window.open(tmp_path / "page.html", 1200)

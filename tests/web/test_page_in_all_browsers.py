@@ -1,4 +1,6 @@
-"""The same page in node, Chromium and Firefox: every number of its motions is the same, to the last bit."""
+"""The same page in node, Chromium and Firefox: every number of its motions is the same, to the last
+bit.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,26 @@ def check_same_bits(kinds, each, folder, browsers):
     counted = 0
     for kind in kinds:
         made = [kind(rng) for _ in range(each)]
-        asked = [{"values": system.parameters, "start": as_start(system, start), **length_of(system)} for system, start in made]
+        asked = [
+            {"values": system.parameters, "start": as_start(system, start), **length_of(system)}
+            for system, start in made
+        ]
         wasm, description = page_parts(made[0][0])
-        (known,) = in_node([{"wasm": wasm, "description": description, "motions": [one | {"at": AT} for one in asked]}], folder)
+        (known,) = in_node(
+            [
+                {
+                    "wasm": wasm,
+                    "description": description,
+                    "motions": [one | {"at": AT} for one in asked],
+                }
+            ],
+            folder,
+        )
         file = saltus.page(made[0][0], path=folder / "page.html", **made[0][1])
         for browser in browsers:
-            browser.open(file, READY) if isinstance(browser, FirefoxPage) else browser.open(file, 1200)
+            browser.open(file, READY) if isinstance(browser, FirefoxPage) else browser.open(
+                file, 1200
+            )
             found = browser.evaluate(f"{FOLLOWED}({json.dumps({'asked': asked, 'at': AT})})")
             for one, other in zip(known, found, strict=True):
                 assert {name: one[name] for name in other} == other, kind
@@ -42,7 +58,9 @@ def check_same_bits(kinds, each, folder, browsers):
     return counted
 
 
-@pytest.mark.skipif(NODE is None or BROWSER is None, reason="node or a Chromium is not installed here")
+@pytest.mark.skipif(
+    NODE is None or BROWSER is None, reason="node or a Chromium is not installed here"
+)
 def test_motions_in_chromium_are_those_in_node_to_the_last_bit(tmp_path):
     page = ComputingPage(str(BROWSER), tmp_path / "profile")
     try:
@@ -53,10 +71,14 @@ def test_motions_in_chromium_are_those_in_node_to_the_last_bit(tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.skipif(
-    NODE is None or BROWSER is None or FIREFOX is None, reason="node, a Chromium or Firefox is not installed here"
+    NODE is None or BROWSER is None or FIREFOX is None,
+    reason="node, a Chromium or Firefox is not installed here",
 )
 def test_motions_of_all_models_are_the_same_in_node_chromium_and_firefox_to_the_last_bit(tmp_path):
-    chromium, firefox = ComputingPage(str(BROWSER), tmp_path / "profile"), FirefoxPage(str(FIREFOX), tmp_path / "other")
+    chromium, firefox = (
+        ComputingPage(str(BROWSER), tmp_path / "profile"),
+        FirefoxPage(str(FIREFOX), tmp_path / "other"),
+    )
     try:
         assert check_same_bits(KINDS, 5, tmp_path, [chromium, firefox]) > 2000
     finally:

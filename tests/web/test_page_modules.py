@@ -1,4 +1,6 @@
-"""The page's modules without a browser: in node where it is installed, and their exports and geometry against Python's."""
+"""The page's modules without a browser: in node where it is installed, and their exports and
+geometry against Python's.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,27 @@ def node(script: str) -> object:
     """What a script for node prints as JSON; it may import the page's modules as `page/name.js`."""
     address = one_file.PAGE.as_uri()
     script = script.replace('"page/', f'"{address}/')
-    command = [str(NODE), "--no-warnings", "--experimental-default-type=module", "--input-type=module", "-e", script]
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout)
+    command = [
+        str(NODE),
+        "--no-warnings",
+        "--experimental-default-type=module",
+        "--input-type=module",
+        "-e",
+        script,
+    ]
+    return json.loads(
+        subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
+    )
 
 
 @needs_node
 def test_the_modules_do_what_their_own_tests_say():
-    done = subprocess.run([str(NODE), "--test", str(HERE / "modules.test.mjs")], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [str(NODE), "--test", str(HERE / "modules.test.mjs")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
 
 
@@ -46,24 +62,37 @@ def test_texts_of_a_study_are_never_markup():
     hostile = stand_in.wall() | {"title": '</script><script>alert("1")</script>{{script}}'}
     page = stand_in.page_of(hostile)
     assert "<script>alert" not in page
-    assert page.count("<script") == 5  # the description, the engine, the worker, the joined modules and what unpacks them
+    # the description, the engine, the worker, the joined modules and what unpacks them
+    assert page.count("<script") == 5
     assert "default-src 'none'" in page
 
 
 @needs_node
-@pytest.mark.parametrize(("beta0", "theta_1", "theta_2"), [(1.4, 0.0, 0.0), (1.4, 0.6, 0.0), (1.1, 0.3, -1.2), (2.0, 1.9, -0.2)])
+@pytest.mark.parametrize(
+    ("beta0", "theta_1", "theta_2"),
+    [(1.4, 0.0, 0.0), (1.4, 0.6, 0.0), (1.1, 0.3, -1.2), (2.0, 1.9, -0.2)],
+)
 def test_the_cell_on_the_page_is_that_of_unit_cell(beta0, theta_1, theta_2):
     base = 1.7
     cell = saltus.UnitCell(beta0=beta0, alpha0=math.atan2(math.sin(beta0), base - math.cos(beta0)))
     layout = cell.layout(theta_1, theta_2).points
-    script = 'import { cellPoints } from "page/cell_drawing.js"; console.log(JSON.stringify(cellPoints(%r, %r, %r)));'
+    script = (
+        'import { cellPoints } from "page/cell_drawing.js"; '
+        "console.log(JSON.stringify(cellPoints(%r, %r, %r)));"
+    )
     drawn = node(script % (beta0, theta_1, theta_2))
-    names = {"lowerLeft": "lower_left", "middleRight": "middle_right", "upperLeft": "upper_left", "upperRight": "upper_right"}
+    names = {
+        "lowerLeft": "lower_left",
+        "middleRight": "middle_right",
+        "upperLeft": "upper_left",
+        "upperRight": "upper_right",
+    }
     for ours, theirs in {**names, "mass1": "mass_1", "mass2": "mass_2"}.items():
         np.testing.assert_allclose(drawn[ours], layout[theirs], atol=1e-12)
     for layer in (1, 2):
         ends = [layout[f"slider_{layer}_in"], layout[f"slider_{layer}_out"]]
-        np.testing.assert_allclose(drawn[f"slider{layer}"], ends, atol=1e-7)  # a square root at a closed layer
+        # a square root at a closed layer
+        np.testing.assert_allclose(drawn[f"slider{layer}"], ends, atol=1e-7)
 
 
 EXPORT = """
@@ -79,8 +108,18 @@ console.log(JSON.stringify([asToml(description, state), asPython(description, st
 
 def described(system: saltus.System, **start: float) -> dict:
     """What the exports need of a description, for any system."""
-    coordinates = [{"name": name, "velocity": f"{name}_velocity", "unit": "1"} for name in system.model.coordinates]
-    parts = {"model": {"name": type(system.model).__name__, "coordinates": coordinates, "parameters": []}, "load": []}
+    coordinates = [
+        {"name": name, "velocity": f"{name}_velocity", "unit": "1"}
+        for name in system.model.coordinates
+    ]
+    parts = {
+        "model": {
+            "name": type(system.model).__name__,
+            "coordinates": coordinates,
+            "parameters": [],
+        },
+        "load": [],
+    }
     return parts | {
         "start": {"time": 0.0, **start},
         "study": {"system": json.loads(system.to_json()), "simulate": {"periods": 3}},
@@ -107,11 +146,21 @@ BLOCK = saltus.System(
 @pytest.mark.parametrize(
     ("system", "values", "start"),
     [
-        (STOPS, {"load.force.1.amplitude": 1e-7, "model.damping": 0.1 + 0.2, "impact.e": 1.0}, {"x": -1 / 3, "x_velocity": 2.0}),
-        (BLOCK, {"model.alpha": 0.25, "load.ground_horizontal.amplitude": 2.0, "load.frequency": 1.5}, {"theta": 0.05}),
+        (
+            STOPS,
+            {"load.force.1.amplitude": 1e-7, "model.damping": 0.1 + 0.2, "impact.e": 1.0},
+            {"x": -1 / 3, "x_velocity": 2.0},
+        ),
+        (
+            BLOCK,
+            {"model.alpha": 0.25, "load.ground_horizontal.amplitude": 2.0, "load.frequency": 1.5},
+            {"theta": 0.05},
+        ),
     ],
 )
-def test_an_exported_study_and_exported_python_make_the_same_system(tmp_path, system, values, start):
+def test_an_exported_study_and_exported_python_make_the_same_system(
+    tmp_path, system, values, start
+):
     given = json.dumps(described(system, **start)), json.dumps(values), json.dumps(start)
     toml, python = node(EXPORT % given)
     (tmp_path / "study.toml").write_text(toml)

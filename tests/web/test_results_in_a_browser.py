@@ -10,14 +10,18 @@ from results_of_all_kinds import SYSTEM
 
 import saltus
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium, Chrome or Edge is installed here")
+pytestmark = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium, Chrome or Edge is installed here"
+)
 
 
 @pytest.fixture(scope="module")
 def window(tmp_path_factory):
     """A page with a branch, a chart, basins and a manifold laid over it."""
     results = (made.branch(), made.chart(), made.basins(), made.manifold())
-    file = saltus.page(SYSTEM, *results, path=tmp_path_factory.mktemp("page") / "results.html", theta=0.3)
+    file = saltus.page(
+        SYSTEM, *results, path=tmp_path_factory.mktemp("page") / "results.html", theta=0.3
+    )
     page = ComputingPage(str(BROWSER), tmp_path_factory.mktemp("profile"))
     page.open(file, 1440, 1000)
     yield page
@@ -27,7 +31,10 @@ def window(tmp_path_factory):
 @pytest.fixture
 def page(window):
     window.errors.clear()
-    window.evaluate("saltusPage.replaceState({...saltusPage.first, selected: null}), document.activeElement.blur()")
+    window.evaluate(
+        "saltusPage.replaceState({...saltusPage.first, selected: null}), "
+        "document.activeElement.blur()"
+    )
     choose(window, 0)
     yield window
     assert window.errors == []
@@ -44,18 +51,29 @@ def choose(page, result):
 
 def end_of_motion(page):
     """The state at the end of the motion that the page shows."""
-    return np.array(page.evaluate("(() => { const m = saltusPage.session.motion; return [...m.state(m.time.last)]; })()"))
+    return np.array(
+        page.evaluate(
+            "(() => { const m = saltusPage.session.motion; return [...m.state(m.time.last)]; })()"
+        )
+    )
 
 
 def shows_the_orbit(page, point):
-    """Check that the page shows an orbit of the branch: its number, start and period, what is said of it, and that it closes."""
+    """Check that the page shows an orbit of the branch: its number, start and period, what is said
+    of it, and that it closes.
+    """
     orbit, now = made.branch().orbits[point], state(page)
     assert now["selected"] == {"result": 0, "branch": 0, "point": point}
     assert now["values"][made.FREQUENCY] == made.branch().parameters[point]
     assert now["periods"] == orbit.period
     start = orbit.start()
     assert now["start"] == pytest.approx(
-        {"theta": start["theta"], "theta_velocity": start["velocity"], "time": start.get("time", 0.0)}, abs=1e-12
+        {
+            "theta": start["theta"],
+            "theta_velocity": start["velocity"],
+            "time": start.get("time", 0.0),
+        },
+        abs=1e-12,
     )
     np.testing.assert_allclose(end_of_motion(page), [start["theta"], start["velocity"]], atol=1e-8)
     said = text(page, "#orbit")
@@ -105,7 +123,9 @@ def test_a_click_into_a_chart_starts_the_largest_motion_of_its_cell(page):
         largest = page.evaluate("""(() => { const m = saltusPage.session.motion, T = saltusPage.session.period;
         const times = Float64Array.from({length: 4000}, (_, i) => m.time.last - 6 * T * (i / 4000));
         return Math.max(...m.sample(times).theta.map(Math.abs)); })()""")
-        assert largest == pytest.approx(float(data["amplitude"].sel(horizontal=horizontal, vertical=vertical)), rel=1e-5)
+        assert largest == pytest.approx(
+            float(data["amplitude"].sel(horizontal=horizontal, vertical=vertical)), rel=1e-5
+        )
         assert state(page)["values"]["model.damping"] == 0.1
 
 

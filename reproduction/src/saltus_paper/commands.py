@@ -1,4 +1,6 @@
-"""The commands that entry points add to saltus: `saltus reproduce` makes the paper, `saltus report` its report."""
+"""The commands that entry points add to saltus: `saltus reproduce` makes the paper, `saltus report`
+its report.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +18,24 @@ RESULTS = Path("results")
 def reproduce(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="NAMES", help="Parts of the paper, such as fig04 or table1; all if none is named."),
+        typer.Argument(
+            metavar="NAMES",
+            help="Parts of the paper, such as fig04 or table1; all if none is named.",
+        ),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write to.")] = RESULTS,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The folder to write to.")
+    ] = RESULTS,
     force: Annotated[bool, typer.Option("--force", help="Make again what is up to date.")] = False,
     effort: Annotated[
-        str, typer.Option("--effort", help="quick: a draft of the whole report in about two fifths of the time, marked as such.")
+        str,
+        typer.Option(
+            "--effort",
+            help=(
+                "quick: a draft of the whole report in about two fifths of the time, marked as "
+                "such."
+            ),
+        ),
     ] = "standard",
     list_: Annotated[bool, typer.Option("--list", help="List the parts and stop.")] = False,
 ) -> None:
@@ -44,7 +58,8 @@ def reproduce(
 
 def report(
     results: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="The folder that `saltus reproduce` has written to.")
+        Path,
+        typer.Argument(metavar="FOLDER", help="The folder that `saltus reproduce` has written to."),
     ] = RESULTS,
 ) -> None:
     """Write the report on the paper anew from results that are there; nothing is computed.
@@ -58,15 +73,20 @@ def report(
     renew_report(results)
 
 
-def reproduce_paper(names: Sequence[str], output: Path, force: bool, effort: str = "standard") -> None:
-    """Reproduce the named parts of the paper, or all, into `output`; print what was made, and the verdicts on the claims."""
+def reproduce_paper(
+    names: Sequence[str], output: Path, force: bool, effort: str = "standard"
+) -> None:
+    """Reproduce the named parts of the paper, or all, into `output`; print what was made, and the
+    verdicts on the claims.
+    """
     from saltus.cli import progress_bar
     from saltus_paper import FIGURES, HEADINGS, ledger, tally, with_summaries
     from saltus_paper import reproduce as made
 
     with progress_bar("paper") as progress:
         results = made(names, output, force, progress, effort)
-    console, table = Console(highlight=False), Table(box=None, show_header=False)
+    console = Console(highlight=False)
+    table = Table(box=None, show_header=False)
     for result in results:
         time = f"{result.seconds:.1f} s of processor time" if result.made else "up to date"
         table.add_row(result.name, time, FIGURES[result.name].title)
@@ -83,10 +103,13 @@ def reproduce_paper(names: Sequence[str], output: Path, force: bool, effort: str
 
 
 def renew_report(output: Path) -> None:
-    """Write the report of the results in `output` anew, computing nothing, and print which parts are in it."""
+    """Write the report of the results in `output` anew, computing nothing, and print which parts
+    are in it.
+    """
     from saltus_paper import report_from_results
 
-    names, console = report_from_results(output), Console(highlight=False)
+    names = report_from_results(output)
+    console = Console(highlight=False)
     console.print(f"Parts in the report: {', '.join(names)}", markup=False, soft_wrap=True)
     _print_report(console, output)
 
@@ -97,7 +120,11 @@ def _print_report(console: Console, output: Path) -> None:
 
     why_not = report_as_pdf(output)
     beside = f"{why_not}." if why_not else f"{output / 'report.pdf'} is the same to print."
-    console.print(f"Results are in {output}: open {output / 'report.html'}. {beside}", markup=False, soft_wrap=True)
+    console.print(
+        f"Results are in {output}: open {output / 'report.html'}. {beside}",
+        markup=False,
+        soft_wrap=True,
+    )
 
 
 def list_parts() -> None:

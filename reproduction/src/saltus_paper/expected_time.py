@@ -1,4 +1,6 @@
-"""How long a reproduction takes here: the work of each part, and the speed of this machine, from a measured second of motions."""
+"""How long a reproduction takes here: the work of each part, and the speed of this machine, from a
+measured second of motions.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +16,20 @@ from saltus_paper.figures.harmonic_loads import under_force
 from saltus_paper.toml_tables import toml_table
 
 MEASURED = 0.5  # seconds for which motions are followed
-MOTIONS, PERIODS = 64, 50  # of one batch of them
+# of one batch of them
+MOTIONS = 64
+PERIODS = 50
 USUAL = 60.0  # seconds for a part that is not in the table
 
 
 def measured_speed() -> float:
-    """Forcing periods of the metainterface that one core follows in a second of the clock; the code for it is compiled before."""
+    """Forcing periods of the metainterface that one core follows in a second of the clock; the code
+    for it is compiled before.
+    """
     theta = np.linspace(-1.0, 1.0, MOTIONS)
     saltus.simulate_many(under_force(), theta=theta, periods=1, threads=1)
-    done, start = 0, time.perf_counter()
+    done = 0
+    start = time.perf_counter()
     while time.perf_counter() - start < MEASURED:
         saltus.simulate_many(under_force(), theta=theta, periods=PERIODS, threads=1)
         done += MOTIONS * PERIODS
@@ -30,10 +37,14 @@ def measured_speed() -> float:
 
 
 def expected_seconds(figures: Iterable[PaperFigure], speed: float) -> dict[str, float]:
-    """The seconds of one core for each of these parts at this speed, by name, from `expected_time.toml`."""
+    """The seconds of one core for each of these parts at this speed, by name, from
+    `expected_time.toml`.
+    """
     table = toml_table("expected_time.toml")
     slower = table["speed"] / speed
-    return {figure.name: slower * table[figure.effort].get(figure.name, USUAL) for figure in figures}
+    return {
+        figure.name: slower * table[figure.effort].get(figure.name, USUAL) for figure in figures
+    }
 
 
 def on_the_clock(seconds: float) -> str:

@@ -1,4 +1,6 @@
-"""Datasets with units on every variable, and with attributes for what was computed, with which system and accuracy."""
+"""Datasets with units on every variable, and with attributes for what was computed, with which
+system and accuracy.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,14 @@ TOLERANCE = 1e-12  # the tolerance of every motion that is shown in a figure
 
 
 def provenance(system: System | None = None, **more: Any) -> dict[str, Any]:
-    """The attributes of every dataset: the version of saltus, the system as JSON if there is one, and further ones."""
-    return {"saltus_version": saltus.__version__, **({"system": system.to_json()} if system else {}), **more}
+    """The attributes of every dataset: the version of saltus, the system as JSON if there is one,
+    and further ones.
+    """
+    return {
+        "saltus_version": saltus.__version__,
+        **({"system": system.to_json()} if system else {}),
+        **more,
+    }
 
 
 def dataset(
@@ -29,12 +37,17 @@ def dataset(
 ) -> xr.Dataset:
     """A Dataset from `name: (dims, values, units, meaning)`, with its provenance in its attributes."""
     parts = {name: _variable(*parts) for name, parts in variables.items()}
-    axes = {name: _variable(*parts) if isinstance(parts, tuple) else parts for name, parts in (coords or {}).items()}
+    axes = {
+        name: _variable(*parts) if isinstance(parts, tuple) else parts
+        for name, parts in (coords or {}).items()
+    }
     return xr.Dataset(parts, axes, provenance(system, what=what, **attributes))
 
 
 def _variable(dims: Any, values: Any, units: str = "1", meaning: str = "") -> xr.Variable:
-    return xr.Variable(dims, values, {"units": units, **({"long_name": meaning} if meaning else {})})
+    return xr.Variable(
+        dims, values, {"units": units, **({"long_name": meaning} if meaning else {})}
+    )
 
 
 def scalar_dataset(values: Mapping[str, float], *, what: str, **attributes: Any) -> xr.Dataset:
@@ -43,7 +56,9 @@ def scalar_dataset(values: Mapping[str, float], *, what: str, **attributes: Any)
 
 
 def largest_angle(ends: xr.Dataset) -> np.ndarray:
-    """The largest abs(theta) of each motion of an ensemble, over all periods of which extrema were kept."""
+    """The largest abs(theta) of each motion of an ensemble, over all periods of which extrema were
+    kept.
+    """
     size = np.maximum(ends["largest_theta"].values, -ends["smallest_theta"].values)
     return np.asarray(size.reshape(len(size), -1).max(axis=1))
 
@@ -55,11 +70,15 @@ def scalars(data: Any) -> dict[str, float]:
 
 def tree(groups: Mapping[str, xr.Dataset], *, what: str, **attributes: Any) -> xr.DataTree:
     """A DataTree of named datasets, such as the panels of a figure."""
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=provenance(what=what, **attributes)), **dict(groups)})
+    return xr.DataTree.from_dict(
+        {"/": xr.Dataset(attrs=provenance(what=what, **attributes)), **dict(groups)}
+    )
 
 
 def joined(panels: Mapping[str, xr.DataTree], *, what: str) -> xr.DataTree:
-    """The trees of a figure's panels as one DataTree; every variable has units, and every group its provenance."""
+    """The trees of a figure's panels as one DataTree; every variable has units, and every group its
+    provenance.
+    """
     parts = {"/": xr.Dataset(attrs=provenance(what=what))}
     for name, panel in panels.items():
         for node in panel.subtree:
@@ -73,7 +92,11 @@ def joined(panels: Mapping[str, xr.DataTree], *, what: str) -> xr.DataTree:
 
 def named(result: Any, title: str) -> Any:
     """A result with a title of its own, by which pages call it."""
-    return result.copy().assign_attrs(title=title) if isinstance(result, xr.Dataset) else _renamed(result, title)
+    return (
+        result.copy().assign_attrs(title=title)
+        if isinstance(result, xr.Dataset)
+        else _renamed(result, title)
+    )
 
 
 def _renamed(tree: xr.DataTree, title: str) -> xr.DataTree:

@@ -1,4 +1,6 @@
-"""The first page of the report: the findings that change a conclusion of the paper, and where the reduced model is valid."""
+"""The first page of the report: the findings that change a conclusion of the paper, and where the
+reduced model is valid.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from typing import Any
 from saltus_paper.claims.claim import Claim, ClaimVerdict
 from saltus_paper.toml_tables import toml_table
 
-BEARS_OUT = (ClaimVerdict.CORRECTED, ClaimVerdict.HOLDS)  # a finding: the statement fails as printed, or our own check holds
+# a finding: the statement fails as printed, or our own check holds
+BEARS_OUT = (ClaimVerdict.CORRECTED, ClaimVerdict.HOLDS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +36,9 @@ class Finding:
 
 
 def findings(claims: Iterable[Claim]) -> list[Finding]:
-    """The findings whose first claim was judged and none of whose claims contradicts them, in the order of the file."""
+    """The findings whose first claim was judged and none of whose claims contradicts them, in the
+    order of the file.
+    """
     known = {claim.id: claim for claim in claims}
     found = []
     for keys in highlight_tables()["findings"]:
@@ -44,7 +49,9 @@ def findings(claims: Iterable[Claim]) -> list[Finding]:
 
 
 def validity(claims: Iterable[Claim]) -> list[Claim]:
-    """The claims whose headlines say where the reduced model ends, in the order of `highlights.toml`."""
+    """The claims whose headlines say where the reduced model ends, in the order of
+    `highlights.toml`.
+    """
     known = {claim.id: claim for claim in claims}
     listed = [known[id] for id in highlight_tables()["validity"] if id in known]
     return [claim for claim in listed if claim.headline and claim.verdict in BEARS_OUT]

@@ -22,10 +22,12 @@ def check_writable(folder: Path) -> None:
             pass
     except (FileExistsError, NotADirectoryError) as error:
         raise ParameterError(
-            f"the output folder {folder} cannot be made: {error.filename} is a file; name another with --output"
+            f"the output folder {folder} cannot be made: {error.filename} is a file; name "
+            "another with --output"
         ) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ParameterError(
-            f"the output folder {folder} cannot be written to ({reason.lower()}); name another with --output"
+            f"the output folder {folder} cannot be written to ({reason.lower()}); name another "
+            "with --output"
         ) from error

@@ -1,4 +1,6 @@
-"""The panels of all parts of the paper, computed on all cores in one pool of processes; a panel of two parts is computed once."""
+"""The panels of all parts of the paper, computed on all cores in one pool of processes; a panel of
+two parts is computed once.
+"""
 
 from __future__ import annotations
 
@@ -13,38 +15,54 @@ from typing import Any
 
 from saltus.flow import available_cores, share_cores
 
-Panels = Mapping[str, Callable[[], Any]]  # the functions that compute the panels of a part, by the panels' names
+# the functions that compute the panels of a part, by the panels' names
+Panels = Mapping[str, Callable[[], Any]]
 Task = tuple[str, str]  # the names of a part and of its panel
 
 
 def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str, Any], float]]:
     """Compute the panels of all parts; each part is given as soon as its last panel is there.
 
-    Panels are begun in the order of the parts. Parts of a single panel each are computed here: to start a process takes longer.
+    Panels are begun in the order of the parts. Parts of a single panel each are computed here: to
+    start a process takes longer.
 
     Yields
     ------
     tuple[str, dict[str, Any], float]
-        The name of the part, its panels by name and in their order, and the seconds of processor time that they took.
+        The name of the part, its panels by name and in their order, and the seconds of processor
+        time that they took.
     """
-    shared: dict[Any, list[Task]] = {}  # by the function and its arguments: a chart of two figures is computed once
+    # by the function and its arguments: a chart of two figures is computed once
+    shared: dict[Any, list[Task]] = {}
     for part, panels in parts.items():
         for name, make in panels.items():
             shared.setdefault(_what(make), []).append((part, name))
     found: dict[Task, tuple[Any, float]] = {}
     work = [(parts[tasks[0][0]][tasks[0][1]], tasks) for tasks in shared.values()]
-    with _results(work, min(available_cores(), max(map(len, parts.values()), default=1))) as results:
+    with _results(
+        work, min(available_cores(), max(map(len, parts.values()), default=1))
+    ) as results:
         for tasks, result in results:
             found |= dict.fromkeys(tasks, result)
             for part in dict.fromkeys(part for part, _ in tasks):
                 if all((part, name) in found for name in parts[part]):
                     made = {name: found.pop((part, name)) for name in parts[part]}
-                    yield part, {name: data for name, (data, _) in made.items()}, sum(seconds for _, seconds in made.values())
+                    yield (
+                        part,
+                        {name: data for name, (data, _) in made.items()},
+                        sum(seconds for _, seconds in made.values()),
+                    )
 
 
 def _what(make: Callable[[], Any]) -> Any:
-    """A key of what a function computes: for a `partial`, the function and its arguments, which are plain data."""
-    return (make.func, repr(make.args), repr(sorted(make.keywords.items()))) if isinstance(make, partial) else make
+    """A key of what a function computes: for a `partial`, the function and its arguments, which are
+    plain data.
+    """
+    return (
+        (make.func, repr(make.args), repr(sorted(make.keywords.items())))
+        if isinstance(make, partial)
+        else make
+    )
 
 
 @contextmanager
@@ -57,11 +75,15 @@ def _results(
         return
     context = multiprocessing.get_context("spawn")
     left = context.Value("i", len(work))
-    with ProcessPoolExecutor(cores, mp_context=context, initializer=_begin, initargs=(left,)) as pool:
+    with ProcessPoolExecutor(
+        cores, mp_context=context, initializer=_begin, initargs=(left,)
+    ) as pool:
         futures = {pool.submit(_counted, make): tasks for make, tasks in work}
         try:
             yield ((futures.pop(future), future.result()) for future in as_completed(list(futures)))
-        except BaseException:  # after an interruption or a failed panel the others are not needed any more
+        except (
+            BaseException
+        ):  # after an interruption or a failed panel the others are not needed any more
             _stop(pool)
             raise
 

@@ -1,6 +1,8 @@
-"""`make release-check`: every claim of the tables judged at full size, from a folder in which nothing is made yet.
+"""`make release-check`: every claim of the tables judged at full size, from a folder in which
+nothing is made yet.
 
-It takes about as long as `saltus reproduce`. The everyday tests judge the claims that are fast, and quick versions of the others.
+It takes about as long as `saltus reproduce`. The everyday tests judge the claims that are fast, and
+quick versions of the others.
 """
 
 from __future__ import annotations
@@ -16,16 +18,29 @@ from saltus_paper.reproduction import reproduce
 
 
 def failures(claims: Iterable[Claim]) -> list[str]:
-    """A line for each claim that fails and has no erratum that holds, and for each claim of the tables that was not judged."""
+    """A line for each claim that fails and has no erratum that holds, and for each claim of the
+    tables that was not judged.
+    """
     found = {claim.id: claim for claim in claims}
-    wrong = [f"{id} disagrees: {claim.evidence}" for id, claim in found.items() if claim.verdict is ClaimVerdict.DISAGREES]
+    wrong = [
+        f"{id} disagrees: {claim.evidence}"
+        for id, claim in found.items()
+        if claim.verdict is ClaimVerdict.DISAGREES
+    ]
     known = [(part, id) for part, entries in claim_tables().items() for id in entries]
     return wrong + [f"{id} of {part} was not judged" for part, id in known if id not in found]
 
 
 def check_release(folder: Path) -> int:
-    """Reproduce the whole paper into `folder` and print what fails; the exit status, 1 if anything does."""
-    results = reproduce((), folder, force=True, progress=lambda fraction, what: print(f"{fraction:4.0%}  {what}", flush=True))
+    """Reproduce the whole paper into `folder` and print what fails; the exit status, 1 if anything
+    does.
+    """
+    results = reproduce(
+        (),
+        folder,
+        force=True,
+        progress=lambda fraction, what: print(f"{fraction:4.0%}  {what}", flush=True),
+    )
     lines = failures(with_summaries(claim for result in results for claim in result.claims))
     print(*lines, sep="\n")
     print(f"{len(lines)} claims fail." if lines else "Every claim was judged, and none disagrees.")

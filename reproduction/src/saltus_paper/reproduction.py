@@ -20,7 +20,8 @@ from saltus_paper.output_folder import check_writable
 from saltus_paper.panel_work import compute_panels
 from saltus_paper.report.report import write_report
 
-Progress = Callable[[float, str], object]  # what `saltus.cli.progress_bar` and `saltus.show_progress` are
+# what `saltus.cli.progress_bar` and `saltus.show_progress` are
+Progress = Callable[[float, str], object]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,34 +42,53 @@ def reproduce(
     progress: Progress = lambda fraction, what: None,
     effort: str = "standard",
 ) -> list[MadeFigure]:
-    """Compute and draw the named parts of the paper (all if none is named) into `output`, and write the report.
+    """Compute and draw the named parts of the paper (all if none is named) into `output`, and write
+    the report.
 
-    With the effort "quick" parts that take long are drafts: spectra and diagrams of fewer starts, charts of a quarter of the
-    cells. A part that is there in full stays as it is, and a later run at the standard effort replaces drafts.
+    With the effort "quick" parts that take long are drafts: spectra and diagrams of fewer starts,
+    charts of a quarter of the cells. A part that is there in full stays as it is, and a later run
+    at the standard effort replaces drafts.
 
-    What is up to date is left alone unless `force`. It is said at once how long the rest will take here, and each picture is
-    named as soon as it can be looked at. An interrupt leaves complete files only, and the next run goes on from there.
+    What is up to date is left alone unless `force`. It is said at once how long the rest will take
+    here, and each picture is named as soon as it can be looked at. An interrupt leaves complete
+    files only, and the next run goes on from there.
 
     Raises
     ------
     ParameterError
-        An unknown name or effort (the error gives similar ones); an output folder that cannot be written to.
+        An unknown name or effort (the error gives similar ones); an output folder that cannot be
+        written to.
     """
     from saltus_paper.parts import FIGURES, ORDER
 
     for name in names:
         if name not in FIGURES:
             alike = difflib.get_close_matches(name, FIGURES)
-            hint = f"did you mean {' or '.join(map(repr, alike))}?" if alike else f"its parts are {', '.join(FIGURES)}"
+            hint = (
+                f"did you mean {' or '.join(map(repr, alike))}?"
+                if alike
+                else f"its parts are {', '.join(FIGURES)}"
+            )
             raise ParameterError(f"no part of the paper is called {name!r}; {hint}")
     if effort not in EFFORTS:
-        raise ParameterError(f"effort must be one of {', '.join(map(repr, EFFORTS))}, got {effort!r}", "effort")
+        raise ParameterError(
+            f"effort must be one of {', '.join(map(repr, EFFORTS))}, got {effort!r}", "effort"
+        )
     output = Path(output)
     check_writable(output)
     chosen = [figure for name, figure in FIGURES.items() if not names or name in names]
-    chosen = [figure if not force and state.up_to_date(figure, output) else figure.at(effort) for figure in chosen]
-    stale = {figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)}
-    seconds = _make({name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale}, output, progress)
+    chosen = [
+        figure if not force and state.up_to_date(figure, output) else figure.at(effort)
+        for figure in chosen
+    ]
+    stale = {
+        figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)
+    }
+    seconds = _make(
+        {name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale},
+        output,
+        progress,
+    )
     progress(1.0, "writing the report")
     results = [_result(figure, output, seconds) for figure in chosen]
     write_report(FIGURES.values(), output, {result.name: result.claims for result in results})
@@ -79,8 +99,11 @@ def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) 
     """Compute, draw and judge these parts, begun in their order; returns their seconds."""
     seconds: dict[str, float] = {}
     expected = _announced(figures, progress)
-    for name, made, computing in compute_panels({name: figure.panels(**figure.parameters) for name, figure in figures.items()}):
-        figure, start = figures[name], time.process_time()
+    for name, made, computing in compute_panels(
+        {name: figure.panels(**figure.parameters) for name, figure in figures.items()}
+    ):
+        figure = figures[name]
+        start = time.process_time()
         data = figure.join(made)
         _write(figure, data, output)
         # The data are taken from memory; tests show that reading the file gives the same.
@@ -88,8 +111,15 @@ def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) 
         seconds[name] = computing + time.process_time() - start
         state.write(figure, output, claims, seconds[name])
         left = sum(expected[other] for other in figures if other not in seconds)
-        ready = next(output / file for file in figure.files() if not file.endswith(".nc") or len(figure.files()) == 1)
-        progress(1.0 - left / sum(expected.values()), f"{ready} is ready, {figure.title}; about {on_the_clock(left)} left")
+        ready = next(
+            output / file
+            for file in figure.files()
+            if not file.endswith(".nc") or len(figure.files()) == 1
+        )
+        progress(
+            1.0 - left / sum(expected.values()),
+            f"{ready} is ready, {figure.title}; about {on_the_clock(left)} left",
+        )
     return seconds
 
 
@@ -100,14 +130,27 @@ def _announced(figures: Mapping[str, PaperFigure], progress: Progress) -> dict[s
     progress(0.0, "measuring the speed of this machine, after compiling if it is the first run")
     expected = expected_seconds(figures.values(), measured_speed())
     cores = f"{available_cores()} core{'s' if available_cores() > 1 else ''}"
-    progress(0.0, f"{len(figures)} parts will take about {on_the_clock(sum(expected.values()))} here on {cores}")
+    progress(
+        0.0,
+        (
+            f"{len(figures)} parts will take about {on_the_clock(sum(expected.values()))} here on "
+            f"{cores}"
+        ),
+    )
     return expected
 
 
 def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> MadeFigure:
     files = tuple(output / name for name in figure.files())
-    made, claims = figure.name in seconds, tuple(state.claims(figure, output))
-    return MadeFigure(name=figure.name, made=made, seconds=seconds.get(figure.name, 0.0), files=files, claims=claims)
+    made = figure.name in seconds
+    claims = tuple(state.claims(figure, output))
+    return MadeFigure(
+        name=figure.name,
+        made=made,
+        seconds=seconds.get(figure.name, 0.0),
+        files=files,
+        claims=claims,
+    )
 
 
 def _write(figure: PaperFigure, data: Any, output: Path) -> None:
@@ -121,5 +164,6 @@ def _write(figure: PaperFigure, data: Any, output: Path) -> None:
         picture = figure.draw(data)
         with style():
             save(output / f"{figure.name}.png", picture)
-            picture.set_layout_engine("none")  # the PDF has the layout of the PNG: a second one would take as long again
+            # the PDF has the layout of the PNG: a second one would take as long again
+            picture.set_layout_engine("none")
             save(output / f"{figure.name}.pdf", picture, title=figure.title)

@@ -19,23 +19,30 @@ from saltus_paper.claims.claim import Claim
 from saltus_paper.claims.claim_tables import claim_tables
 from saltus_paper.figures.figure import PaperFigure
 
-PACKAGES = ("numpy", "numba", "scipy", "xarray", "matplotlib")  # on whose versions the digits may depend
+# on whose versions the digits may depend
+PACKAGES = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 FOLDER = ".saltus"  # inside the output folder
 
 
 def key(figure: PaperFigure) -> str:
-    """A fingerprint of saltus' version, the sources of the figure and of all it imports, its title, parameters and claims."""
+    """A fingerprint of saltus' version, the sources of the figure and of all it imports, its title,
+    parameters and claims.
+    """
     digest = hashlib.sha256(saltus.__version__.encode())
     for module in sorted(closure(figure.module)):
         digest.update(module.encode() + b"\0" + _source(module) + b"\0")
     claims = {id: asdict(entry) for id, entry in claim_tables().get(figure.name, {}).items()}
-    digest.update(json.dumps([figure.title, dict(figure.parameters), claims], sort_keys=True).encode())
+    digest.update(
+        json.dumps([figure.title, dict(figure.parameters), claims], sort_keys=True).encode()
+    )
     return digest.hexdigest()
 
 
 @cache
 def closure(module: str) -> frozenset[str]:
-    """`module` and the modules of saltus and of this package that it imports, directly or not, at its top or in functions."""
+    """`module` and the modules of saltus and of this package that it imports, directly or not, at
+    its top or in functions.
+    """
     found: set[str] = set()
     waiting = [module]
     while waiting:
@@ -59,7 +66,9 @@ def _imports(module: str) -> list[str]:
 
 
 def _home(package: str, name: str) -> str:
-    """The module that defines a name which a package gives, behind as many front doors as there are."""
+    """The module that defines a name which a package gives, behind as many front doors as there
+    are.
+    """
     module = _behind_the_door(package).get(name)
     if module is None:
         return f"{package}.{name}"
@@ -73,7 +82,11 @@ def _behind_the_door(package: str) -> dict[str, str]:
     stub = None if path is None else path.with_suffix(".pyi")
     if stub is None or path is None or path.name != "__init__.py" or not stub.exists():
         return {}
-    imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom) and node.module]
+    imports = [
+        node
+        for node in ast.parse(stub.read_text()).body
+        if isinstance(node, ast.ImportFrom) and node.module
+    ]
     return {alias.name: f"{package}.{node.module}" for node in imports for alias in node.names}
 
 
@@ -105,7 +118,9 @@ def up_to_date(figure: PaperFigure, folder: Path) -> bool:
 
 
 def intact(figure: PaperFigure, folder: Path) -> bool:
-    """Whether every output is there as its record has it, and the claims can be read, whatever sources made them."""
+    """Whether every output is there as its record has it, and the claims can be read, whatever
+    sources made them.
+    """
     record = read(figure, folder)
     prints = record.get("files") if record else None
     if (
@@ -117,7 +132,12 @@ def intact(figure: PaperFigure, folder: Path) -> bool:
     try:
         claims(figure, folder)
         return math.isfinite(record["seconds"]) and isinstance(record["versions"], dict)
-    except (KeyError, TypeError, ValueError, AttributeError):  # by another version of saltus, or by somebody else
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+    ):  # by another version of saltus, or by somebody else
         return False
 
 
@@ -137,13 +157,20 @@ def claims(figure: PaperFigure, folder: Path) -> list[Claim]:
 
 
 def write(figure: PaperFigure, folder: Path, made: Iterable[Claim], seconds: float) -> None:
-    """Record what made the figure's outputs, with which versions and in which time, their fingerprints and claims.
+    """Record what made the figure's outputs, with which versions and in which time, their
+    fingerprints and claims.
 
     It is written last, so that an interrupted run leaves none.
     """
     files = {name: fingerprint(folder / name) for name in figure.files()}
     versions = {name: version(name) for name in ("saltus", *PACKAGES)}
-    record = {"key": key(figure), "files": files, "seconds": round(seconds, 1), "versions": versions, "effort": figure.effort}
+    record = {
+        "key": key(figure),
+        "files": files,
+        "seconds": round(seconds, 1),
+        "versions": versions,
+        "effort": figure.effort,
+    }
     record["claims"] = [claim.to_dict() for claim in made]
     saltus.save(folder / FOLDER / f"{figure.name}.json", json.dumps(record, indent=1))
 

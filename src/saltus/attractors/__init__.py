@@ -1,4 +1,6 @@
-"""Where motions end: verdicts and Lyapunov exponents of motions, the attractors, their basins and the curves between these."""
+"""Where motions end: verdicts and Lyapunov exponents of motions, the attractors, their basins and
+the curves between these.
+"""
 
 from saltus._front_door import front_door
 

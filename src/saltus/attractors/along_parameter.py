@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.attractor import REST, Attractor, Attractors, Target, about, attractor_columns, variable
+from saltus.attractors.attractor import (
+    REST,
+    Attractor,
+    Attractors,
+    Target,
+    about,
+    attractor_columns,
+    variable,
+)
 from saltus.attractors.attractor_search import find_attractors
 from saltus.checks import as_numbers, check_number
 from saltus.errors import ParameterError, shown
@@ -24,11 +32,18 @@ if TYPE_CHECKING:
 class MatchingSettings:
     """The numbers by which an attractor is recognised at the next value of the parameter."""
 
-    threshold: float = 0.3  # Two sets may be one attractor if their distance, relative to their size, is below this threshold.
-    other_period: float = 0.5  # A factor of the threshold for orbits of different periods, as across a period doubling.
-    led: float = 3.0  # A factor of the threshold for orbits of the same period, if motions from one settle on the other.
-    seeds: int = 64  # Number of states of each attractor from which motions start at the next value.
-    # The share of the states of a sampled set that must be near the other set; some may not be, as both are random samples.
+    # Two sets may be one attractor if their distance, relative to their size, is below this
+    # threshold.
+    threshold: float = 0.3
+    # A factor of the threshold for orbits of different periods, as across a period doubling.
+    other_period: float = 0.5
+    # A factor of the threshold for orbits of the same period, if motions from one settle on the
+    # other.
+    led: float = 3.0
+    # Number of states of each attractor from which motions start at the next value.
+    seeds: int = 64
+    # The share of the states of a sampled set that must be near the other set; some may not be, as
+    # both are random samples.
     share: float = 0.95
 
 
@@ -49,14 +64,17 @@ def attractors_along(
     tol: float = 1e-11,
     progress: Progress = silent,
 ) -> xarray.Dataset:
-    """The attractors at each value of a parameter, with labels that an attractor keeps as the parameter changes.
+    """The attractors at each value of a parameter, with labels that an attractor keeps as the
+    parameter changes.
 
-    At each value they are found by `find_attractors`, from the same initial states and from states of the attractors at the
-    value before, so that none is lost because its basin is small. The attractors at two neighbouring values are then matched,
-    the nearest pair first, by the distance between the sets of their points at phase 0 (Hausdorff's), relative to the size of the
-    larger set. Between attractors of different periods, as across a period doubling, the threshold is half as large; between two
-    of the same period it is three times as large if motions from all points of the first settle on the second. An attractor
-    without a match is born, or has died. Rest always has the label 0.
+    At each value they are found by `find_attractors`, from the same initial states and from states
+    of the attractors at the value before, so that none is lost because its basin is small. The
+    attractors at two neighbouring values are then matched, the nearest pair first, by the distance
+    between the sets of their points at phase 0 (Hausdorff's), relative to the size of the larger
+    set. Between attractors of different periods, as across a period doubling, the threshold is half
+    as large; between two of the same period it is three times as large if motions from all points
+    of the first settle on the second. An attractor without a match is born, or has died. Rest
+    always has the label 0.
 
     Parameters
     ----------
@@ -65,27 +83,30 @@ def attractors_along(
     path
         Dotted path of the parameter.
     values
-        Values of the parameter, increasing or decreasing; attractors are matched from each to the next.
+        Values of the parameter, increasing or decreasing; attractors are matched from each to the
+        next.
     window, starts, max_period, seed, tol
         As for `find_attractors`.
     known
         Branches along the same parameter, whose stable orbits count as attractors at every value.
     threshold
-        The largest relative distance between the states of one attractor at two neighbouring values.
+        The largest relative distance between the states of one attractor at two neighbouring
+        values.
     progress
         Called with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset. Over (value, attractor), nan where the attractor does not exist: `fraction`, `error`, `amplitude`,
-        `largest_...`, `smallest_...`, `period` (0: none), `kind` ("" where it does not exist). Over (value): `undecided`. Over
-        (event): births and deaths.
+        A Dataset. Over (value, attractor), nan where the attractor does not exist: `fraction`,
+        `error`, `amplitude`, `largest_...`, `smallest_...`, `period` (0: none), `kind` ("" where it
+        does not exist). Over (value): `undecided`. Over (event): births and deaths.
 
     Raises
     ------
     ParameterError
-        A path that leads to no number, values that are not monotonic; else as for `find_attractors`.
+        A path that leads to no number, values that are not monotonic; else as for
+        `find_attractors`.
 
     Examples
     --------
@@ -95,7 +116,8 @@ def attractors_along(
            [1.]])
     """
     check_number("threshold", threshold, above=0.0)
-    grid, followed = _values(system, path, values), _Followed(threshold, system.dimension)
+    grid = _values(system, path, values)
+    followed = _Followed(threshold, system.dimension)
     for i, value in enumerate(grid):
         here = find_attractors(
             system.with_({path: float(value)}),
@@ -115,7 +137,9 @@ def attractors_along(
 
 @dataclass
 class _Followed:
-    """The attractors at the values so far, and for each value the identities of its attractors by their labels there."""
+    """The attractors at the values so far, and for each value the identities of its attractors by
+    their labels there.
+    """
 
     threshold: float
     dimension: int  # of the states
@@ -126,13 +150,21 @@ class _Followed:
     def seeds(self) -> np.ndarray:
         """States of the attractors at the last value, (n, d)."""
         last = self.rows[-1] if self.rows else ()
-        return np.concatenate([np.empty((0, self.dimension)), *(member.states[-SETTINGS.seeds :] for member in last)])
+        return np.concatenate(
+            [np.empty((0, self.dimension)), *(member.states[-SETTINGS.seeds :] for member in last)]
+        )
 
     def add(self, here: Attractors) -> None:
-        """Add the attractors at the next value: each gets the identity of the nearest one at the value before, or a new one."""
+        """Add the attractors at the next value: each gets the identity of the nearest one at the
+        value before, or a new one.
+        """
         found: dict[int, int] = {}
         for (old, new), distance in sorted(self._distances(here).items(), key=lambda item: item[1]):
-            if distance < self.threshold and new not in found and self.names[-1][old] not in found.values():
+            if (
+                distance < self.threshold
+                and new not in found
+                and self.names[-1][old] not in found.values()
+            ):
                 found[new] = self.names[-1][old]
         taken = max((name for row in self.names for name in row.values()), default=REST)
         for member in here:
@@ -143,19 +175,35 @@ class _Followed:
         self.names.append(found)
 
     def _distances(self, here: Attractors) -> dict[tuple[int, int], float]:
-        """The distance of each attractor from each one at the value before, by their labels (old, new)."""
+        """The distance of each attractor from each one at the value before, by their labels (old,
+        new).
+        """
         if not self.rows:
             return {}
         before = self.rows[-1]
-        parts = np.split(here.carried, np.cumsum([len(member.states[-SETTINGS.seeds :]) for member in before])[:-1])
-        led = {old.label: set(part.tolist()) for old, part in zip(before, parts, strict=True)} if len(before) else {}
-        return {(old.label, new.label): _apart(old, new, led[old.label] == {new.label}) for old in before for new in here}
+        parts = np.split(
+            here.carried,
+            np.cumsum([len(member.states[-SETTINGS.seeds :]) for member in before])[:-1],
+        )
+        led = (
+            {old.label: set(part.tolist()) for old, part in zip(before, parts, strict=True)}
+            if len(before)
+            else {}
+        )
+        return {
+            (old.label, new.label): _apart(old, new, led[old.label] == {new.label})
+            for old in before
+            for new in here
+        }
 
     def events(self, grid: np.ndarray) -> list[tuple[str, int, float, float]]:
-        """Births and deaths: their kind, the label, and the last value before them and the first one after."""
+        """Births and deaths: their kind, the label, and the last value before them and the first
+        one after.
+        """
         found = []
         for i in range(1, len(grid)):
-            old, new = set(self.names[i - 1].values()), set(self.names[i].values())
+            old = set(self.names[i - 1].values())
+            new = set(self.names[i].values())
             edges = float(grid[i - 1]), float(grid[i])
             found += [("death", label, *edges) for label in sorted(old - new)]
             found += [("birth", label, *edges) for label in sorted(new - old)]
@@ -163,11 +211,13 @@ class _Followed:
 
 
 def set_distance(one: Target, other: Target) -> float:
-    """Hausdorff's distance between two sets of states, relative to their largest absolute value of a variable.
+    """Hausdorff's distance between two sets of states, relative to their largest absolute value of
+    a variable.
 
     If one of the sets is a sample, 5 % of the states may lie farther away.
     """
-    forth, back = other.distance(one.states), one.distance(other.states)
+    forth = other.distance(one.states)
+    back = one.distance(other.states)
     share = SETTINGS.share if one.dense or other.dense else 1.0
     apart = max(float(np.quantile(forth, share)), float(np.quantile(back, share)))
     size = max(float(np.abs(target.states).max()) for target in (one, other))
@@ -175,8 +225,8 @@ def set_distance(one: Target, other: Target) -> float:
 
 
 def _apart(old: Attractor, new: Attractor, led: bool) -> float:
-    """The distance of two attractors, scaled up for different periods, and down where motions from the old one settle on the new
-    one."""
+    """The distance of two attractors, scaled up for different periods, and down where motions from
+    the old one settle on the new one."""
     if Ending.REST in (old.kind, new.kind):
         return set_distance(old.target, new.target) if old.kind == new.kind else np.inf
     distance = set_distance(old.target, new.target)
@@ -189,13 +239,26 @@ def _values(system: System, path: str, values: Any) -> np.ndarray:
     check_path(system, path)
     grid = np.atleast_1d(as_numbers(values, "values"))
     steps = np.diff(grid)
-    if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all() or not ((steps > 0).all() or (steps < 0).all()):
-        raise ParameterError(f"values must be numbers of {path} that increase, or that decrease, got {shown(values)}", "values")
+    if (
+        grid.ndim != 1
+        or not grid.size
+        or not np.isfinite(grid).all()
+        or not ((steps > 0).all() or (steps < 0).all())
+    ):
+        raise ParameterError(
+            (
+                f"values must be numbers of {path} that increase, or that decrease, got "
+                f"{shown(values)}"
+            ),
+            "values",
+        )
     check_along(system, path, grid, "values")
     return grid
 
 
-def _dataset(system: System, path: str, grid: np.ndarray, followed: _Followed, numbers: dict[str, Any]) -> xarray.Dataset:
+def _dataset(
+    system: System, path: str, grid: np.ndarray, followed: _Followed, numbers: dict[str, Any]
+) -> xarray.Dataset:
     import xarray
 
     identities = sorted({name for row in followed.names for name in row.values()})
@@ -208,17 +271,33 @@ def _dataset(system: System, path: str, grid: np.ndarray, followed: _Followed, n
             kinds[i, j] = str(member.kind)
             for key, (part, _, _) in columns.items():
                 tables[key][i, j] = getattr(member, part)
-    over, events = ("value", "attractor"), followed.events(grid)
-    variables = {key: variable(over, tables[key], units, text) for key, (_, units, text) in columns.items()}
+    over = ("value", "attractor")
+    events = followed.events(grid)
+    variables = {
+        key: variable(over, tables[key], units, text) for key, (_, units, text) in columns.items()
+    }
     variables["kind"] = variable(over, kinds, "1", "rest, periodic, quasi-periodic or chaotic")
-    variables["undecided"] = variable("value", [row.undecided for row in followed.rows], "1", "undecided initial states")
+    variables["undecided"] = variable(
+        "value", [row.undecided for row in followed.rows], "1", "undecided initial states"
+    )
     for i, (key, text) in enumerate(
-        (("kind", "birth or death"), ("label", "label"), ("before", f"{path} before"), ("after", f"{path} after"))
+        (
+            ("kind", "birth or death"),
+            ("label", "label"),
+            ("before", f"{path} before"),
+            ("after", f"{path} after"),
+        )
     ):
-        variables[f"event_{key}"] = variable("event", np.array([event[i] for event in events]), "1", text)
+        variables[f"event_{key}"] = variable(
+            "event", np.array([event[i] for event in events]), "1", text
+        )
     axes = {
         "value": variable("value", grid, "1", path),
-        "attractor": ("attractor", np.array(identities, dtype=int), {"long_name": "identity; 0 is rest"}),
+        "attractor": (
+            "attractor",
+            np.array(identities, dtype=int),
+            {"long_name": "identity; 0 is rest"},
+        ),
     }
     numbers |= {"coordinate": " ".join(system.model.coordinates)}
     return xarray.Dataset(

@@ -1,4 +1,6 @@
-"""An attractor of the stroboscopic map: its kind, its states, the share of motions that end on it, and the table of all."""
+"""An attractor of the stroboscopic map: its kind, its states, the share of motions that end on it,
+and the table of all.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ DEVIATIONS = 1.96  # standard deviations to each side of a 95 % interval
 
 
 def share_interval(number: int, sample: int) -> tuple[float, float]:
-    """The 95 % interval (Wilson's) of a share that is estimated from a sample; nan without a sample.
+    """The 95 % interval (Wilson's) of a share that is estimated from a sample; nan without a
+    sample.
 
     Parameters
     ----------
@@ -51,7 +54,8 @@ def share_interval(number: int, sample: int) -> tuple[float, float]:
     check_count("number", number, 0, sample)
     if not sample:
         return (math.nan, math.nan)
-    share, spread = number / sample, DEVIATIONS**2 / sample
+    share = number / sample
+    spread = DEVIATIONS**2 / sample
     middle = (share + 0.5 * spread) / (1.0 + spread)
     half = math.sqrt(spread * (share * (1.0 - share) + 0.25 * spread)) / (1.0 + spread)
     return (max(0.0, middle - half), min(1.0, middle + half))
@@ -59,14 +63,17 @@ def share_interval(number: int, sample: int) -> tuple[float, float]:
 
 UNDECIDED = -1  # the label of motions that end on no known attractor
 REST = 0  # the label of rest at the contact, always
-LAST_STATES = 64  # of a motion that does not settle, which lies on a set if their median distance is small; most that are written
-SAME_STATE = 1e-6  # two states at phase 0 this near to one another count as one, relative to their size or to 1
+# of a motion that does not settle, which lies on a set if their median distance is small; most that
+# are written
+LAST_STATES = 64
+# two states at phase 0 this near to one another count as one, relative to their size or to 1
+SAME_STATE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """The states of an attractor on the stroboscopic section, phase 0 of the load: all states of an orbit, or a sample of a set
-    that does not repeat."""
+    """The states of an attractor on the stroboscopic section, phase 0 of the load: all states of an
+    orbit, or a sample of a set that does not repeat."""
 
     label: int
     kind: Ending
@@ -85,15 +92,17 @@ class Target:
 
     @cached_property
     def grain(self) -> float:
-        """The distance within which a state counts as one of a sampled set: twice the distance within which 95 % of the sample
-        have a neighbour; 0 for other sets."""
+        """The distance within which a state counts as one of a sampled set: twice the distance
+        within which 95 % of the sample have a neighbour; 0 for other sets."""
         if not self.dense:
             return 0.0
         apart, _ = self._tree.query(self.states, k=2, p=np.inf)
         return float(2.0 * np.quantile(apart[:, 1], 0.95))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """The distances of states (..., d) from the attractor's nearest state, as the largest difference of a variable, (...)."""
+        """The distances of states (..., d) from the attractor's nearest state, as the largest
+        difference of a variable, (...).
+        """
         if self.dense:
             finite = np.isfinite(points).all(axis=-1)
             apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
@@ -127,13 +136,15 @@ class Attractor:
     lowest
         The smallest coordinate on it.
     orbit
-        The orbit if it is periodic, solved by its own equations and stable by its multipliers; else None.
+        The orbit if it is periodic, solved by its own equations and stable by its multipliers; else
+        None.
     starts
         The number of initial states whose motions end there.
     of
         The number of all initial states.
     mirror
-        The label of its mirror image: its own if it is symmetric, UNDECIDED if the system has no mirror symmetry.
+        The label of its mirror image: its own if it is symmetric, UNDECIDED if the system has no
+        mirror symmetry.
     evidence
         The evidence for its kind.
 
@@ -187,8 +198,8 @@ class Attractor:
     def error(self) -> float:
         """The binomial standard error of the fraction, sqrt(p (1 - p) / n).
 
-        It is 0 if none or all of n starts end there; the true share then differs from p by less than 3 / n with a probability of
-        95 %.
+        It is 0 if none or all of n starts end there; the true share then differs from p by less
+        than 3 / n with a probability of 95 %.
         """
         return math.sqrt(self.fraction * (1.0 - self.fraction) / self.of) if self.of else math.nan
 
@@ -207,7 +218,11 @@ class Attractor:
 
     def __repr__(self) -> str:
         what = f"period {self.period}" if self.orbit is not None else self.kind
-        share = f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts" if self.of else ""
+        share = (
+            f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts"
+            if self.of
+            else ""
+        )
         return f"Attractor({self.label}: {what}, amplitude={self.amplitude:.9g}{share})"
 
 
@@ -275,11 +290,15 @@ class Attractors(Result):
         for member in self.members:
             if member.label == label:
                 return member
-        raise KeyError(f"no attractor {label}; there are {[member.label for member in self.members]}")
+        raise KeyError(
+            f"no attractor {label}; there are {[member.label for member in self.members]}"
+        )
 
     @property
     def undecided(self) -> int:
-        """The number of initial states whose motions end on none of the attractors, as far as they were followed."""
+        """The number of initial states whose motions end on none of the attractors, as far as they
+        were followed.
+        """
         return int((self.assigned == UNDECIDED).sum())
 
     @property
@@ -288,7 +307,9 @@ class Attractors(Result):
         return tuple(member.target for member in self.members)
 
     def to_xarray(self) -> xarray.Dataset:
-        """A row for each attractor: kind, periods, fraction and its error, extrema, multipliers, points at phase 0."""
+        """A row for each attractor: kind, periods, fraction and its error, extrema, multipliers,
+        points at phase 0.
+        """
         return attractors_dataset(self)
 
     def _repr_html_(self) -> str:
@@ -297,7 +318,9 @@ class Attractors(Result):
             "attractor": [m.label for m in members],
             "kind": [f"period {m.period}" if m.orbit is not None else str(m.kind) for m in members],
             "amplitude": [m.amplitude for m in members],
-            "share of the starts": [f"{100 * m.fraction:.3g} +- {100 * m.error:.2g} %" if m.of else "" for m in members],
+            "share of the starts": [
+                f"{100 * m.fraction:.3g} +- {100 * m.error:.2g} %" if m.of else "" for m in members
+            ],
             "evidence": [m.evidence for m in members],
         }
         facts = {"starts": len(self.states), "undecided": self.undecided} | self._facts()
@@ -305,17 +328,24 @@ class Attractors(Result):
 
     def __repr__(self) -> str:
         lines = "".join(f"\n  {member!r}" for member in self.members)
-        return f"Attractors({len(self.members)} from {len(self.states)} states, {self.undecided} of them undecided{lines})"
+        return (
+            f"Attractors({len(self.members)} from {len(self.states)} states, {self.undecided} "
+            f"of them undecided{lines})"
+        )
 
 
 def attractors_dataset(found: Attractors) -> xarray.Dataset:
-    """The table of the attractors, with their states at phase 0, and the initial states with the labels of their ends."""
+    """The table of the attractors, with their states at phase 0, and the initial states with the
+    labels of their ends.
+    """
     import xarray
 
     table = attractor_table(found.members, found.system)
     for i, (name, unit) in enumerate(state_units(found.system).items()):
         table[f"start_{name}"] = variable("start", found.states[:, i], unit, f"{name} at the start")
-    table["end"] = variable("start", found.assigned, "1", "attractor on which it ends, -1 for undecided")
+    table["end"] = variable(
+        "start", found.assigned, "1", "attractor on which it ends, -1 for undecided"
+    )
     attributes = about(
         found.system,
         "attractors",
@@ -337,30 +367,48 @@ def variable(dims: str | tuple[str, ...], values: Any, unit: str, text: str) -> 
 def about(system: System, kind: str, **numbers: Any) -> dict[str, Any]:
     """The attributes of a dataset: what it holds, the kind of load, and where it comes from."""
     load = "constant" if is_constant(system.load) else "periodic"
-    attributes = {"title": f"{kind} computed by saltus", "kind": kind, "load": load, "Conventions": "CF-1.8"}
+    attributes = {
+        "title": f"{kind} computed by saltus",
+        "kind": kind,
+        "load": load,
+        "Conventions": "CF-1.8",
+    }
     return attributes | provenance(system, **numbers)
 
 
 def state_units(system: System) -> dict[str, str]:
-    """The units of the state variables by their names; as time is dimensionless, a velocity has the unit of its coordinate."""
+    """The units of the state variables by their names; as time is dimensionless, a velocity has the
+    unit of its coordinate.
+    """
     names = system.model.coordinates
-    return dict(zip(state_names(names), 2 * [system.model.unit_of(name) for name in names], strict=True))
+    return dict(
+        zip(state_names(names), 2 * [system.model.unit_of(name) for name in names], strict=True)
+    )
 
 
 def state_plane(system: System) -> tuple[str, str]:
-    """The two state variables over which attractors are drawn: the first coordinate and its velocity."""
+    """The two state variables over which attractors are drawn: the first coordinate and its
+    velocity.
+    """
     names = state_names(system.model.coordinates)
     return names[0], names[len(names) // 2]
 
 
 def labels(members: Iterable[Attractor]) -> Any:
     """The coordinate `attractor`."""
-    return "attractor", np.array([member.label for member in members], dtype=int), {"long_name": "label; 0 is rest"}
+    return (
+        "attractor",
+        np.array([member.label for member in members], dtype=int),
+        {"long_name": "label; 0 is rest"},
+    )
 
 
 def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
-    """The columns of a table of attractors by their names: the property of `Attractor`, the unit and the text of each."""
-    names, unit = system.model.coordinates, system.model.unit_of(system.model.coordinates[0])
+    """The columns of a table of attractors by their names: the property of `Attractor`, the unit
+    and the text of each.
+    """
+    names = system.model.coordinates
+    unit = system.model.unit_of(system.model.coordinates[0])
     high, low = extrema_names(names)
     name = names[0] if len(names) == 1 else "any coordinate"
     return {
@@ -381,19 +429,31 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
         row[: len(member.states)] = member.states[:LAST_STATES]
     columns: dict[str, Any] = {}
     for key, (part, units, text) in attractor_columns(system).items():
-        values = np.array([getattr(member, part) for member in members], dtype=int if key == "period" else float)
+        values = np.array(
+            [getattr(member, part) for member in members], dtype=int if key == "period" else float
+        )
         columns[{"error": "fraction_error", "period": "attractor_period"}.get(key, key)] = variable(
             "attractor", values, units, text
         )
     more = {
-        "attractor_kind": (np.array([str(m.kind) for m in members], dtype=str), "rest, periodic, quasi-periodic or chaotic"),
-        "multiplier": (np.array([_multiplier(m) for m in members], dtype=float), "largest modulus of its multipliers"),
+        "attractor_kind": (
+            np.array([str(m.kind) for m in members], dtype=str),
+            "rest, periodic, quasi-periodic or chaotic",
+        ),
+        "multiplier": (
+            np.array([_multiplier(m) for m in members], dtype=float),
+            "largest modulus of its multipliers",
+        ),
         "mirror": (np.array([m.mirror for m in members], dtype=int), "label of its mirror image"),
         "evidence": (np.array([m.evidence for m in members], dtype=str), "why it is one"),
     }
-    columns |= {key: variable("attractor", values, "1", text) for key, (values, text) in more.items()}
+    columns |= {
+        key: variable("attractor", values, "1", text) for key, (values, text) in more.items()
+    }
     for i, (label, unit) in enumerate(state_units(system).items()):
-        columns[f"section_{label}"] = variable(("attractor", "state"), states[:, :, i], unit, f"{label} at phase 0 of the load")
+        columns[f"section_{label}"] = variable(
+            ("attractor", "state"), states[:, :, i], unit, f"{label} at phase 0 of the load"
+        )
     return columns
 
 

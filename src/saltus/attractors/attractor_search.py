@@ -1,4 +1,6 @@
-"""The attractors of a system: found from a window of initial states, certified, counted, and joined with the known orbits."""
+"""The attractors of a system: found from a window of initial states, certified, counted, and joined
+with the known orbits.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors.attractor import LAST_STATES, REST, SAME_STATE, UNDECIDED, Attractor, Attractors, Target
+from saltus.attractors.attractor import (
+    LAST_STATES,
+    REST,
+    SAME_STATE,
+    UNDECIDED,
+    Attractor,
+    Attractors,
+    Target,
+)
 from saltus.attractors.classification import classify
-from saltus.attractors.stroboscopic_section import section_states, solved_orbit, stays_at_rest, with_clock
+from saltus.attractors.stroboscopic_section import (
+    section_states,
+    solved_orbit,
+    stays_at_rest,
+    with_clock,
+)
 from saltus.checks import check_count, check_number, check_starts, check_states, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import (
@@ -42,16 +57,25 @@ from saltus.systems import (
 
 @dataclass(frozen=True)
 class AttractorSearchSettings:
-    """How long motions are followed before their attractors are determined, and how they are assigned to these."""
+    """How long motions are followed before their attractors are determined, and how they are
+    assigned to these.
+    """
 
     first: int = 400  # All motions are followed for this many forcing periods.
-    second: int = 4000  # Those that have not settled by then are followed for this many more, and so may be those to be judged.
-    kept: int = 256  # Number of last stroboscopic states of a motion that are compared with attractors that do not repeat.
-    verdicts: int = 8  # The largest number of unsettled motions that are classified, as each takes seconds.
+    # Those that have not settled by then are followed for this many more, and so may be those to be
+    # judged.
+    second: int = 4000
+    # Number of last stroboscopic states of a motion that are compared with attractors that do not
+    # repeat.
+    kept: int = 256
+    # The largest number of unsettled motions that are classified, as each takes seconds.
+    verdicts: int = 8
     sample: int = 2048  # Number of stroboscopic states that represent a set that does not repeat.
-    # If the sum of the exponents is above minus this, areas of the state plane do not shrink, and the set attracts nothing.
+    # If the sum of the exponents is above minus this, areas of the state plane do not shrink, and
+    # the set attracts nothing.
     lossless: float = 1e-6
-    # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions that settle on it.
+    # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions
+    # that settle on it.
     beside: float = 100.0
 
 
@@ -74,7 +98,10 @@ class KnownAttractors:
             labels[row] = self.add_rest(rest_state(self.system, ends.last[row]))
         if ends.ended.any():
             labels[ends.ended] = UNDECIDED
-            self.reasons.append(f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot go on")
+            self.reasons.append(
+                f"{int(ends.ended.sum())} motions are ended by a margin of the model or cannot "
+                "go on"
+            )
         for period in np.unique(ends.period[ends.periodic]):
             rows = np.flatnonzero(ends.period == period)
             while rows.size:
@@ -86,7 +113,9 @@ class KnownAttractors:
         return labels
 
     def _settled(self, states: np.ndarray) -> int:
-        """The label of the orbit on whose states motions have settled; UNDECIDED where its equations have no stable solution."""
+        """The label of the orbit on whose states motions have settled; UNDECIDED where its
+        equations have no stable solution.
+        """
         known = self.label_of(states)
         if known is not None:
             return known
@@ -94,14 +123,18 @@ class KnownAttractors:
             return self.add_rest(states[-1])
         where = f"at {_shown(states[-1])}"
         orbit = solved_orbit(self.system, states[-1], len(states))
-        if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(states):
+        if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(
+            states
+        ):
             return self._fail(
-                f"motions repeat themselves every {len(states)} periods {where}, but no orbit solves its equations there"
+                f"motions repeat themselves every {len(states)} periods {where}, but no orbit "
+                "solves its equations there"
             )
         if not orbit.stable:
             largest = np.abs(orbit.multipliers).max()
             return self._fail(
-                f"motions stay on an orbit of period {orbit.period} {where} with a multiplier of modulus {largest:.6g}"
+                f"motions stay on an orbit of period {orbit.period} {where} with a multiplier of "
+                f"modulus {largest:.6g}"
             )
         return self.add_orbit(orbit, states[-orbit.period :])
 
@@ -115,9 +148,13 @@ class KnownAttractors:
             if member.kind is Ending.REST and np.abs(member.states[0] - state).max() < _near(state):
                 return member.label
         held = state[: len(self.system.model.coordinates)]
-        if self.system.in_gap_coordinates is not self.system:  # contacts may hold it to a wall that moves
+        # contacts may hold it to a wall that moves
+        if self.system.in_gap_coordinates is not self.system:
             held = simulate(self.system, **arguments_of(self.system, state), periods=1).extrema
-        evidence = "proved: captured at the contact for all later loads, or at rest where no load ever pulls"
+        evidence = (
+            "proved: captured at the contact for all later loads, or at rest where no "
+            "load ever pulls"
+        )
         return self._add(Ending.REST, state[None], (float(held.min()), float(held.max())), evidence)
 
     def add_orbit(self, orbit: PeriodicOrbit, states: np.ndarray | None = None) -> int:
@@ -128,7 +165,10 @@ class KnownAttractors:
         if known is not None:
             return known
         largest = np.abs(orbit.multipliers).max()
-        evidence = f"orbit of period {orbit.period}: residual {orbit.residual:.1g}, largest multiplier {largest:.6g}"
+        evidence = (
+            f"orbit of period {orbit.period}: residual {orbit.residual:.1g}, largest "
+            f"multiplier {largest:.6g}"
+        )
         return self._add(Ending.PERIODIC, states, (orbit.lowest, orbit.highest), evidence, orbit)
 
     def _add(
@@ -141,29 +181,42 @@ class KnownAttractors:
     ) -> int:
         low, high = extrema
         target = Target(len(self.members), kind, states)
-        self.members.append(Attractor(target, high, low, orbit, starts=0, of=0, mirror=UNDECIDED, evidence=evidence))
+        self.members.append(
+            Attractor(target, high, low, orbit, starts=0, of=0, mirror=UNDECIDED, evidence=evidence)
+        )
         return target.label
 
     def label_of(self, states: np.ndarray) -> int | None:
-        """The label of the orbit, or of rest, with these states at phase 0; None if it is not known."""
+        """The label of the orbit, or of rest, with these states at phase 0; None if it is not
+        known.
+        """
         for member in self.members:
             if not member.target.dense and (member.target.distance(states) < _near(states)).all():
                 return member.label
         return None
 
     def assign_unsettled(self, ends: Recurrence, labels: np.ndarray) -> None:
-        """Label the unsettled motions that move on a known sampled attractor, or within SAME_STATE of a known orbit."""
+        """Label the unsettled motions that move on a known sampled attractor, or within SAME_STATE
+        of a known orbit.
+        """
         for i in np.flatnonzero(labels == WAITING):
             last = ends.states[i, -LAST_STATES:]
             for target in (member.target for member in self.members):
                 apart = target.distance(last)
-                if np.median(apart) < target.grain if target.dense else apart[-len(target.states) :].max() < _near(last[-1:]):
+                if (
+                    np.median(apart) < target.grain
+                    if target.dense
+                    else apart[-len(target.states) :].max() < _near(last[-1:])
+                ):
                     labels[i] = target.label
                     break
 
     def judge(self, state: np.ndarray, max_period: int) -> int:
-        """Classify a motion that does not settle, from a state (d,): the label of its attractor, or UNDECIDED if it has none."""
-        start, longest = arguments_of(self.system, state), max(max_period, 16)
+        """Classify a motion that does not settle, from a state (d,): the label of its attractor, or
+        UNDECIDED if it has none.
+        """
+        start = arguments_of(self.system, state)
+        longest = max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.second, max_period=longest)
         if verdict.kind is Ending.REST:
             return self.add_rest(rest_state(self.system, state_of(self.system, verdict.state)))
@@ -173,23 +226,40 @@ class KnownAttractors:
         if verdict.kind is Ending.UNDECIDED or verdict.exponents is None:
             return self._fail(f"{where}: {verdict.reason}")
         if float(verdict.exponents.values.sum()) > -SETTINGS.lossless:
-            return self._fail(f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts")
-        sums = self.system.in_gap_coordinates is not self.system  # lanes record the extrema of other coordinates
+            return self._fail(
+                f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts"
+            )
+        # lanes record the extrema of other coordinates
+        sums = self.system.in_gap_coordinates is not self.system
         sampled = ("state",) if sums else ("state", "extrema")
-        sample = motions_from(self.system, state[None], periods=SETTINGS.sample, sample=sampled, last="all", tol=1e-10)
+        sample = motions_from(
+            self.system, state[None], periods=SETTINGS.sample, sample=sampled, last="all", tol=1e-10
+        )
         if sums:
             extrema = simulate(self.system, **start, periods=SETTINGS.sample, tol=1e-10).extrema
-            low, high = float(extrema.min()), float(extrema.max())
+            low = float(extrema.min())
+            high = float(extrema.max())
         else:
-            high, low = (float(sample[f"overall_{name}"].values[0]) for name in extrema_names(self.system.model.coordinates))
-        return self._add(verdict.kind, stroboscopic(self.system, sample)[0], (low, high), verdict.reason)
+            high, low = (
+                float(sample[f"overall_{name}"].values[0])
+                for name in extrema_names(self.system.model.coordinates)
+            )
+        return self._add(
+            verdict.kind, stroboscopic(self.system, sample)[0], (low, high), verdict.reason
+        )
 
     def add_images(self) -> None:
-        """Add the mirror image of every attractor of a system with that symmetry: it is an attractor as well."""
+        """Add the mirror image of every attractor of a system with that symmetry: it is an
+        attractor as well.
+        """
         if not is_symmetric(self.system):
             return
         for label in range(len(self.members)):
-            image = self._image(self.members[label]) if self.members[label].mirror == UNDECIDED else None
+            image = (
+                self._image(self.members[label])
+                if self.members[label].mirror == UNDECIDED
+                else None
+            )
             if image is not None:
                 for one, other in ((label, image), (image, label)):
                     self.members[one] = replace(self.members[one], mirror=other)
@@ -223,7 +293,15 @@ def _near(states: np.ndarray) -> float:
 
 
 def _check(
-    system: System, window: Any, starts: int, max_period: int, seed: int, known: Any, also: Any, tol: float, progress: object
+    system: System,
+    window: Any,
+    starts: int,
+    max_period: int,
+    seed: int,
+    known: Any,
+    also: Any,
+    tol: float,
+    progress: object,
 ) -> None:
     with_clock(system)
     further = check_states("also", also, system.dimension)
@@ -250,23 +328,25 @@ def find_attractors(
     tol: float = 1e-11,
     progress: Progress = silent,
 ) -> Attractors:
-    """The attractors on which motions from a window of initial states at phase 0 end, each certified, with its share of the
-    motions.
+    """The attractors on which motions from a window of initial states at phase 0 end, each
+    certified, with its share of the motions.
 
-    Rest is certified by proof (`capture_speed`, or no load that ever pulls); a periodic orbit by its own equations, solved to
-    rounding, with multipliers inside the unit circle; a set on which motions never settle by the verdict of `classify`, if areas
-    of states shrink. Other motions are undecided; they are counted, with the reasons. In a symmetric system the mirror image of
-    an attractor is another attractor, unless it is the same set, and is added even if no start leads to it. Under a constant
-    load the equilibria are found, as orbits of period 1.
+    Rest is certified by proof (`capture_speed`, or no load that ever pulls); a periodic orbit by
+    its own equations, solved to rounding, with multipliers inside the unit circle; a set on which
+    motions never settle by the verdict of `classify`, if areas of states shrink. Other motions are
+    undecided; they are counted, with the reasons. In a symmetric system the mirror image of an
+    attractor is another attractor, unless it is the same set, and is added even if no start leads
+    to it. Under a constant load the equilibria are found, as orbits of period 1.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency or a constant one.
     window
-        Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered evenly by initial states; with
-        several coordinates a pair for each of them, then for each velocity. By default half widths are 1.5 around the contact,
-        or around 0 without one. With several contacts the starts take turns as to which contacts are closed.
+        Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered
+        evenly by initial states; with several coordinates a pair for each of them, then for each
+        velocity. By default half widths are 1.5 around the contact, or around 0 without one. With
+        several contacts the starts take turns as to which contacts are closed.
     starts
         The number of initial states.
     max_period
@@ -274,10 +354,11 @@ def find_attractors(
     seed
         The seed by which the grid of initial states is shifted.
     known
-        Orbits, or branches with orbits at the system's parameter, of which the stable ones count as attractors too.
+        Orbits, or branches with orbits at the system's parameter, of which the stable ones count as
+        attractors too.
     also
-        Further initial states (n, d), coordinates and velocities, which do not count in the shares. A state at a contact that
-        moves into it is taken just before the impact.
+        Further initial states (n, d), coordinates and velocities, which do not count in the shares.
+        A state at a contact that moves into it is taken just before the impact.
     tol
         The error of a step, as for `simulate_many`.
     progress
@@ -294,9 +375,12 @@ def find_attractors(
     >>> [attractor.period for attractor in found]
     [1]
     """
-    clock, further, area = with_clock(system), check_states("also", also, system.dimension), check_window(window, system)
+    clock = with_clock(system)
+    further = check_states("also", also, system.dimension)
+    area = check_window(window, system)
     progress(0.0, "motions")
-    states, found = initial_states(clock, starts, area, seed), KnownAttractors(clock)
+    states = initial_states(clock, starts, area, seed)
+    found = KnownAttractors(clock)
     for orbit in _known(system, known):
         found.add_orbit(orbit)
     begun = np.concatenate([states, before_impacts(clock, further)])
@@ -305,22 +389,43 @@ def find_attractors(
     final = final_labels(found.members)
     counts = np.bincount(labels[:starts][labels[:starts] >= 0], minlength=len(found.members))
     ends = np.array([final.get(int(label), UNDECIDED) for label in labels], dtype=int)
-    members = [member.labelled(final, starts=int(counts[member.label]), of=starts) for member in found.members]
+    members = [
+        member.labelled(final, starts=int(counts[member.label]), of=starts)
+        for member in found.members
+    ]
     members.sort(key=lambda member: member.label)
     progress(1.0, "attractors")
-    return Attractors(system, tuple(members), states, ends[:starts], ends[starts:], area, seed, tol, tuple(found.reasons))
+    return Attractors(
+        system,
+        tuple(members),
+        states,
+        ends[:starts],
+        ends[starts:],
+        area,
+        seed,
+        tol,
+        tuple(found.reasons),
+    )
 
 
-def _assigned(found: KnownAttractors, states: np.ndarray, max_period: int, tol: float, progress: Progress) -> np.ndarray:
-    """The label among the known attractors on which each motion ends; below 0 where that is undecided."""
+def _assigned(
+    found: KnownAttractors, states: np.ndarray, max_period: int, tol: float, progress: Progress
+) -> np.ndarray:
+    """The label among the known attractors on which each motion ends; below 0 where that is
+    undecided.
+    """
     options: dict[str, Any] = {"max_period": max_period, "kept": SETTINGS.kept, "tol": tol}
-    ends = find_recurrence(found.system, states, SETTINGS.first, **options, progress=part_of(progress, 0.0, 0.3))
+    ends = find_recurrence(
+        found.system, states, SETTINGS.first, **options, progress=part_of(progress, 0.0, 0.3)
+    )
     labels = found.assign(ends)
     left = np.flatnonzero(labels == WAITING)
     if not left.size:
         return labels
     begin = ends.states[left, -1]
-    ends = find_recurrence(found.system, begin, SETTINGS.second, **options, progress=part_of(progress, 0.3, 0.7))
+    ends = find_recurrence(
+        found.system, begin, SETTINGS.second, **options, progress=part_of(progress, 0.3, 0.7)
+    )
     later = found.assign(ends)
     found.assign_unsettled(ends, later)
     for turn in range(SETTINGS.verdicts):
@@ -332,23 +437,31 @@ def _assigned(found: KnownAttractors, states: np.ndarray, max_period: int, tol: 
         progress(0.7 + 0.3 * turn / SETTINGS.verdicts, "verdicts")
     if (later == WAITING).any():
         periods = SETTINGS.first + SETTINGS.second
-        found.reasons.append(f"{int((later == WAITING).sum())} motions do not settle in {periods} forcing periods")
+        found.reasons.append(
+            f"{int((later == WAITING).sum())} motions do not settle in {periods} forcing periods"
+        )
     labels[left] = np.where(later == WAITING, UNDECIDED, later)
     return labels
 
 
 def final_labels(members: list[Attractor]) -> dict[int, int]:
-    """The final labels by the labels of the known ones, in an order that does not depend on the search: rest, then orbits by
-    period, amplitude and sign, then others.
+    """The final labels by the labels of the known ones, in an order that does not depend on the
+    search: rest, then orbits by period, amplitude and sign, then others.
 
-    With several contacts there may be more than one state of rest; 0 is the one with the least coordinates.
+    With several contacts there may be more than one state of rest; 0 is the one with the least
+    coordinates.
     """
 
     def rank(member: Attractor) -> tuple[float, ...]:
         if member.kind is Ending.REST:
             return -1.0, *map(float, member.states[0])
         if member.orbit is None:
-            return 1.0, 0.0, round(member.amplitude, 2), -round(float(member.states[:, 0].mean()), 2)
+            return (
+                1.0,
+                0.0,
+                round(member.amplitude, 2),
+                -round(float(member.states[:, 0].mean()), 2),
+            )
         return 0.0, float(member.period), round(member.amplitude, 6), -round(member.highest, 6)
 
     ordered = sorted(members, key=rank)
@@ -357,7 +470,9 @@ def final_labels(members: list[Attractor]) -> dict[int, int]:
 
 
 def _known(system: System, known: Any) -> list[PeriodicOrbit]:
-    """The stable orbits among those that are known, and among those of known branches at the system's parameter."""
+    """The stable orbits among those that are known, and among those of known branches at the
+    system's parameter.
+    """
     orbits: list[PeriodicOrbit] = []
     for item in [known] if isinstance(known, (PeriodicOrbit, Branch)) else known:
         if isinstance(item, Branch):
@@ -365,14 +480,22 @@ def _known(system: System, known: Any) -> list[PeriodicOrbit]:
         elif isinstance(item, PeriodicOrbit):
             orbits.append(item)
         else:
-            raise ParameterError(f"known must be periodic orbits or branches, got {item!r}", "known")
+            raise ParameterError(
+                f"known must be periodic orbits or branches, got {item!r}", "known"
+            )
     for orbit in orbits:
         theirs = orbit.system.parameters
         unlike = [
-            p for p, x in system.parameters.items() if not math.isclose(theirs.get(p, math.nan), x, rel_tol=1e-9, abs_tol=1e-12)
+            p
+            for p, x in system.parameters.items()
+            if not math.isclose(theirs.get(p, math.nan), x, rel_tol=1e-9, abs_tol=1e-12)
         ]
         if unlike or type(orbit.system.model) is not type(system.model):
             raise ParameterError(
-                f"a known orbit belongs to another system; it differs in {', '.join(unlike) or 'its model'}", "known"
+                (
+                    "a known orbit belongs to another system; it differs in "
+                    f"{', '.join(unlike) or 'its model'}"
+                ),
+                "known",
             )
     return [orbit for orbit in orbits if orbit.stable]

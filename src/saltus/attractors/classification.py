@@ -1,7 +1,7 @@
 """Verdicts: what one motion ends on, with the evidence.
 
-A motion that comes to rest, ends or repeats itself within its time is judged here; the one that does not by `judge`, which charts
-and diagrams ask too.
+A motion that comes to rest, ends or repeats itself within its time is judged here; the one that
+does not by `judge`, which charts and diagrams ask too.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     import xarray
 
 NAMES = ("periods", "transient", "max_period", "seed", "tol")  # arguments of `classify`
-SECTION_STATES = 1000  # states of a motion that does not repeat, enough to see the shape of its attractor
+# states of a motion that does not repeat, enough to see the shape of its attractor
+SECTION_STATES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,25 +84,44 @@ class Verdict(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The verdict and its evidence as single values, and the motion at its end.
 
-        `section_<variable>` are its states at phase 0 over `state`; if it is on an orbit, `curve_<variable>` is one period of the
-        orbit over `time`.
+        `section_<variable>` are its states at phase 0 over `state`; if it is on an orbit,
+        `curve_<variable>` is one period of the orbit over `time`.
         """
-        known = {"kind": str(self.kind), "reason": self.reason, "period": self.period or 0, "followed": self.periods}
-        columns: dict[str, tuple[Any, ...]] = {
-            name: ((), value, "1", name.replace("_", " ")) for name, value in (known | self.evidence).items()
+        known = {
+            "kind": str(self.kind),
+            "reason": self.reason,
+            "period": self.period or 0,
+            "followed": self.periods,
         }
-        plane, units = state_plane(self.system), state_units(self.system)
+        columns: dict[str, tuple[Any, ...]] = {
+            name: ((), value, "1", name.replace("_", " "))
+            for name, value in (known | self.evidence).items()
+        }
+        plane = state_plane(self.system)
+        units = state_units(self.system)
         for i, name in zip((0, self.system.dimension // 2), plane, strict=True):
-            columns[f"section_{name}"] = ("state", self._section()[:, i], units[name], f"{name} at phase 0")
+            columns[f"section_{name}"] = (
+                "state",
+                self._section()[:, i],
+                units[name],
+                f"{name} at phase 0",
+            )
         if self.orbit is not None:
             curve = self.orbit.motion().to_xarray()
-            columns |= {f"curve_{name}": ("time", curve[name].values, units[name], f"{name} on its orbit") for name in plane}
+            columns |= {
+                f"curve_{name}": ("time", curve[name].values, units[name], f"{name} on its orbit")
+                for name in plane
+            }
         return result_dataset("verdict", columns, None, self.system, plane=list(plane))
 
     def _section(self) -> np.ndarray:
-        """States at phase 0 from the end of the motion on, (n, d): those of one period, or many if it does not repeat itself."""
+        """States at phase 0 from the end of the motion on, (n, d): those of one period, or many if
+        it does not repeat itself.
+        """
         end = state_of(self.system, self.state)
-        lasting = self.kind not in (Ending.REST, Ending.UNDECIDED) and self.system.load.period is not None
+        lasting = (
+            self.kind not in (Ending.REST, Ending.UNDECIDED) and self.system.load.period is not None
+        )
         if not lasting:
             return end[None]
         count = self.period or SECTION_STATES
@@ -109,7 +129,11 @@ class Verdict(Result):
         return np.asarray(ends.states[0])
 
     def _repr_html_(self) -> str:
-        known = {"period": self.period or "none", "reason": self.reason, "forcing periods followed": self.periods}
+        known = {
+            "period": self.period or "none",
+            "reason": self.reason,
+            "forcing periods followed": self.periods,
+        }
         return html_table(f"Verdict: {self.kind}", known | self.evidence)
 
     def __repr__(self) -> str:
@@ -130,11 +154,15 @@ class _Case:
 
     @property
     def settings(self) -> JudgementSettings:
-        """How the judge looks at a motion that has not settled: for periods as long as are asked for."""
+        """How the judge looks at a motion that has not settled: for periods as long as are asked
+        for.
+        """
         return replace(JUDGEMENT, longest_period=max(JUDGEMENT.longest_period, self.max_period))
 
     def ends_of(self, state: np.ndarray, periods: int, part: tuple[float, float]) -> Recurrence:
-        """How the motion from a state (d,) ends within so many forcing periods; `part` is the share of the progress."""
+        """How the motion from a state (d,) ends within so many forcing periods; `part` is the share
+        of the progress.
+        """
         kept = min(periods, max(self.periods, 4 * self.max_period))
         return find_recurrence(
             self.clock,
@@ -146,8 +174,12 @@ class _Case:
             progress=part_of(self.progress, *part),
         )
 
-    def verdict(self, kind: Ending, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any) -> Verdict:
-        """A verdict on a motion with these `ends`, for a cause whose sentence is filled with these numbers."""
+    def verdict(
+        self, kind: Ending, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any
+    ) -> Verdict:
+        """A verdict on a motion with these `ends`, for a cause whose sentence is filled with these
+        numbers.
+        """
         given: dict[str, Any] = (
             dict.fromkeys(("period", "orbit", "exponents", "zero_one"))
             | {"state": arguments_of(self.system, ends.states[0, -1]), "reason": ""}
@@ -157,8 +189,12 @@ class _Case:
         given.setdefault("periods", round(float(ends.periods[0])))
         return Verdict(system=self.system, kind=kind, cause=cause, **given)
 
-    def undecided(self, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any) -> Verdict:
-        """The verdict that a motion is undecided, for a cause whose sentence is filled with these numbers."""
+    def undecided(
+        self, cause: Reason, ends: Recurrence, numbers: dict[str, Any], **more: Any
+    ) -> Verdict:
+        """The verdict that a motion is undecided, for a cause whose sentence is filled with these
+        numbers.
+        """
         return self.verdict(Ending.UNDECIDED, cause, ends, numbers, **more)
 
 
@@ -174,16 +210,23 @@ def classify(
     progress: Progress = silent,
     **coordinates: float,
 ) -> Verdict:
-    """Where a motion ends: at rest, on a periodic orbit, on a torus, in chaos, or undecided, each with its evidence.
+    """Where a motion ends: at rest, on a periodic orbit, on a torus, in chaos, or undecided, each
+    with its evidence.
 
-    * `rest`: proved to stay at the contact for all later loads (`capture_speed`), or at rest there where the load never pulls.
-    * `periodic`: it repeats itself, and is on an orbit that solves its own equations, has all multipliers inside the unit circle
-      and repeats itself in direct simulation. Under constant loads an equilibrium is such an orbit, of period 1.
-    * `chaotic`: it has not settled after transient + periods, and `judge`, the judge of charts and diagrams, finds that the
-      largest Lyapunov exponent is above 0 by more than its error and what regular motion may show, and that of 16 companions,
-      which begin in the motion's last states, none settles in 100 000 forcing periods for which they are followed in all. A
-      chaotic transient would be noticed with a probability of 95 % if its mean life was below 33 000.
-    * `quasi-periodic`: the exponent may be 0, the 0-1 test shows a regular motion, also on every n-th state, and `excludes_tori`
+    * `rest`: proved to stay at the contact for all later loads (`capture_speed`), or at rest there
+      where the load never pulls.
+    * `periodic`: it repeats itself, and is on an orbit that solves its own equations, has all
+      multipliers inside the unit circle
+      and repeats itself in direct simulation. Under constant loads an equilibrium is such an orbit,
+      of period 1.
+    * `chaotic`: it has not settled after transient + periods, and `judge`, the judge of charts and
+      diagrams, finds that the
+      largest Lyapunov exponent is above 0 by more than its error and what regular motion may show,
+      and that of 16 companions, which begin in the motion's last states, none settles in 100 000
+      forcing periods for which they are followed in all. A chaotic transient would be noticed with
+      a probability of 95 % if its mean life was below 33 000.
+    * `quasi-periodic`: the exponent may be 0, the 0-1 test shows a regular motion, also on every
+      n-th state, and `excludes_tori`
       knows no reason against it.
     * `undecided`: everything else, with the reason.
 
@@ -194,7 +237,8 @@ def classify(
     velocity, coordinates
         The state at the start, at phase 0.
     periods
-        Forcing periods in which it may settle, after the transient, and as many again after it was judged; at least 32.
+        Forcing periods in which it may settle, after the transient, and as many again after it was
+        judged; at least 32.
     transient
         Forcing periods at the beginning.
     max_period
@@ -216,7 +260,8 @@ def classify(
     >>> str(saltus.classify(system, theta=0.3).kind)
     'periodic'
     """
-    clock, start = with_clock(system), read_start(system, velocity, coordinates, NAMES)
+    clock = with_clock(system)
+    start = read_start(system, velocity, coordinates, NAMES)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
@@ -230,38 +275,55 @@ def classify(
 
 
 def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None:
-    """The verdict on a motion from a state (d,) that has come to rest, has ended or repeats itself; None if it goes on moving."""
+    """The verdict on a motion from a state (d,) that has come to rest, has ended or repeats itself;
+    None if it goes on moving.
+    """
     if ends.rest[0] or (ends.period[0] == 1 and stays_at_rest(case.clock, ends.last[0])):
-        numbers, point = {"periods": round(float(ends.periods[0]))}, rest_state(case.system, ends.last[0])
+        numbers = {"periods": round(float(ends.periods[0]))}
+        point = rest_state(case.system, ends.last[0])
         cause = Reason.STANDS if case.system.model.frictions else Reason.CAPTURED
-        return case.verdict(Ending.REST, cause, ends, numbers, state=arguments_of(case.system, point))
+        return case.verdict(
+            Ending.REST, cause, ends, numbers, state=arguments_of(case.system, point)
+        )
     if ends.ended[0]:
         return _ended(case, ends, start)
     if not ends.periodic[0]:
         return None
-    period, seen = int(ends.period[0]), "it repeats itself"
+    period = int(ends.period[0])
+    seen = "it repeats itself"
     found = certify(case.clock, ends.states[0, -1], period)
     every = f"every {period} forcing periods" if period > 1 else ""
     if not found.sound and (other := _period_by_the_judge(case, ends)) not in (None, period):
         again = f"every {other}" if other else "not at all"
-        facts: dict[str, Any] = {"seen": f"{seen} {every}", "tol": case.tol, "looser": JUDGEMENT.tol, "other": again}
+        facts: dict[str, Any] = {
+            "seen": f"{seen} {every}",
+            "tol": case.tol,
+            "looser": JUDGEMENT.tol,
+            "other": again,
+        }
         return case.undecided(Reason.ROUNDING, ends, facts)
     return _on_orbit(case, ends, found, f"{seen} {every}".rstrip())
 
 
 def _period_by_the_judge(case: _Case, ends: Recurrence) -> int | None:
-    """The period of the motion from the same state with the judge's steps, 0 if it then does not repeat itself; None if the
-    motion does not rest within its period.
+    """The period of the motion from the same state with the judge's steps, 0 if it then does not
+    repeat itself; None if the motion does not rest within its period.
 
-    A motion that rests now and then returns to one state exactly, also where what it does in between is too sensitive to be
-    computed: its period is then another with every change of rounding.
+    A motion that rests now and then returns to one state exactly, also where what it does in
+    between is too sensitive to be computed: its period is then another with every change of
+    rounding.
     """
-    start, period = arguments_of(case.system, ends.states[0, -1]), int(ends.period[0])
-    if not len(simulate(case.clock, **start, periods=period, dense=False).events.of(EventKind.REST)):
+    start = arguments_of(case.system, ends.states[0, -1])
+    period = int(ends.period[0])
+    if not len(
+        simulate(case.clock, **start, periods=period, dense=False).events.of(EventKind.REST)
+    ):
         return None
     longest = max(case.max_period, RECURRENCE.compiled_max_period)
     options: dict[str, Any] = {"max_period": longest, "kept": 2 * longest + 2, "tol": JUDGEMENT.tol}
-    again = find_recurrence(case.clock, ends.states[:, -1], max(case.periods, 2 * longest), **options)
+    again = find_recurrence(
+        case.clock, ends.states[:, -1], max(case.periods, 2 * longest), **options
+    )
     return int(again.period[0])
 
 
@@ -269,7 +331,13 @@ def _ended(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict:
     """The verdict on a motion that cannot be followed further; `simulate` gives the reason."""
     periods = round(float(ends.periods[0]))
     try:
-        motion = simulate(case.clock, **arguments_of(case.system, start), periods=periods + 1, tol=case.tol, dense=False)
+        motion = simulate(
+            case.clock,
+            **arguments_of(case.system, start),
+            periods=periods + 1,
+            tol=case.tol,
+            dense=False,
+        )
     except MotionError as error:
         return case.undecided(Reason.CANNOT_GO_ON, ends, {"error": error})
     if motion.limit is not None:
@@ -278,28 +346,45 @@ def _ended(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict:
 
 
 def _on_orbit(case: _Case, ends: Recurrence, found: Certificate, seen: str, **more: Any) -> Verdict:
-    """The verdict on a motion near an orbit, which is certified or not; `seen` says what was seen of the motion."""
+    """The verdict on a motion near an orbit, which is certified or not; `seen` says what was seen
+    of the motion.
+    """
     more["evidence"] = more.get("evidence", {}) | found.evidence
     if found.orbit is None or not found.sound:
-        return case.undecided(Reason.DOUBTFUL_ORBIT, ends, {"seen": seen, "doubt": found.doubt}, **more)
+        return case.undecided(
+            Reason.DOUBTFUL_ORBIT, ends, {"seen": seen, "doubt": found.doubt}, **more
+        )
     period = found.orbit.period
     cause = Reason.ON_ORBIT if case.system.load.period is not None else Reason.EQUILIBRIUM
-    numbers = {"seen": seen, "period": period, "multiplier": abs(found.orbit.multipliers[0]), "place": ends.states[0, -1, 0]}
-    return case.verdict(Ending.PERIODIC, cause, ends, numbers, period=period, orbit=found.orbit, **more)
+    numbers = {
+        "seen": seen,
+        "period": period,
+        "multiplier": abs(found.orbit.multipliers[0]),
+        "place": ends.states[0, -1, 0],
+    }
+    return case.verdict(
+        Ending.PERIODIC, cause, ends, numbers, period=period, orbit=found.orbit, **more
+    )
 
 
 def _judged(case: _Case, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has neither come to rest nor repeated itself."""
     if case.system.load.period is None:
-        return case.undecided(Reason.SELF_EXCITED if case.system.model.frictions else Reason.CONSERVATIVE, ends, {})
+        return case.undecided(
+            Reason.SELF_EXCITED if case.system.model.frictions else Reason.CONSERVATIVE, ends, {}
+        )
     states = ends.states[:, -JUDGEMENT.companions :]
-    answer = judge(case.system, states, {}, settings=case.settings, progress=part_of(case.progress, 0.3, 0.6))
-    before, later = round(float(ends.periods[0])), case.ends_of(ends.states[0, -1], case.periods, (0.6, 0.7))
+    answer = judge(
+        case.system, states, {}, settings=case.settings, progress=part_of(case.progress, 0.3, 0.6)
+    )
+    before = round(float(ends.periods[0]))
+    later = case.ends_of(ends.states[0, -1], case.periods, (0.6, 0.7))
     evidence = _evidence(answer)
     after_all = _settled(case, later, ends.states[0, -1])
     if after_all is not None:
         return _after_all(after_all, answer, before, evidence)
-    ending, periods = Ending(answer.ending[0]), before + round(float(later.periods[0]))
+    ending = Ending(answer.ending[0])
+    periods = before + round(float(later.periods[0]))
     if ending is Ending.PERIODIC or answer.reason[0] == Reason.NOT_SURE:
         approached = _approaching(case, later, answer, {"periods": periods, "evidence": evidence})
         if approached is not None:
@@ -328,19 +413,32 @@ def _evidence(answer: Judged) -> dict[str, Any]:
 
 
 def _witnesses(case: _Case, ends: Recurrence) -> dict[str, Any]:
-    """What is told beside a verdict on which it does not rest: all exponents of the motion, and the 0-1 test of its states."""
+    """What is told beside a verdict on which it does not rest: all exponents of the motion, and the
+    0-1 test of its states.
+    """
     series = ends.states[0, :, 0]
     series = series[np.isfinite(series)]
-    run: dict[str, Any] = {"periods": case.periods, "transient": 0, "tol": case.tol, "two_trajectories": False}
+    run: dict[str, Any] = {
+        "periods": case.periods,
+        "transient": 0,
+        "tol": case.tol,
+        "two_trajectories": False,
+    }
     start = arguments_of(case.system, ends.states[0, -1])
-    exponents = lyapunov_spectrum(case.system, **start, **run, progress=part_of(case.progress, 0.7, 1.0))
+    exponents = lyapunov_spectrum(
+        case.system, **start, **run, progress=part_of(case.progress, 0.7, 1.0)
+    )
     opinion = zero_one_of_bands(series, seed=case.seed) if series.size >= FEWEST_ENTRIES else None
     return {"exponents": exponents, "zero_one": opinion}
 
 
 def _after_all(verdict: Verdict, answer: Judged, before: int, evidence: dict[str, Any]) -> Verdict:
     """The verdict on a motion that has settled after all, after it was judged."""
-    chaos = f" of transient chaos with an exponent of {answer.exponent[0]:.4g}" if answer.ending[0] == Ending.TRANSIENT else ""
+    chaos = (
+        f" of transient chaos with an exponent of {answer.exponent[0]:.4g}"
+        if answer.ending[0] == Ending.TRANSIENT
+        else ""
+    )
     return replace(
         verdict,
         reason=f"after more than {before} forcing periods{chaos}: {verdict.reason}",
@@ -349,8 +447,12 @@ def _after_all(verdict: Verdict, answer: Judged, before: int, evidence: dict[str
     )
 
 
-def _approaching(case: _Case, ends: Recurrence, answer: Judged, given: dict[str, Any]) -> Verdict | None:
-    """The verdict on a motion that is or may be periodic: on its orbit, if the orbit is found and attracts."""
+def _approaching(
+    case: _Case, ends: Recurrence, answer: Judged, given: dict[str, Any]
+) -> Verdict | None:
+    """The verdict on a motion that is or may be periodic: on its orbit, if the orbit is found and
+    attracts.
+    """
     period = int(answer.period[0]) or None
     state = answer.settled.state[answer.settled.question == 0][-1] if period else ends.last[0]
     found = certify(case.clock, state, period, max_period=case.max_period)

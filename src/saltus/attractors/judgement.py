@@ -1,6 +1,7 @@
 """The judge: what motions end on that have not settled, many at once.
 
-`classify`, `find_attractors`, charts and diagrams all ask it, so that they cannot contradict each other on one motion.
+`classify`, `find_attractors`, charts and diagrams all ask it, so that they cannot contradict each
+other on one motion.
 """
 
 from __future__ import annotations
@@ -27,8 +28,14 @@ class Reason(NumberedSentence):
         1,
         "{seen}, and none of those beside it settles any more, which excludes transients of a mean life below {life:.3g} periods",
     )
-    TRANSIENT = 2, "{seen}, but {gone} of the motions beside it settle, after {life:.3g} forcing periods in the mean: a transient"
-    FEW_SETTLED = 3, "{seen}, and {gone} of the motions beside it settle: too few to tell a long transient from chaos beside one"
+    TRANSIENT = (
+        2,
+        "{seen}, but {gone} of the motions beside it settle, after {life:.3g} forcing periods in the mean: a transient",
+    )
+    FEW_SETTLED = (
+        3,
+        "{seen}, and {gone} of the motions beside it settle: too few to tell a long transient from chaos beside one",
+    )
     COMING_TOGETHER = (
         4,
         (
@@ -40,15 +47,27 @@ class Reason(NumberedSentence):
     LONG_PERIOD = 6, "it repeats itself every {period} forcing periods"
     NO_EXPONENTS = 7, "it comes to rest or ends before an exponent is known"
     LIMIT = 8, "a limit of the model ends it and all motions beside it"
-    CAPTURED = 9, "within {periods} forcing periods it is captured by the contact, from where no later load pulls it"
-    STANDS = 10, "within {periods} forcing periods it stands still, held by what no later load overcomes"
-    ON_ORBIT = 11, "{seen}, on an orbit of period {period} with the largest multiplier {multiplier:.6g}"
+    CAPTURED = (
+        9,
+        "within {periods} forcing periods it is captured by the contact, from where no later load pulls it",
+    )
+    STANDS = (
+        10,
+        "within {periods} forcing periods it stands still, held by what no later load overcomes",
+    )
+    ON_ORBIT = (
+        11,
+        "{seen}, on an orbit of period {period} with the largest multiplier {multiplier:.6g}",
+    )
     EQUILIBRIUM = 12, "it comes to the equilibrium at {place:.9g}, which attracts"
     DOUBTFUL_ORBIT = 13, "{seen}, but {doubt}"
     MARGIN = 14, "the motion ends at time {time:.6g}, where its margin {limit} reaches 0"
     CANNOT_GO_ON = 15, "the motion cannot go on: {error}"
     NOT_FOLLOWED = 16, "the motion cannot be followed beyond some {periods} forcing periods"
-    CONSERVATIVE = 17, "under constant loads it goes on moving: it has not lost its energy, or has none to lose"
+    CONSERVATIVE = (
+        17,
+        "under constant loads it goes on moving: it has not lost its energy, or has none to lose",
+    )
     SELF_EXCITED = (
         18,
         (
@@ -69,37 +88,49 @@ class Reason(NumberedSentence):
 class JudgementSettings:
     """How long motions that have not settled are followed, and what then counts as chaos."""
 
-    # Number of companions: motions from the states of a question, which stand for all motions there.
+    # Number of companions: motions from the states of a question, which stand for all motions
+    # there.
     companions: int = 16
-    first_periods: int = 250  # The first round in forcing periods; most transients end in it, and need no exponents.
-    round_periods: int = 1690  # The length of each further round. After a round survivors replace the companions that settled.
+    # The first round in forcing periods; most transients end in it, and need no exponents.
+    first_periods: int = 250
+    # The length of each further round. After a round survivors replace the companions that settled.
+    round_periods: int = 1690
     rounds: int = 12  # The largest number of further rounds.
-    # Forcing periods, added up over companions, in which none may settle. If none has settled within E, transients of a mean life
-    # of E / 3 or less are excluded with a probability of 95 %, as the number that settle within E is Poisson distributed.
+    # Forcing periods, added up over companions, in which none may settle. If none has settled
+    # within E, transients of a mean life of E / 3 or less are excluded with a probability of 95 %,
+    # as the number that settle within E is Poisson distributed.
     exposure: int = 100_000
-    # Number of companions that must have settled for the verdict of a transient while others go on: from three, a mean life is
-    # estimated to within a factor of about 3. If some settle and then no more do, chaos takes a time without settling of three of
-    # the mean lives that the former show.
+    # Number of companions that must have settled for the verdict of a transient while others go on:
+    # from three, a mean life is estimated to within a factor of about 3. If some settle and then no
+    # more do, chaos takes a time without settling of three of the mean lives that the former show.
     settled: int = 3
-    # After so many rounds the motions are called a transient if the rate at which companions settle in the later half of the
-    # rounds is at least this share of the rate in the earlier half: if some were on an attractor, their share of the companions
-    # would grow, and the rate would fall. Pure transients take five rounds on average, those beside an attractor more.
+    # After so many rounds the motions are called a transient if the rate at which companions settle
+    # in the later half of the rounds is at least this share of the rate in the earlier half: if
+    # some were on an attractor, their share of the companions would grow, and the rate would fall.
+    # Pure transients take five rounds on average, those beside an attractor more.
     fewest_rounds: int = 4
     steady: float = 0.9
     # Number of survivors whose exponent is measured; they are taken as samples of one attractor.
     measured: int = 12
-    # Forcing periods of the shortest run of these survivors, which is doubled up to the longest one as long as the sign of the
-    # exponent is open: weak chaos of exponent 0.005 takes a thousand periods.
+    # Forcing periods of the shortest run of these survivors, which is doubled up to the longest one
+    # as long as the sign of the exponent is open: weak chaos of exponent 0.005 takes a thousand
+    # periods.
     shortest_run: int = 64
     longest_run: int = 1600
-    # From a run of this length on, a long period is looked for if the exponent seems to be below 0: one saves longer runs.
+    # From a run of this length on, a long period is looked for if the exponent seems to be below 0:
+    # one saves longer runs.
     regular_run: int = 256
-    # Distance between the first states of companions from one state, as they would else be one motion. Chaos of exponent 0.005
-    # separates them within 3000 units of time.
+    # Distance between the first states of companions from one state, as they would else be one
+    # motion. Chaos of exponent 0.005 separates them within 3000 units of time.
     apart: float = 1e-7
-    longest_period: int = 128  # The longest period looked for in a regular motion that has not settled, in forcing periods.
-    patience: int = 4000  # Forcing periods for which such a motion is followed, so that it settles with multipliers up to 0.99.
-    tol: float = 1e-10  # The error of a step: with 1e-8, some periodic motions do not return near enough to be recognised.
+    # The longest period looked for in a regular motion that has not settled, in forcing periods.
+    longest_period: int = 128
+    # Forcing periods for which such a motion is followed, so that it settles with multipliers up to
+    # 0.99.
+    patience: int = 4000
+    # The error of a step: with 1e-8, some periodic motions do not return near enough to be
+    # recognised.
+    tol: float = 1e-10
 
 
 JUDGEMENT = JudgementSettings()
@@ -107,37 +138,57 @@ JUDGEMENT = JudgementSettings()
 
 @dataclass(frozen=True, eq=False)
 class EarlierJudgement:
-    """What a less careful judgement has shown of the chaos from whose states a further one starts, an entry for each question."""
+    """What a less careful judgement has shown of the chaos from whose states a further one starts,
+    an entry for each question.
+    """
 
     exponent: np.ndarray  # (n,): the largest exponent, which is surely above 0
     error: np.ndarray  # (n,): half width of its 95 % interval
-    periods_without_settling: np.ndarray  # (n,): forcing periods of companions, in all, in which none has settled
+    # (n,): forcing periods of companions, in all, in which none has settled
+    periods_without_settling: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
     """The answers, an entry for each question."""
 
-    ending: np.ndarray  # (n,): an `Ending`: CHAOTIC, TRANSIENT, PERIODIC, QUASI_PERIODIC or UNDECIDED
+    # (n,): an `Ending`: CHAOTIC, TRANSIENT, PERIODIC, QUASI_PERIODIC or UNDECIDED
+    ending: np.ndarray
     reason: np.ndarray  # (n,): a `Reason`, whose sentence `sentence` fills in
-    exponent: np.ndarray  # (n,): largest exponent of those that have not settled, per unit of time; nan if all settle at once
+    # (n,): largest exponent of those that have not settled, per unit of time; nan if all settle at
+    # once
+    exponent: np.ndarray
     error: np.ndarray  # (n,): half width of its 95 % interval
-    resolution: np.ndarray  # (n,): 2 ln(t) / t, which regular motion may show after the time of the run
+    # (n,): 2 ln(t) / t, which regular motion may show after the time of the run
+    resolution: np.ndarray
     zero_one: np.ndarray  # (n,): K of the 0-1 test by which a torus is one; else nan
-    settled_count: np.ndarray  # (n,): how many companions have settled, or were ended by a limit of the model
-    mean_life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
-    period: np.ndarray  # (n,): forcing periods after which a periodic motion repeats itself, 0 if that is not known
-    states: np.ndarray  # (n, companions, d): the last stroboscopic states, of survivors where there are any
+    # (n,): how many companions have settled, or were ended by a limit of the model
+    settled_count: np.ndarray
+    # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded
+    # with 95 %
+    mean_life: np.ndarray
+    # (n,): forcing periods after which a periodic motion repeats itself, 0 if that is not known
+    period: np.ndarray
+    # (n, companions, d): the last stroboscopic states, of survivors where there are any
+    states: np.ndarray
     settled: SettledLater  # what companions settled on
 
     def __len__(self) -> int:
         return len(self.ending)
 
     def sentence(self, row: int, settings: JudgementSettings, torus: str = "") -> str:
-        """The reason of an answer in words; `torus` is added where it is not known whether a motion is regular."""
-        exponent, error, least = (float(values[row]) for values in (self.exponent, self.error, self.resolution))
+        """The reason of an answer in words; `torus` is added where it is not known whether a motion
+        is regular.
+        """
+        exponent, error, least = (
+            float(values[row]) for values in (self.exponent, self.error, self.resolution)
+        )
         seen = f"its largest exponent is {exponent:.4g} +- {error:.1g}, where regular motion may show {least:.1g}"
-        numbers = {"gone": int(self.settled_count[row]), "life": float(self.mean_life[row]), "period": int(self.period[row])}
+        numbers = {
+            "gone": int(self.settled_count[row]),
+            "life": float(self.mean_life[row]),
+            "period": int(self.period[row]),
+        }
         return Reason(self.reason[row]).sentence.format(
             seen=seen if np.isfinite(exponent) else "it looks like chaos for a while",
             torus=torus,
@@ -162,12 +213,22 @@ class SettledLater:
 
     def joined(self, other: SettledLater) -> SettledLater:
         """These and others."""
-        return SettledLater(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in ("question", "state", "period")))
+        return SettledLater(
+            *(
+                np.concatenate([getattr(self, n), getattr(other, n)])
+                for n in ("question", "state", "period")
+            )
+        )
 
     def few(self, alike: int, most: int) -> SettledLater:
-        """At most `most` of the motions of each question, and of these at most `alike` of each period."""
+        """At most `most` of the motions of each question, and of these at most `alike` of each
+        period.
+        """
         order = np.lexsort((self.state[:, 0], self.period, self.question))
-        for key, count in (self.question * (1 + self.period.max(initial=0)) + self.period, alike), (self.question, most):
+        for key, count in (
+            (self.question * (1 + self.period.max(initial=0)) + self.period, alike),
+            (self.question, most),
+        ):
             order = order[np.arange(len(order)) - np.searchsorted(key[order], key[order]) < count]
         return SettledLater(self.question[order], self.state[order], self.period[order])
 
@@ -181,32 +242,37 @@ def judge(
     earlier: EarlierJudgement | None = None,
     progress: Progress = silent,
 ) -> Judged:
-    """What motions end on that have not settled: chaos, a transient, a torus, or an orbit after all.
+    """What motions end on that have not settled: chaos, a transient, a torus, or an orbit after
+    all.
 
-    A question is a set of stroboscopic states under one set of parameters: the last states of a motion, or of several motions,
-    that have not settled. Companions start at these and are followed in rounds. Chaos takes two conditions. The average of the
-    survivors' largest exponents is above 0 by more than its 95 % error and the resolution 2 ln(t) / t. And within a number of
-    forcing periods, added up over companions, none settles: settling from chaotic transients is a Poisson process, whose rate is
-    estimated or bounded by this number. If some settle, survivors take their places; if there is a chaotic attractor beside the
-    transient, the share of companions on it grows, until none settles within three mean lives of the transient. If the rate at
-    which companions settle does not fall, there is no such attractor.
+    A question is a set of stroboscopic states under one set of parameters: the last states of a
+    motion, or of several motions, that have not settled. Companions start at these and are followed
+    in rounds. Chaos takes two conditions. The average of the survivors' largest exponents is above
+    0 by more than its 95 % error and the resolution 2 ln(t) / t. And within a number of forcing
+    periods, added up over companions, none settles: settling from chaotic transients is a Poisson
+    process, whose rate is estimated or bounded by this number. If some settle, survivors take their
+    places; if there is a chaotic attractor beside the transient, the share of companions on it
+    grows, until none settles within three mean lives of the transient. If the rate at which
+    companions settle does not fall, there is no such attractor.
 
-    A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after a long period. It is on a
-    torus if its exponent may be 0 and the conditions of `regular_motion` hold.
+    A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after
+    a long period. It is on a torus if its exponent may be 0 and the conditions of `regular_motion`
+    hold.
 
     Parameters
     ----------
     system
         What moves, under a load with a frequency.
     states
-        (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, and each question needs one other row.
+        (n, m, d), coordinates and velocities at phase 0; rows of nan are left out, and each
+        question needs one other row.
     parameters
         Numbers by dotted path, (n,) each, in place of the system's.
     settings
         How long companions are followed, and how surely transients are excluded.
     earlier
-        The results of an earlier judgement that has found chaos, if the states are those that it gave: the exponent is not
-        measured again, and the time in which none has settled is counted.
+        The results of an earlier judgement that has found chaos, if the states are those that it
+        gave: the exponent is not measured again, and the time in which none has settled is counted.
     progress
         Called with the fraction done.
     """
@@ -231,23 +297,36 @@ class _Judgement:
     """The state of a judgement of several questions."""
 
     def __init__(
-        self, system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray], settings: JudgementSettings
+        self,
+        system: System,
+        states: np.ndarray,
+        parameters: Mapping[str, np.ndarray],
+        settings: JudgementSettings,
     ) -> None:
         n = len(states)
-        self.system, self.settings, self.settled = system, settings, SettledLater.none(system.dimension)
-        self.parameters = {path: np.broadcast_to(np.asarray(values, dtype=float), n) for path, values in parameters.items()}
+        self.system = system
+        self.settings = settings
+        self.settled = SettledLater.none(system.dimension)
+        self.parameters = {
+            path: np.broadcast_to(np.asarray(values, dtype=float), n)
+            for path, values in parameters.items()
+        }
         self.states = np.full((n, settings.companions, system.dimension), np.nan)
         for row, given in enumerate(states):
             self.states[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         self.open = np.ones(n, dtype=bool)  # whether companions are still to be followed
-        self.positive, self.negative = np.zeros((2, n), dtype=bool)  # whether the exponent is surely above, or below 0
-        self.all_gone, self.looked = np.zeros((2, n), dtype=bool)  # whether no companion is left; whether long periods were tried
+        # whether the exponent is surely above, or below 0
+        self.positive, self.negative = np.zeros((2, n), dtype=bool)
+        # whether no companion is left; whether long periods were tried
+        self.all_gone, self.looked = np.zeros((2, n), dtype=bool)
         self.exponent, self.error, self.resolution, self.zero_one = np.full((4, n), np.nan)
         self.settled_count, self.ended = np.zeros(
             (2, n), dtype=int
         )  # companions that have settled or ended; of these, by a limit
-        self.exposure = np.zeros(n, dtype=int)  # forcing periods for which companions were followed, added up
-        self.before = np.zeros(n, dtype=int)  # the exposure up to the end of the last round in which any settled
+        # forcing periods for which companions were followed, added up
+        self.exposure = np.zeros(n, dtype=int)
+        # the exposure up to the end of the last round in which any settled
+        self.before = np.zeros(n, dtype=int)
         self.period, self.rounds = np.zeros((2, n), dtype=int)
         # Number of companions that settled in each round, and the round's exposure.
         self.history = np.zeros((2, settings.rounds + 1, n))
@@ -261,9 +340,14 @@ class _Judgement:
         )
         self.positive[:] = True
 
-    def _ends(self, rows: np.ndarray, states: np.ndarray, periods: int, progress: Progress, **options: Any) -> Recurrence:
+    def _ends(
+        self, rows: np.ndarray, states: np.ndarray, periods: int, progress: Progress, **options: Any
+    ) -> Recurrence:
         """How motions from states (rows, m, 2) end."""
-        columns = {path: np.repeat(values[rows], states.shape[1]) for path, values in self.parameters.items()}
+        columns = {
+            path: np.repeat(values[rows], states.shape[1])
+            for path, values in self.parameters.items()
+        }
         options = {"kept": 1} | options
         return find_recurrence(
             self.system,
@@ -276,15 +360,19 @@ class _Judgement:
         )
 
     def do_round(self, periods: int, progress: Progress) -> None:
-        """Follow companions for a round: those that settle are counted, and survivors take their places."""
+        """Follow companions for a round: those that settle are counted, and survivors take their
+        places.
+        """
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
         ends = self._ends(rows, self.states[rows], periods, progress)
         shape = (rows.size, self.settings.companions)
-        moving, last = (ends.outcome == Ending.UNDECIDED).reshape(shape), ends.last.reshape(*shape, -1)
+        moving = (ends.outcome == Ending.UNDECIDED).reshape(shape)
+        last = ends.last.reshape(*shape, -1)
         self._keep_settled(rows, ends)
-        left, followed = (~moving).sum(axis=1), np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
+        left = (~moving).sum(axis=1)
+        followed = np.ceil(ends.periods).astype(int).reshape(shape).sum(axis=1)
         self.history[:, self.rounds[rows], rows] = left, followed
         self.rounds[rows] += 1
         self.exposure[rows] += followed
@@ -294,7 +382,9 @@ class _Judgement:
         for i, row in enumerate(rows):
             survivors = last[i][moving[i]]
             self.all_gone[row] = not len(survivors)
-            self.states[row] = _companions(self.system, survivors, self.settings) if len(survivors) else last[i]
+            self.states[row] = (
+                _companions(self.system, survivors, self.settings) if len(survivors) else last[i]
+            )
         self.open[rows] = ~self.all_gone[rows]
 
     @property
@@ -306,18 +396,32 @@ class _Judgement:
     def _lacking(self) -> np.ndarray:
         """The further exposure in which none may settle until a transient is excluded, (n,)."""
         life = self.before / np.maximum(self.settled_count, 1)
-        return np.asarray(np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before))
+        return np.asarray(
+            np.maximum(self.settings.exposure, 3.0 * life) - (self.exposure - self.before)
+        )
 
     @property
     def steady(self) -> np.ndarray:
-        """Where companions settle at a rate that does not fall, so that none of them is on an attractor, (n,)."""
+        """Where companions settle at a rate that does not fall, so that none of them is on an
+        attractor, (n,).
+        """
         later = np.arange(self.history.shape[1])[:, None] >= self.rounds - self.rounds // 2
-        (left, followed), (left_late, followed_late) = self.history.sum(axis=1), np.where(later, self.history, 0.0).sum(axis=1)
-        does_not_fall = left_late * (followed - followed_late) >= self.settings.steady * (left - left_late) * followed_late
-        return np.asarray(does_not_fall & (left >= self.settings.settled) & (self.rounds >= self.settings.fewest_rounds))
+        (left, followed) = self.history.sum(axis=1)
+        (left_late, followed_late) = np.where(later, self.history, 0.0).sum(axis=1)
+        does_not_fall = (
+            left_late * (followed - followed_late)
+            >= self.settings.steady * (left - left_late) * followed_late
+        )
+        return np.asarray(
+            does_not_fall
+            & (left >= self.settings.settled)
+            & (self.rounds >= self.settings.fewest_rounds)
+        )
 
     def may_last(self, rounds: int) -> np.ndarray:
-        """Where so many more rounds may exclude a transient, or may show enough settled companions to call it one, (n,)."""
+        """Where so many more rounds may exclude a transient, or may show enough settled companions
+        to call it one, (n,).
+        """
         within = self._lacking <= rounds * self.settings.round_periods * self.settings.companions
         return np.asarray(within | (self.settled_count < self.settings.settled))
 
@@ -325,19 +429,28 @@ class _Judgement:
         """Keep the motions on which companions have settled."""
         here = np.flatnonzero(ends.periodic)
         question = rows[here // self.settings.companions]
-        self.settled = self.settled.joined(SettledLater(question, ends.last[here], ends.period[here]))
+        self.settled = self.settled.joined(
+            SettledLater(question, ends.last[here], ends.period[here])
+        )
 
     def measure(self) -> None:
-        """Measure the exponents of some survivors, by longer and longer runs until their sign is known.
+        """Measure the exponents of some survivors, by longer and longer runs until their sign is
+        known.
 
-        There are no longer runs if the exponent seems to be below 0 and a motion repeats itself after a long period.
+        There are no longer runs if the exponent seems to be below 0 and a motion repeats itself
+        after a long period.
         """
-        rows, settings = np.flatnonzero(self.open), self.settings
+        rows = np.flatnonzero(self.open)
+        settings = self.settings
         if not rows.size:
             return
-        chosen = np.linspace(0, settings.companions - 1, min(settings.measured, settings.companions)).astype(int)
+        chosen = np.linspace(
+            0, settings.companions - 1, min(settings.measured, settings.companions)
+        ).astype(int)
         columns = {path: values[rows] for path, values in self.parameters.items()}
-        given, shortest, periods = self.states[rows][:, chosen], settings.shortest_run, 0
+        given = self.states[rows][:, chosen]
+        shortest = settings.shortest_run
+        periods = 0
         run = LargestExponents(self.system, given, columns, shortest=shortest, tol=settings.tol)
         while periods < settings.longest_run:
             periods = min(max(2 * periods, shortest), settings.longest_run)
@@ -351,7 +464,8 @@ class _Judgement:
                 self.look_for_long_periods(self.open & (self.exponent < 0.0))
 
     def look_for_long_periods(self, chosen: np.ndarray) -> None:
-        """Follow a motion of each of the chosen questions, (n,), until it settles, unless the exponent is surely positive.
+        """Follow a motion of each of the chosen questions, (n,), until it settles, unless the
+        exponent is surely positive.
 
         Near bifurcations exponents are near 0, and motions settle slowly.
         """
@@ -368,29 +482,47 @@ class _Judgement:
         self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
 
     def look_for_tori(self) -> None:
-        """Decide whether a motion of each question whose exponent may be 0 is on a torus, or approaches an orbit slowly."""
-        chosen = ~self.positive & ~self.negative & (self.period == 0) & ~self.all_gone & np.isfinite(self.exponent)
+        """Decide whether a motion of each question whose exponent may be 0 is on a torus, or
+        approaches an orbit slowly.
+        """
+        chosen = (
+            ~self.positive
+            & ~self.negative
+            & (self.period == 0)
+            & ~self.all_gone
+            & np.isfinite(self.exponent)
+        )
         for row in np.flatnonzero(chosen):
-            system = self.system.with_({path: float(values[row]) for path, values in self.parameters.items()})
-            found = regular_motion(system, self.states[row, 0], self.settings.patience, self.settings.tol)
+            system = self.system.with_(
+                {path: float(values[row]) for path, values in self.parameters.items()}
+            )
+            found = regular_motion(
+                system, self.states[row, 0], self.settings.patience, self.settings.tol
+            )
             if found.zero_one is not None:
                 self.zero_one[row] = found.zero_one.K
             if found.orbit is not None:
-                period, state = found.orbit.period, found.orbit.section_state
+                period = found.orbit.period
+                state = found.orbit.section_state
                 self.period[row] = period
-                self.settled = self.settled.joined(SettledLater(np.array([row]), state[None], np.array([period])))
+                self.settled = self.settled.joined(
+                    SettledLater(np.array([row]), state[None], np.array([period]))
+                )
 
     def judged(self) -> Judged:
         """The verdicts that follow from the counts and the exponents."""
         n = len(self.open)
-        ending, reason = np.full(n, Ending.UNDECIDED), np.full(n, Reason.NOT_SURE)
+        ending = np.full(n, Ending.UNDECIDED)
+        reason = np.full(n, Reason.NOT_SURE)
         lasts = self.positive & ~self.all_gone & self.lasts
         some = self.positive & ~self.lasts
         cut = self.all_gone & (self.ended == self.settled_count)
         transient = (self.all_gone & ~cut) | (some & (self.settled_count >= self.settings.settled))
-        reason[some], reason[np.isnan(self.exponent)] = Reason.FEW_SETTLED, Reason.NO_EXPONENTS
+        reason[some] = Reason.FEW_SETTLED
+        reason[np.isnan(self.exponent)] = Reason.NO_EXPONENTS
         reason[cut] = Reason.LIMIT
-        repeats, together = (self.period > 0) & ~self.all_gone, self.negative & ~self.all_gone
+        repeats = (self.period > 0) & ~self.all_gone
+        together = self.negative & ~self.all_gone
         for chosen, kind, why in (
             (np.isfinite(self.zero_one), Ending.QUASI_PERIODIC, Reason.TORUS),
             (together, Ending.PERIODIC, Reason.COMING_TOGETHER),
@@ -398,14 +530,24 @@ class _Judgement:
             (transient, Ending.TRANSIENT, Reason.TRANSIENT),
             (lasts, Ending.CHAOTIC, Reason.CHAOS),
         ):
-            ending[chosen], reason[chosen] = kind, why
+            ending[chosen] = kind
+            reason[chosen] = why
         with np.errstate(divide="ignore"):
-            life = np.where(lasts, (self.exposure - self.before) / 3.0, self.exposure / self.settled_count)
-        found = {name: getattr(self, name) for name in ("exponent", "error", "resolution", "zero_one", "settled_count", "period")}
-        return Judged(ending, reason, mean_life=life, states=self.states, settled=self.settled, **found)
+            life = np.where(
+                lasts, (self.exposure - self.before) / 3.0, self.exposure / self.settled_count
+            )
+        found = {
+            name: getattr(self, name)
+            for name in ("exponent", "error", "resolution", "zero_one", "settled_count", "period")
+        }
+        return Judged(
+            ending, reason, mean_life=life, states=self.states, settled=self.settled, **found
+        )
 
 
 def _companions(system: System, states: np.ndarray, settings: JudgementSettings) -> np.ndarray:
-    """The first states of companions, (companions, d): beside these states (m, d), each of which is taken about equally often."""
+    """The first states of companions, (companions, d): beside these states (m, d), each of which is
+    taken about equally often.
+    """
     chosen = states[np.linspace(0, len(states) - 1, settings.companions).astype(int)]
     return states_beside(system, chosen, settings.apart * np.arange(settings.companions)[:, None])

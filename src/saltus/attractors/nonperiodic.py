@@ -1,4 +1,6 @@
-"""Motions that do not repeat themselves: the 0-1 test for chaos, and whether a motion is quasi-periodic or can be (errata 22)."""
+"""Motions that do not repeat themselves: the 0-1 test for chaos, and whether a motion is
+quasi-periodic or can be (errata 22).
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from saltus.systems import System, check_system
 from saltus.taylor import trace
 
 FEWEST_ENTRIES = 100  # the shortest series, as lags reach a tenth of it
-MOST_BANDS, FEWEST_OF_BANDS = 8, 500  # the bands that are tried at most, and the fewest numbers that are then used
+# the bands that are tried at most, and the fewest numbers that are then used
+MOST_BANDS = 8
+FEWEST_OF_BANDS = 500
 CONSTANT = 1e-9  # a series that varies by less than this, relatively, counts as constant
 
 
@@ -49,17 +53,20 @@ class ZeroOne:
 
 
 def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int = 100) -> ZeroOne:
-    """The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8 (2009) 129), by the correlation method.
+    """The 0-1 test of Gottwald and Melbourne (SIAM J. Appl. Dyn. Syst. 8 (2009) 129), by the
+    correlation method.
 
-    At random frequencies c in (pi/5, 4 pi/5) the series phi drives p + i q = sum of phi_j exp(i j c), which wanders like a
-    Brownian path in chaos and stays bounded in regular motion. Its mean square displacement M(n) over lags n up to a tenth of the
-    series, less the term E[phi]^2 (1 - cos n c) / (1 - cos c) that oscillates with n, is compared with n: K is their
-    correlation, and the median over the frequencies is taken.
+    At random frequencies c in (pi/5, 4 pi/5) the series phi drives p + i q = sum of phi_j exp(i j
+    c), which wanders like a Brownian path in chaos and stays bounded in regular motion. Its mean
+    square displacement M(n) over lags n up to a tenth of the series, less the term E[phi]^2 (1 -
+    cos n c) / (1 - cos c) that oscillates with n, is compared with n: K is their correlation, and
+    the median over the frequencies is taken.
 
-    The series must be sampled coarsely, such as once in each forcing period: for a finely sampled series the test gives 0
-    whatever the motion is. Where chaos lies in n narrow bands that it visits in turn, as after a cascade of period doublings,
-    the test sees the regular change of band: K is near 0 however long the series is, and near 1 on every n-th number. Weak chaos
-    takes long series, and the test does not resolve the fine structure of many tori.
+    The series must be sampled coarsely, such as once in each forcing period: for a finely sampled
+    series the test gives 0 whatever the motion is. Where chaos lies in n narrow bands that it
+    visits in turn, as after a cascade of period doublings, the test sees the regular change of
+    band: K is near 0 however long the series is, and near 1 on every n-th number. Weak chaos takes
+    long series, and the test does not resolve the fine structure of many tori.
 
     Parameters
     ----------
@@ -88,12 +95,19 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
     check_count("every", every, 1)
     check_size(series, "series")
     try:
-        values = np.asarray(series, dtype=float)[:: int(every)] if np.ndim(series) == 1 else np.asarray(series, dtype=float)
+        values = (
+            np.asarray(series, dtype=float)[:: int(every)]
+            if np.ndim(series) == 1
+            else np.asarray(series, dtype=float)
+        )
     except (TypeError, ValueError):
-        raise ParameterError("the 0-1 test takes a series of numbers, one a forcing period", "series") from None
+        raise ParameterError(
+            "the 0-1 test takes a series of numbers, one a forcing period", "series"
+        ) from None
     if values.ndim != 1 or values.size < FEWEST_ENTRIES or not np.isfinite(values).all():
         raise ParameterError(
-            f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}", "series"
+            f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}",
+            "series",
         )
     check_count("count", count, 1, 100_000)
     check_count("seed", seed, 0)
@@ -108,17 +122,22 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
 
 
 def zero_one_of_bands(series: np.ndarray, *, seed: int = 0) -> ZeroOne:
-    """The 0-1 test on every n-th number of a series, n = 1, 2, ..., for the n with the largest K: chaos in n bands is seen there.
+    """The 0-1 test on every n-th number of a series, n = 1, 2, ..., for the n with the largest K:
+    chaos in n bands is seen there.
 
-    So many n are tried that 500 numbers are left (all numbers are taken if there are fewer): with less, K of tori scatters by
-    more than 0.1.
+    So many n are tried that 500 numbers are left (all numbers are taken if there are fewer): with
+    less, K of tori scatters by more than 0.1.
     """
     tried = range(1, max(1, min(MOST_BANDS, series.size // FEWEST_OF_BANDS)) + 1)
-    return max((zero_one_test(series, every=every, seed=seed) for every in tried), key=lambda found: found.K)
+    return max(
+        (zero_one_test(series, every=every, seed=seed) for every in tried),
+        key=lambda found: found.K,
+    )
 
 
 def _displacement(values: np.ndarray, c: np.ndarray, longest: int) -> np.ndarray:
-    """M(n) for n = 1, ..., longest: the mean of abs(z_{j+n} - z_j)^2 over all j with j + longest <= samples, (frequencies, lags).
+    """M(n) for n = 1, ..., longest: the mean of abs(z_{j+n} - z_j)^2 over all j with j + longest <=
+    samples, (frequencies, lags).
 
     The squares are summed by cumulative sums, the products by Fourier transforms.
     """
@@ -140,20 +159,25 @@ def _correlation(lags: np.ndarray, displacement: np.ndarray) -> float:
 
 
 def excludes_tori(system: System) -> str | None:
-    """Why a system with one coordinate has no quasi-periodic motion, as a sentence; None where it may have one (errata 22).
+    """Why a system with one coordinate has no quasi-periodic motion, as a sentence; None where it
+    may have one (errata 22).
 
-    Under one forcing frequency a quasi-periodic motion lies on closed curves that the stroboscopic map P (or, where a curve is
-    mapped to another one, a power of it) carries onto themselves. There is none where
+    Under one forcing frequency a quasi-periodic motion lies on closed curves that the stroboscopic
+    map P (or, where a curve is mapped to another one, a power of it) carries onto themselves. There
+    is none where
 
-    * P is continuous on the plane of states, in which the states before and after an impact are one point. It is discontinuous
-      only if the contact pushes away on both sides at one instant, as motions beside the state of rest then leave to different
-      sides: for equal layers, where V cos(beta0) > 0. It is continuous with bounces from one wall, with a contact that changes
-      neither the velocity nor the acceleration, and without a contact;
+    * P is continuous on the plane of states, in which the states before and after an impact are one
+      point. It is discontinuous
+      only if the contact pushes away on both sides at one instant, as motions beside the state of
+      rest then leave to different sides: for equal layers, where V cos(beta0) > 0. It is continuous
+      with bounces from one wall, with a contact that changes neither the velocity nor the
+      acceleration, and without a contact;
     * and P shrinks areas: da/dv < 0 on every side, and no impact raises the speed.
 
-    For then P maps the curve onto itself and, being continuous, the area within the curve onto at least the same area, although
-    it shrinks areas. Both conditions are checked by interval bounds over the whole forcing period and all states. They are
-    sufficient, not necessary: if the bounds decide nothing, the system may have tori.
+    For then P maps the curve onto itself and, being continuous, the area within the curve onto at
+    least the same area, although it shrinks areas. Both conditions are checked by interval bounds
+    over the whole forcing period and all states. They are sufficient, not necessary: if the bounds
+    decide nothing, the system may have tori.
 
     Parameters
     ----------
@@ -189,13 +213,18 @@ def excludes_tori(system: System) -> str | None:
 
 
 def _continuous(system: System) -> str | None:
-    """Why the stroboscopic map is continuous, as a part of a sentence; None if the contact may push away on both sides."""
+    """Why the stroboscopic map is continuous, as a part of a sentence; None if the contact may push
+    away on both sides.
+    """
     traced = trace(system)
     if traced.side_count == 0:
         return "the motion has no contact"
     if traced.side_count == 1:
         return "a bounce from one wall joins its states before and after without a gap"
-    if contact_regularity(traced, tuple(system.parameters.values())) is ContactRegularity.CONTINUOUS:
+    if (
+        contact_regularity(traced, tuple(system.parameters.values()))
+        is ContactRegularity.CONTINUOUS
+    ):
         return "neither the velocity nor the acceleration changes at the contact"
     assert traced.contact_acceleration is not None
     pushes = largest_pushes(system, traced.contact_acceleration)
@@ -206,22 +235,27 @@ def _continuous(system: System) -> str | None:
     return "the load never pushes away from the contact on both sides at once"
 
 
-ORDER = 0.2  # the 0-1 test shows a regular motion where its K is below this, on every n-th state too
+# the 0-1 test shows a regular motion where its K is below this, on every n-th state too
+ORDER = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class RegularMotion:
-    """What is known of a motion whose largest exponent may be 0: an orbit that it approaches slowly, or that it is on a torus."""
+    """What is known of a motion whose largest exponent may be 0: an orbit that it approaches
+    slowly, or that it is on a torus.
+    """
 
     orbit: PeriodicOrbit | None  # an attracting orbit that passes the motion
     zero_one: ZeroOne | None  # the 0-1 test, if it shows order and nothing excludes a torus
 
 
 def regular_motion(system: System, state: np.ndarray, periods: int, tol: float) -> RegularMotion:
-    """Whether a motion from a state (d,) whose largest exponent is 0, as far as that is known, is on a torus.
+    """Whether a motion from a state (d,) whose largest exponent is 0, as far as that is known, is
+    on a torus.
 
-    It is if nothing excludes tori, if the 0-1 test of its coordinate sees order in all of the states at phase 0 and in every n-th
-    of them, and if no attracting orbit is near, which it might approach slowly.
+    It is if nothing excludes tori, if the 0-1 test of its coordinate sees order in all of the
+    states at phase 0 and in every n-th of them, and if no attracting orbit is near, which it might
+    approach slowly.
     """
     if periods < FEWEST_OF_BANDS or excludes_tori(system) is not None:
         return RegularMotion(None, None)
@@ -232,4 +266,6 @@ def regular_motion(system: System, state: np.ndarray, periods: int, tol: float) 
     if found.K >= ORDER:
         return RegularMotion(None, None)
     certificate = certify(system, ends.last[0], None)
-    return RegularMotion(certificate.orbit, None) if certificate.sound else RegularMotion(None, found)
+    return (
+        RegularMotion(certificate.orbit, None) if certificate.sound else RegularMotion(None, found)
+    )

@@ -1,8 +1,10 @@
-"""The phase plane under a constant load: the equilibria of any model of one coordinate, and the separatrices of its saddles.
+"""The phase plane under a constant load: the equilibria of any model of one coordinate, and the
+separatrices of its saddles.
 
-At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q', with the eigenvalues lambda^2 - a_v lambda - a_q = 0:
-a saddle where a_q > 0. At the contact the system rests while the accelerations of all its sides push it into the contact. The
-stable manifolds of a saddle, which are tangent to (1, lambda) there, are computed by the exact backward flow.
+At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q', with the eigenvalues
+lambda^2 - a_v lambda - a_q = 0: a saddle where a_q > 0. At the contact the system rests while the
+accelerations of all its sides push it into the contact. The stable manifolds of a saddle, which are
+tangent to (1, lambda) there, are computed by the exact backward flow.
 """
 
 from __future__ import annotations
@@ -21,7 +23,15 @@ from saltus.checks import check_number
 from saltus.errors import ParameterError
 from saltus.flow import Motion, Stop, simulate
 from saltus.result import Result, result_dataset
-from saltus.systems import Box, Constant, System, Window, check_system, check_window, reversed_system
+from saltus.systems import (
+    Box,
+    Constant,
+    System,
+    Window,
+    check_system,
+    check_window,
+    reversed_system,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -33,12 +43,15 @@ class EquilibriumSettings:
 
     grid: int = 2001  # Number of points of the window between which equilibria are looked for.
     difference: float = 1e-3  # Derivatives are central differences of sixth order with this step.
-    neutral: float = 1e-9  # Real parts up to this count as 0: where no energy is lost the differences leave such an error.
-    inside: float = 1e-6  # If the acceleration at the contact is 0, its sign is that at this distance inside the side.
+    # Real parts up to this count as 0: where no energy is lost the differences leave such an error.
+    neutral: float = 1e-9
+    # If the acceleration at the contact is 0, its sign is that at this distance inside the side.
+    inside: float = 1e-6
 
 
 EQUILIBRIA = EquilibriumSettings()
-SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))  # (step, weight) of the central difference for a first derivative
+# (step, weight) of the central difference for a first derivative
+SIXTH_ORDER = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
 
 
 @dataclass(frozen=True)
@@ -71,14 +84,18 @@ class Equilibrium:
     @property
     def saddle(self) -> bool:
         """Whether one disturbance grows and another one decays."""
-        return self.eigenvalues is not None and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
+        return (
+            self.eigenvalues is not None
+            and self.eigenvalues[0].real > 0.0 > self.eigenvalues[1].real
+        )
 
 
 def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
-    """The equilibria in a window of the phase plane, by their coordinate, including the contact if the system can rest there.
+    """The equilibria in a window of the phase plane, by their coordinate, including the contact if
+    the system can rest there.
 
-    They are the zeros of the acceleration at rest between 2001 points of the window: two equilibria that are closer together than
-    a thousandth of it, as near a fold, may be missed.
+    They are the zeros of the acceleration at rest between 2001 points of the window: two equilibria
+    that are closer together than a thousandth of it, as near a fold, may be missed.
 
     Parameters
     ----------
@@ -106,7 +123,12 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     for side in model.every_side:
         grid = np.linspace(low, high, EQUILIBRIA.grid)
         if touches:
-            grid = np.sort(np.append(grid[np.asarray(system.one_contact.gap(grid, side)) > 0.0], _beside(system, side)))
+            grid = np.sort(
+                np.append(
+                    grid[np.asarray(system.one_contact.gap(grid, side)) > 0.0],
+                    _beside(system, side),
+                )
+            )
         pull = _pull(system, side)
         for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
             values = _eigenvalues(system, place, side)
@@ -123,7 +145,10 @@ def check_constant(system: System) -> None:
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(
-                f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` are for loads that repeat",
+                (
+                    f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` "
+                    "are for loads that repeat"
+                ),
                 f"load.{name}",
             )
 
@@ -153,15 +178,20 @@ def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, comp
         return float(system.model.acceleration(0.0, q, v, float(side), system.load))
 
     h = EQUILIBRIA.difference
-    slope = sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
+    slope = (
+        sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
+    )
     loss = sum(w * (pull(place, j * h) - pull(place, -j * h)) for j, w in SIXTH_ORDER) / h
     root = cmath.sqrt(0.25 * loss * loss + slope)
     return 0.5 * loss + root, 0.5 * loss - root
 
 
 def _at_contact(system: System) -> list[Equilibrium]:
-    """The contact as an equilibrium: a stable one if all sides push towards it, an unstable one if both push away from it."""
-    contact, outward = float(system.model.contact), []
+    """The contact as an equilibrium: a stable one if all sides push towards it, an unstable one if
+    both push away from it.
+    """
+    contact = float(system.model.contact)
+    outward = []
     for side in system.model.every_side:
         place = _beside(system, side)
         pull = _pull(system, side)
@@ -193,7 +223,8 @@ class SeparatrixEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Separatrix(Result):
-    """A branch of the stable manifold of a saddle, followed back in time from it; nan where an impact makes the velocity jump.
+    """A branch of the stable manifold of a saddle, followed back in time from it; nan where an
+    impact makes the velocity jump.
 
     Attributes
     ----------
@@ -208,7 +239,8 @@ class Separatrix(Result):
     velocity
         (n,), its rate.
     impacts
-        (m, 2): the times of the impacts of the forward motion and the velocities just before them, latest first.
+        (m, 2): the times of the impacts of the forward motion and the velocities just before them,
+        latest first.
     end
         Why it ends.
 
@@ -235,8 +267,18 @@ class Separatrix(Result):
         columns: dict[str, tuple[Any, ...]] = {
             name: ("time", self.theta, unit, f"{name} along the separatrix"),
             "velocity": ("time", self.velocity, unit, f"d {name} / d tau"),
-            "impact_time": ("impact", self.impacts[:, 0], "1", "times of the impacts of the forward motion"),
-            "impact_velocity_before": ("impact", self.impacts[:, 1], unit, "velocities just before them"),
+            "impact_time": (
+                "impact",
+                self.impacts[:, 0],
+                "1",
+                "times of the impacts of the forward motion",
+            ),
+            "impact_velocity_before": (
+                "impact",
+                self.impacts[:, 1],
+                unit,
+                "velocities just before them",
+            ),
         }
         facts = {"saddle": self.saddle, "end": str(self.end), "plane": [name, "velocity"]}
         return result_dataset("separatrix", columns, {"time": self.time}, self.system, **facts)
@@ -253,11 +295,15 @@ def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     return tuple(point for point in equilibria(system, window) if point.saddle)
 
 
-def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02) -> tuple[Separatrix, ...]:
-    """The stable manifolds of all saddles in a window: the curves that separate the basins under a constant load.
+def separatrices(
+    system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02
+) -> tuple[Separatrix, ...]:
+    """The stable manifolds of all saddles in a window: the curves that separate the basins under a
+    constant load.
 
-    Each branch is followed back for at most a time `span`, until it leaves the window for good (three half widths), comes to a
-    saddle or to a margin that ends all motions; points are given every `step` of time.
+    Each branch is followed back for at most a time `span`, until it leaves the window for good
+    (three half widths), comes to a saddle or to a margin that ends all motions; points are given
+    every `step` of time.
 
     Parameters
     ----------
@@ -285,18 +331,32 @@ def separatrices(system: System, window: Box = PLANE, *, span: float = 60.0, ste
     check_number("step", step, above=0.0)
     points = saddles(system, window)
     places = np.array([point.place for point in points])
-    return tuple(_branch(system, point, away, places, area, (span, step)) for point in points for away in (1.0, -1.0))
+    return tuple(
+        _branch(system, point, away, places, area, (span, step))
+        for point in points
+        for away in (1.0, -1.0)
+    )
 
 
 def _branch(
-    system: System, saddle: Equilibrium, away: float, saddles: np.ndarray, window: Window, times: tuple[float, float]
+    system: System,
+    saddle: Equilibrium,
+    away: float,
+    saddles: np.ndarray,
+    window: Window,
+    times: tuple[float, float],
 ) -> Separatrix:
-    """The branch to one side of a saddle; `saddles` are the coordinates of all saddles, (n,), `times` are `span` and `step`."""
+    """The branch to one side of a saddle; `saddles` are the coordinates of all saddles, (n,),
+    `times` are `span` and `step`.
+    """
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
     span, step = times
-    theta, velocity = saddle.place + away * MANIFOLDS.offset, -away * MANIFOLDS.offset * saddle.eigenvalues[1].real
-    now, end, left = 0.0, SeparatrixEnd.SPAN, False
+    theta = saddle.place + away * MANIFOLDS.offset
+    velocity = -away * MANIFOLDS.offset * saddle.eigenvalues[1].real
+    now = 0.0
+    end = SeparatrixEnd.SPAN
+    left = False
     parts: list[np.ndarray] = []
     impacts: list[np.ndarray] = []
     while now < span and end is SeparatrixEnd.SPAN:
@@ -313,7 +373,9 @@ def _branch(
             end = SeparatrixEnd.LIMIT
         left = left or bool(apart[-1] > 10.0 * SEPARATRICES.close)
         within = motion.impacts.time < part[0, -1] - now + step
-        impacts.append(np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within])
+        impacts.append(
+            np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within]
+        )
         parts.append(part)
         now, theta, velocity = now + SEPARATRICES.span, motion.position, motion.velocity
     time, thetas, velocities = np.concatenate(parts, axis=1)
@@ -322,14 +384,19 @@ def _branch(
 
 
 def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
-    """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan between them where they differ."""
+    """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan
+    between them where they differ.
+    """
     times = np.linspace(0.0, SEPARATRICES.span, round(SEPARATRICES.span / step) + 1)
     times = np.append(times[times < motion.time], motion.time)
     theta, velocity = motion.at(times)
-    impacts, contact = motion.impacts, float(motion.system.model.contact)
+    impacts = motion.impacts
+    contact = float(motion.system.model.contact)
     rows = [np.stack([times, theta, velocity])]
     jump = bool((impacts.velocity_before != impacts.velocity_after).any())
-    for values in (impacts.velocity_before, np.full(len(impacts), np.nan), impacts.velocity_after)[:: 1 if jump else 2]:
+    for values in (impacts.velocity_before, np.full(len(impacts), np.nan), impacts.velocity_after)[
+        :: 1 if jump else 2
+    ]:
         at = np.full(len(impacts), contact)
         rows.append(np.stack([impacts.time, np.where(np.isnan(values), np.nan, at), values]))
     joined = np.concatenate(rows, axis=1)

@@ -1,13 +1,16 @@
-"""Stable and unstable manifolds of saddle orbits in the stroboscopic section; the stable ones are the curves between basins.
+"""Stable and unstable manifolds of saddle orbits in the stroboscopic section; the stable ones are
+the curves between basins.
 
-The stroboscopic map P takes a state at phase 0 to the state a forcing period later. A saddle orbit of period q has q points x_i
-with P(x_i) = x_{i+1}, at which P^q has the multipliers mu_s, mu_u with abs(mu_s) < 1 < abs(mu_u) and directions v_s, v_u. The
-stable manifold of x_0 is the union of the images of its fundamental segment
+The stroboscopic map P takes a state at phase 0 to the state a forcing period later. A saddle orbit
+of period q has q points x_i with P(x_i) = x_{i+1}, at which P^q has the multipliers mu_s, mu_u with
+abs(mu_s) < 1 < abs(mu_u) and directions v_s, v_u. The stable manifold of x_0 is the union of the
+images of its fundamental segment
 
     x_0 + d rho^s v_s,    0 <= s <= 1,    rho = 1 / abs(mu_s),
 
-under P^{-q}, P^{-2q}, ..., with small d of both signs; the images under the other powers of P^{-1} lie on the manifolds of the
-other points. P^{-1} is the flow of the reversed system over a period, event by event, as exact as the forward flow.
+under P^{-q}, P^{-2q}, ..., with small d of both signs; the images under the other powers of P^{-1}
+lie on the manifolds of the other points. P^{-1} is the flow of the reversed system over a period,
+event by event, as exact as the forward flow.
 """
 
 from __future__ import annotations
@@ -37,15 +40,19 @@ class GrowthSettings:
     """When an image of the segment is fine enough."""
 
     rounds: int = 40  # The largest number of rounds of refinement, each of which halves the gaps.
-    narrowest: float = 1e-13  # Gaps between parameters on the segment that are narrower than this are not halved.
+    # Gaps between parameters on the segment that are narrower than this are not halved.
+    narrowest: float = 1e-13
     bend: float = 0.15  # The largest angle between neighbouring chords, rad.
     short: float = 0.1  # The angle at chords shorter than this, in steps, may be larger.
-    torn: float = 2.0  # The image has a gap where neighbours stay farther apart than this, in steps.
-    reach: float = 3.0  # Points farther than this from the middle of the window, in half widths, are dropped.
+    # The image has a gap where neighbours stay farther apart than this, in steps.
+    torn: float = 2.0
+    # Points farther than this from the middle of the window, in half widths, are dropped.
+    reach: float = 3.0
 
 
 SETTINGS = GrowthSettings()
-Flow = Callable[[np.ndarray, int], np.ndarray]  # states (n, 2) and forcing periods -> states (n, 2), nan where there are none
+# states (n, 2) and forcing periods -> states (n, 2), nan where there are none
+Flow = Callable[[np.ndarray, int], np.ndarray]
 Segment = Callable[[np.ndarray], np.ndarray]  # places (n,) in [0, 1] -> states (n, 2)
 
 
@@ -59,7 +66,9 @@ class GrowthEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The image of the segment after `periods` forcing periods: points in order along it, nan if they have left the window."""
+    """The image of the segment after `periods` forcing periods: points in order along it, nan if
+    they have left the window.
+    """
 
     periods: int
     places: np.ndarray  # (n,): the parameter on the segment, in [0, 1]
@@ -73,7 +82,9 @@ def has_left(window: Window, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Growth:
-    """A segment, the flow that maps it, the window in which its images are wanted, and how fine they are."""
+    """A segment, the flow that maps it, the window in which its images are wanted, and how fine
+    they are.
+    """
 
     segment: Segment
     flow: Flow
@@ -84,8 +95,8 @@ class Growth:
     def levels(self, count: int) -> tuple[list[Level], GrowthEnd]:
         """The images under 0, 1, 2, ..., `count` forcing periods, and why there are no more.
 
-        Each is refined where it lies in the window. A new point begins on the segment and is followed through all periods, so it
-        lies on the curve as exactly as the flow is known.
+        Each is refined where it lies in the window. A new point begins on the segment and is
+        followed through all periods, so it lies on the curve as exactly as the flow is known.
         """
         places = np.linspace(0.0, 1.0, 9)
         points = self.segment(places)
@@ -111,8 +122,12 @@ class Growth:
             result[has_left(self.window, result)] = np.nan
         return result if periods else points
 
-    def _refined(self, periods: int, places: np.ndarray, points: np.ndarray, room: int) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Insert points until no two neighbours are farther apart than the step; the flag is True if `room` does not suffice."""
+    def _refined(
+        self, periods: int, places: np.ndarray, points: np.ndarray, room: int
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Insert points until no two neighbours are farther apart than the step; the flag is True
+        if `room` does not suffice.
+        """
         for _ in range(SETTINGS.rounds):
             gaps = np.flatnonzero(self._coarse(places, points))
             if not gaps.size:
@@ -121,18 +136,28 @@ class Growth:
                 return places, points, True
             between = 0.5 * (places[gaps] + places[gaps + 1])
             fresh = self._advanced(self.segment(between), periods)
-            places, points = np.insert(places, gaps + 1, between), np.insert(points, gaps + 1, fresh, axis=0)
+            places, points = (
+                np.insert(places, gaps + 1, between),
+                np.insert(points, gaps + 1, fresh, axis=0),
+            )
         return places, points, False
 
     def _parted(self, places: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The points with nan between neighbours that refinement has not brought close together: the image has a gap there."""
+        """The points with nan between neighbours that refinement has not brought close together:
+        the image has a gap there.
+        """
         scaled = self.window.scaled(points)
-        torn = np.flatnonzero(np.abs(np.diff(scaled, axis=0)).max(axis=1) > SETTINGS.torn * self.step) + 1
+        torn = (
+            np.flatnonzero(np.abs(np.diff(scaled, axis=0)).max(axis=1) > SETTINGS.torn * self.step)
+            + 1
+        )
         torn = torn[_may_cross(scaled)[torn - 1] | (np.abs(scaled) <= 1.0).all(axis=1)[torn]]
         return np.insert(places, torn, places[torn]), np.insert(points, torn, np.nan, axis=0)
 
     def _coarse(self, places: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Which chords between neighbours are to be divided, (n - 1,): long ones, bends, and those that may cross the window."""
+        """Which chords between neighbours are to be divided, (n - 1,): long ones, bends, and those
+        that may cross the window.
+        """
         scaled = self.window.scaled(points)
         chords = np.diff(scaled, axis=0)
         length = np.hypot(chords[:, 0], chords[:, 1])
@@ -147,12 +172,18 @@ class Growth:
             bent[1:] |= turn
             bent &= length > SETTINGS.short * self.step
         crossing = ~near & long & _may_cross(scaled)
-        return np.asarray(((near & (long | bent)) | crossing) & (np.diff(places) > SETTINGS.narrowest))
+        return np.asarray(
+            ((near & (long | bent)) | crossing) & (np.diff(places) > SETTINGS.narrowest)
+        )
 
 
 def _may_cross(scaled: np.ndarray) -> np.ndarray:
-    """Which chords with both ends outside the window may pass through it: not those whose ends lie beyond one of its sides."""
-    beyond = np.stack([scaled[:, 0] > 1, scaled[:, 0] < -1, scaled[:, 1] > 1, scaled[:, 1] < -1], axis=1)
+    """Which chords with both ends outside the window may pass through it: not those whose ends lie
+    beyond one of its sides.
+    """
+    beyond = np.stack(
+        [scaled[:, 0] > 1, scaled[:, 0] < -1, scaled[:, 1] > 1, scaled[:, 1] < -1], axis=1
+    )
     same = (beyond[:-1] & beyond[1:]).any(axis=1)
     known = np.isfinite(scaled).all(axis=1)
     return np.asarray(~same & known[:-1] & known[1:])
@@ -162,7 +193,9 @@ def _may_cross(scaled: np.ndarray) -> np.ndarray:
 class ManifoldSettings:
     """Where manifolds begin, and how exactly they are followed."""
 
-    offset: float = 1e-6  # d, from the saddle: the tangent misses the manifold by about d^2, and its images by less and less.
+    # d, from the saddle: the tangent misses the manifold by about d^2, and its images by less and
+    # less.
+    offset: float = 1e-6
     tolerance: float = 1e-13  # The error of a step of the motions along a manifold.
     hyperbolic: float = 1e-6  # The least difference of the multipliers' moduli from 1.
 
@@ -173,12 +206,16 @@ PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane if none is g
 
 @dataclass(frozen=True, eq=False)
 class ManifoldBranch:
-    """One branch of a manifold of one point of the orbit: from the orbit on, nan where it is outside the window."""
+    """One branch of a manifold of one point of the orbit: from the orbit on, nan where it is
+    outside the window.
+    """
 
     point: int  # the index of the orbit's point, `orbit_states[point]`
     side: int  # +1 or -1: along or against the direction
     states: np.ndarray  # (n, 2): coordinate and velocity at phase 0
-    place: np.ndarray  # (n,): s + (number of forcing periods) / q; the map (for a stable manifold its inverse) adds 1 / q
+    # (n,): s + (number of forcing periods) / q; the map (for a stable manifold its inverse) adds 1
+    # / q
+    place: np.ndarray
     end: GrowthEnd  # why it does not go on
 
 
@@ -229,19 +266,43 @@ class Manifold(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The curves over `place`, nan between branches, and the orbit over `point`."""
-        plane, unit = state_plane(self.orbit.system), state_units(self.orbit.system)
+        plane = state_plane(self.orbit.system)
+        unit = state_units(self.orbit.system)
         columns: dict[str, tuple[Any, ...]] = {}
         for i, name in enumerate(plane):
-            columns[name] = ("place", self.states[:, i], unit[name], f"{name} at phase 0 along the manifold")
+            columns[name] = (
+                "place",
+                self.states[:, i],
+                unit[name],
+                f"{name} at phase 0 along the manifold",
+            )
         for i, name in enumerate(plane):
-            columns[f"orbit_{name}"] = ("point", self.orbit_states[:, i], unit[name], f"{name} of the orbit at phase 0")
-            columns[f"direction_{name}"] = ("point", self.directions[:, i], "1", f"{name} of the manifold's direction there")
-        facts = {"stable": int(self.stable), "multiplier": self.multiplier, "length": self.length, "plane": list(plane)}
+            columns[f"orbit_{name}"] = (
+                "point",
+                self.orbit_states[:, i],
+                unit[name],
+                f"{name} of the orbit at phase 0",
+            )
+            columns[f"direction_{name}"] = (
+                "point",
+                self.directions[:, i],
+                "1",
+                f"{name} of the manifold's direction there",
+            )
+        facts = {
+            "stable": int(self.stable),
+            "multiplier": self.multiplier,
+            "length": self.length,
+            "plane": list(plane),
+        }
         return result_dataset("manifold", columns, None, self.orbit.system, **facts)
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"
-        return f"Manifold({kind}, of {self.orbit!r}, multiplier {self.multiplier:.6g}, length {self.length:.4g})"
+        return (
+            f"Manifold({kind}, of {self.orbit!r}, multiplier {self.multiplier:.6g}, length "
+            f"{self.length:.4g})"
+        )
 
 
 @answered
@@ -253,26 +314,29 @@ def stable_manifold(
     step: float = 0.01,
     points: int = 100_000,
 ) -> Manifold:
-    """The states that the flow takes to a saddle orbit, as curves in the section at phase 0, at which basins meet.
+    """The states that the flow takes to a saddle orbit, as curves in the section at phase 0, at
+    which basins meet.
 
     Parameters
     ----------
     orbit
         A saddle orbit: one multiplier is inside the unit circle and one outside.
     window
-        ((least, largest coordinate), (least, largest velocity)), in which the curves are wanted; they are followed outside it up
-        to three half widths from its middle.
+        ((least, largest coordinate), (least, largest velocity)), in which the curves are wanted;
+        they are followed outside it up to three half widths from its middle.
     periods
         The number of forcing periods for which the curves are followed backward.
     step
-        The longest distance between neighbouring points in the window, in its half widths; they are closer in bends.
+        The longest distance between neighbouring points in the window, in its half widths; they are
+        closer in bends.
     points
         The largest number of points for each of the two sides.
 
     Raises
     ------
     ParameterError
-        An orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0 can).
+        An orbit that is no saddle, or whose system cannot be run backward (v+ = e v- with e > 0
+        can).
     MotionError
         The orbit is at the contact at phase 0, where the map has no derivative.
 
@@ -295,7 +359,8 @@ def unstable_manifold(
     step: float = 0.01,
     points: int = 100_000,
 ) -> Manifold:
-    """The states that the backward flow takes to a saddle orbit: as `stable_manifold`, with the time reversed.
+    """The states that the backward flow takes to a saddle orbit: as `stable_manifold`, with the
+    time reversed.
 
     Parameters
     ----------
@@ -320,14 +385,21 @@ def unstable_manifold(
     return _manifold(orbit, False, window, periods, step, points)
 
 
-def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int) -> Manifold:
+def _manifold(
+    orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, step: float, points: int
+) -> Manifold:
     check_count("periods", periods, 1)
     check_count("points", points, 100)
     check_number("step", step, above=0.0, at_most=1.0)
     if not is_saddle(orbit):
-        raise ParameterError(f"only a saddle has such manifolds; this orbit has the multipliers {orbit.multipliers}", "orbit")
-    system, q = orbit.system, orbit.period
-    area, flow = check_window(window, system), _flow(reversed_system(system) if stable else system, stable)
+        raise ParameterError(
+            f"only a saddle has such manifolds; this orbit has the multipliers {orbit.multipliers}",
+            "orbit",
+        )
+    system = orbit.system
+    q = orbit.period
+    area = check_window(window, system)
+    flow = _flow(reversed_system(system) if stable else system, stable)
     states = np.roll(section_states(system, np.array([orbit.state]), q)[0], 1, axis=0)
     multiplier, directions = _directions(system, states, stable)
     ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)
@@ -342,14 +414,20 @@ def _manifold(orbit: PeriodicOrbit, stable: bool, window: Any, periods: int, ste
 def is_saddle(orbit: PeriodicOrbit) -> bool:
     """Whether an orbit has one multiplier inside the unit circle and one outside."""
     size = np.sort(np.abs(orbit.multipliers))
-    return len(size) == 2 and bool(0.0 < size[0] < 1.0 - MANIFOLDS.hyperbolic and 1.0 + MANIFOLDS.hyperbolic < size[1] < np.inf)
+    return len(size) == 2 and bool(
+        0.0 < size[0] < 1.0 - MANIFOLDS.hyperbolic and 1.0 + MANIFOLDS.hyperbolic < size[1] < np.inf
+    )
 
 
 def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float, np.ndarray]:
-    """The multiplier and the unit vector along the manifold at each state of the orbit, carried on by the map's derivative."""
+    """The multiplier and the unit vector along the manifold at each state of the orbit, carried on
+    by the map's derivative.
+    """
     maps = []
     for state in states:
-        found = sensitivities(system, **arguments_of(system, state), periods=1, tol=MANIFOLDS.tolerance, dense=False)
+        found = sensitivities(
+            system, **arguments_of(system, state), periods=1, tol=MANIFOLDS.tolerance, dense=False
+        )
         if found.undefined:
             raise MotionError(f"the orbit's map has no derivative at phase 0: {found.undefined}")
         maps.append(found.state)
@@ -364,15 +442,21 @@ def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float
 
 
 def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Segment:
-    return lambda places: point + MANIFOLDS.offset * ratio ** np.asarray(places)[:, None] * direction
+    return lambda places: (
+        point + MANIFOLDS.offset * ratio ** np.asarray(places)[:, None] * direction
+    )
 
 
 def _flow(system: System, backward: bool) -> Any:
-    """The stroboscopic map, or its inverse by the reversed system, whose velocities have the other sign."""
+    """The stroboscopic map, or its inverse by the reversed system, whose velocities have the other
+    sign.
+    """
     sign = np.array([1.0, -1.0 if backward else 1.0])
 
     def flow(states: np.ndarray, periods: int) -> np.ndarray:
-        result = motions_from(system, states * sign, periods=periods, sample=(), tol=MANIFOLDS.tolerance)
+        result = motions_from(
+            system, states * sign, periods=periods, sample=(), tol=MANIFOLDS.tolerance
+        )
         ends = sign * last_states(system, result)
         ends[result["periods"].values < periods] = np.nan
         return np.asarray(ends)
@@ -380,10 +464,13 @@ def _flow(system: System, backward: bool) -> Any:
     return flow
 
 
-def _branches(levels: list[Level], q: int, side: int, stable: bool, turns: bool, end: GrowthEnd) -> list[ManifoldBranch]:
+def _branches(
+    levels: list[Level], q: int, side: int, stable: bool, turns: bool, end: GrowthEnd
+) -> list[ManifoldBranch]:
     """The levels joined to the branches of each point of the orbit, from the orbit on.
 
-    If the multiplier is negative, the branches change sides each time that the orbit is back at point 0.
+    If the multiplier is negative, the branches change sides each time that the orbit is back at
+    point 0.
     """
     curves = []
     for first in range(min(q, len(levels))):

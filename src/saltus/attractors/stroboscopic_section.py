@@ -1,5 +1,5 @@
-"""The stroboscopic section of a system: its states at phase 0 of the load, and the certificate that a motion that
-repeats itself there is on an attracting orbit."""
+"""The stroboscopic section of a system: its states at phase 0 of the load, and the certificate that
+a motion that repeats itself there is on an attracting orbit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from saltus.systems import Load, System, arguments_of, check_system
 
 
 def with_clock(system: System) -> System:
-    """The system with a forcing period, which fixes the stroboscopic section: its load's, or 2 pi under a constant load.
+    """The system with a forcing period, which fixes the stroboscopic section: its load's, or 2 pi
+    under a constant load.
 
     Equilibria are then orbits of period 1.
 
@@ -29,11 +30,14 @@ def with_clock(system: System) -> System:
     check_periodic(system)
     if system.load.frequency is not None:
         return system
-    return System(model=system.model, load=Load(frequency=1.0, **system.load.channels), impact=system.impact)
+    return System(
+        model=system.model, load=Load(frequency=1.0, **system.load.channels), impact=system.impact
+    )
 
 
 def check_periodic(system: System) -> None:
-    """Refuse loads by records of samples and by pulses, under which motions have no long-term behaviour.
+    """Refuse loads by records of samples and by pulses, under which motions have no long-term
+    behaviour.
 
     Raises
     ------
@@ -42,19 +46,32 @@ def check_periodic(system: System) -> None:
     """
     for name, signal in system.load.channels.items():
         if signal.once:
-            kind = next(type(term).__name__ for term in getattr(signal, "terms", (signal,)) if term.once)
+            kind = next(
+                type(term).__name__ for term in getattr(signal, "terms", (signal,)) if term.once
+            )
             raise ParameterError(
-                f"load.{name} is a {kind}, which does not repeat, so nothing settles under it; use Harmonic", f"load.{name}"
+                (
+                    f"load.{name} is a {kind}, which does not repeat, so nothing settles under it; "
+                    "use Harmonic"
+                ),
+                f"load.{name}",
             )
 
 
 def is_constant(load: Load) -> bool:
-    """Whether no channel varies: the section is then the phase plane, and orbits of period 1 are equilibria."""
+    """Whether no channel varies: the section is then the phase plane, and orbits of period 1 are
+    equilibria.
+    """
     return not any(signal.periodic for signal in load.channels.values())
 
 
-def section_states(system: System, states: np.ndarray, periods: float, tol: float = 1e-13) -> np.ndarray:
-    """The states after 1, 2, ... forcing periods from states (n, d) at phase 0, (n, periods, d); or after half a period."""
+def section_states(
+    system: System, states: np.ndarray, periods: float, tol: float = 1e-13
+) -> np.ndarray:
+    """The states after 1, 2, ...
+
+    forcing periods from states (n, d) at phase 0, (n, periods, d); or after half a period.
+    """
     return stroboscopic(system, motions_from(system, states, periods=periods, last="all", tol=tol))
 
 
@@ -63,9 +80,11 @@ class CertificateSettings:
     """How well an orbit must agree with a motion."""
 
     residual: float = 1e-9  # The largest residual of its equations.
-    # The largest distance of the orbit from itself after a period of direct simulation, and from the states of the motion.
+    # The largest distance of the orbit from itself after a period of direct simulation, and from
+    # the states of the motion.
     defect: float = 1e-6
-    slow: float = 1e-3  # The largest distance from the states of a motion that approaches it slowly.
+    # The largest distance from the states of a motion that approaches it slowly.
+    slow: float = 1e-3
     neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
 
 
@@ -91,7 +110,10 @@ class Certificate:
         if orbit.grazes:
             return "the orbit there touches the contact without speed, and has no multipliers"
         if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - SETTINGS.neutral:
-            return f"the orbit there does not attract: its largest multiplier is {abs(orbit.multipliers[0]):.9g}"
+            return (
+                "the orbit there does not attract: its largest multiplier is "
+                f"{abs(orbit.multipliers[0]):.9g}"
+            )
         if not orbit.defect < SETTINGS.defect:
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
         if not self.distance < self.within:
@@ -112,7 +134,9 @@ class Certificate:
         return {
             "residual": self.orbit.residual,
             "largest_multiplier": multiplier,
-            "largest_exponent": math.log(multiplier) / self.orbit.duration if multiplier > 0.0 else -math.inf,
+            "largest_exponent": math.log(multiplier) / self.orbit.duration
+            if multiplier > 0.0
+            else -math.inf,
             "defect": self.orbit.defect,
             "distance": self.distance,
             "amplitude": self.orbit.amplitude,
@@ -120,11 +144,14 @@ class Certificate:
         }
 
 
-def certify(system: System, state: np.ndarray, period: int | None, max_period: int = 16) -> Certificate:
-    """The orbit of a motion with this state (d,) at phase 0, which repeats itself after `period` forcing periods.
+def certify(
+    system: System, state: np.ndarray, period: int | None, max_period: int = 16
+) -> Certificate:
+    """The orbit of a motion with this state (d,) at phase 0, which repeats itself after `period`
+    forcing periods.
 
-    Without a period, that of the nearest return within `max_period` is tried; the motion may then be farther from the orbit, as
-    it is still on its way to it.
+    Without a period, that of the nearest return within `max_period` is tried; the motion may then
+    be farther from the orbit, as it is still on its way to it.
     """
     later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
     states = np.concatenate([[state], later])
@@ -137,17 +164,25 @@ def certify(system: System, state: np.ndarray, period: int | None, max_period: i
     return Certificate(orbit, float(apart.min()), within)
 
 
-def solved_orbit(system: System, state: np.ndarray, period: int, admissible: bool = True) -> PeriodicOrbit | None:
-    """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method finds none."""
+def solved_orbit(
+    system: System, state: np.ndarray, period: int, admissible: bool = True
+) -> PeriodicOrbit | None:
+    """The orbit of this period near a motion from a state (d,) at phase 0; None if Newton's method
+    finds none.
+    """
     try:
-        orbit = orbit_from(equations_of(system, Signature((), 1)), arguments_of(system, state), period)
+        orbit = orbit_from(
+            equations_of(system, Signature((), 1)), arguments_of(system, state), period
+        )
     except MotionError:
         return None
     return orbit if orbit is not None and (orbit.admissible or not admissible) else None
 
 
 def stays_at_rest(system: System, state: np.ndarray) -> bool:
-    """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then stays, as the load repeats."""
+    """Whether contacts or frictions hold a state (d,) at rest over a whole forcing period; it then
+    stays, as the load repeats.
+    """
     if not system.model.holds_coordinates:
         return False
     motion = simulate(system, **arguments_of(system, state), periods=1, dense=False)

@@ -1,4 +1,6 @@
-"""Proofs about motions that need no simulation: interval bounds, capture at rest, the energy barrier, the adiabatic invariant."""
+"""Proofs about motions that need no simulation: interval bounds, capture at rest, the energy
+barrier, the adiabatic invariant.
+"""
 
 from saltus._front_door import front_door
 

@@ -1,5 +1,6 @@
-"""Proofs of capture: a speed after an impact below which a motion never leaves the contact again and comes to rest there; and the
-energy that it takes to open a gap in a flight, from bounds of the pull."""
+"""Proofs of capture: a speed after an impact below which a motion never leaves the contact again
+and comes to rest there; and the energy that it takes to open a gap in a flight, from bounds of the
+pull."""
 
 from __future__ import annotations
 
@@ -13,8 +14,25 @@ import numpy as np
 from saltus.bounds.adiabatic_invariant import budget, first_guess, largest_start, normal_form
 from saltus.bounds.gap_equation import OPENING, SPEED, Leaves, Opening, reads
 from saltus.bounds.intervals import SLACK, Interval, enclose, enclosed_along
-from saltus.systems import System, broadcast_arrays, check_parameters, check_system, finite_array, numbers, parameter_table
-from saltus.taylor import Expr, Trace, differentiate, number, record_tables, structure_key, substitute, trace
+from saltus.systems import (
+    System,
+    broadcast_arrays,
+    check_parameters,
+    check_system,
+    finite_array,
+    numbers,
+    parameter_table,
+)
+from saltus.taylor import (
+    Expr,
+    Trace,
+    differentiate,
+    number,
+    record_tables,
+    structure_key,
+    substitute,
+    trace,
+)
 
 Bounds = Callable[[Interval], Interval]
 Work = tuple[Any, Any, Any]
@@ -25,7 +43,8 @@ class ClimbSettings:
     """The largest opening of a gap, and the steps in which it is opened."""
 
     widest: float = 1e6  # The largest opening that is considered.
-    tries: int = 30  # The largest number of times that the first step is divided by 4, until it may be taken.
+    # The largest number of times that the first step is divided by 4, until it may be taken.
+    tries: int = 30
     steps: int = 20  # The largest number of steps over the opening, each at most a third of it.
 
 
@@ -33,7 +52,8 @@ CLIMB = ClimbSettings()
 
 
 def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
-    """Open a gap from 0 as long as the pull is positive at all times and the ratio of the two works is below `allowed`.
+    """Open a gap from 0 as long as the pull is positive at all times and the ratio of the two works
+    is below `allowed`.
 
     Parameters
     ----------
@@ -47,8 +67,9 @@ def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
     Returns
     -------
     Work
-        The opening W that is reached, and lower and upper bounds of the work, int_0^W min_t(-A) dw and int_0^W max_t(-A) dw;
-        arrays (1, n), 0 where nothing is proved. The ratio of the works is below `allowed` for all smaller openings too.
+        The opening W that is reached, and lower and upper bounds of the work, int_0^W min_t(-A) dw
+        and int_0^W max_t(-A) dw; arrays (1, n), 0 where nothing is proved. The ratio of the works
+        is below `allowed` for all smaller openings too.
     """
     done: Work = (np.zeros_like(allowed), np.zeros_like(allowed), np.zeros_like(allowed))
     step = np.ones_like(allowed)
@@ -68,15 +89,25 @@ def climb(pull: Bounds, slope: Bounds, allowed: Any) -> Work:
 def _step(pull: Bounds, slope: Bounds, allowed: Any, done: Work, step: Any) -> tuple[Work, Any]:
     """The works after one more step, and whether it may be taken.
 
-    Over a step h the work is h times the pull in the middle, to within h^2 / 8 times the range of the slope. Anywhere in the
-    step, the ratio of the works lies between the ratio before the step and the one with the extreme pulls of the step.
+    Over a step h the work is h times the pull in the middle, to within h^2 / 8 times the range of
+    the slope. Anywhere in the step, the ratio of the works lies between the ratio before the step
+    and the one with the extreme pulls of the step.
     """
     opening, lo, hi = done
-    middle, change = pull(Interval(opening + step / 2)), slope(Interval(opening, opening + step))
-    reach, spread = step / 2 * change.magnitude(), step * step / 8 * (change.hi - change.lo)
-    low, high = (middle.lo - reach) * (1 - SLACK), (middle.hi + reach) * (1 + SLACK)
-    new = (opening + step, lo + (step * middle.lo - spread) * (1 - SLACK), hi + (step * middle.hi + spread) * (1 + SLACK))
-    return new, (low > 0) & (hi + high * step < allowed * (lo + low * step)) & (new[0] <= CLIMB.widest)
+    middle = pull(Interval(opening + step / 2))
+    change = slope(Interval(opening, opening + step))
+    reach = step / 2 * change.magnitude()
+    spread = step * step / 8 * (change.hi - change.lo)
+    low = (middle.lo - reach) * (1 - SLACK)
+    high = (middle.hi + reach) * (1 + SLACK)
+    new = (
+        opening + step,
+        lo + (step * middle.lo - spread) * (1 - SLACK),
+        hi + (step * middle.hi + spread) * (1 + SLACK),
+    )
+    return new, (low > 0) & (hi + high * step < allowed * (lo + low * step)) & (
+        new[0] <= CLIMB.widest
+    )
 
 
 @dataclass(frozen=True)
@@ -84,10 +115,16 @@ class CaptureSettings:
     """The intervals of a proof, and the speeds that are tried."""
 
     cells: int = 16  # The number of intervals into which the forcing period is divided.
-    batch: int = 8192  # Parameter sets that are treated at once for each cell of the time: their arrays then stay in the cache.
-    rest_cells: int = 64  # The number of intervals for a system at rest, where a bound is cheap and the load makes all its width.
-    one: float = 1e-14  # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
-    # The largest speeds over which the corrected invariant is bounded, as shares of the first guess; they are tried in turn.
+    # Parameter sets that are treated at once for each cell of the time: their arrays then stay in
+    # the cache.
+    batch: int = 8192
+    # The number of intervals for a system at rest, where a bound is cheap and the load makes all
+    # its width.
+    rest_cells: int = 64
+    # A product of impact factors this close to 1 is 1: no law states its numbers more exactly.
+    one: float = 1e-14
+    # The largest speeds over which the corrected invariant is bounded, as shares of the first
+    # guess; they are tried in turn.
     boxes: tuple[float, ...] = (0.7, 0.2)
 
 
@@ -95,28 +132,34 @@ CAPTURE = CaptureSettings()
 
 
 def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -> Any:
-    """The speed of the gap just after an impact below which a motion is provably captured at the contact.
+    """The speed of the gap just after an impact below which a motion is provably captured at the
+    contact.
 
-    From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the returned speed, the motion
-    stays near the contact under all later loads and its speed falls to zero: in finite time if impacts lose speed, otherwise
-    through damping. No later release is possible, as the contact accelerations press on every side at all times. The speed is 0
-    where nothing is proved: for instance if the load can lift the system off, if neither impacts nor damping dissipate energy, or
-    if the impact law has no bounded slope at rest (`EnergyRestitution`). Margins at which a motion may stop are not considered.
+    From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the
+    returned speed, the motion stays near the contact under all later loads and its speed falls to
+    zero: in finite time if impacts lose speed, otherwise through damping. No later release is
+    possible, as the contact accelerations press on every side at all times. The speed is 0 where
+    nothing is proved: for instance if the load can lift the system off, if neither impacts nor
+    damping dissipate energy, or if the impact law has no bounded slope at rest
+    (`EnergyRestitution`). Margins at which a motion may stop are not considered.
 
-    On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at impact, and the gap of one side in
-    units that make the factors of both sides equal, the larger of two speeds is returned.
+    On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at
+    impact, and the gap of one side in units that make the factors of both sides equal, the larger
+    of two speeds is returned.
 
-    *Energy.* Let A_u <= 0 and 0 < lo(w) <= -A(t, w, 0) <= hi(w) for all t. A flight that leaves with speed v turns before W,
-    where 2 int_0^W lo dw = v^2, and comes back with rho^2 v^2 <= 2 int_0^W hi dw. So it is captured if f rho < 1 up to v; and
-    where A does not depend on the time, rho <= 1, if the flights stay below the first W at which lo may be 0 (the barrier), and
-    f < 1, or f <= 1 and A_u < 0.
+    *Energy.* Let A_u <= 0 and 0 < lo(w) <= -A(t, w, 0) <= hi(w) for all t. A flight that leaves
+    with speed v turns before W, where 2 int_0^W lo dw = v^2, and comes back with rho^2 v^2 <= 2
+    int_0^W hi dw. So it is captured if f rho < 1 up to v; and where A does not depend on the time,
+    rho <= 1, if the flights stay below the first W at which lo may be 0 (the barrier), and f < 1,
+    or f <= 1 and A_u < 0.
 
-    *Corrected adiabatic invariant.* Under periodic loads the energy bounds prove nothing for f near 1, because flights gain speed
-    while the pull grows and lose it afterwards. L = 3 ln v + ln sum 1/alpha + O(v) falls nevertheless (`adiabatic_invariant.py`),
-    so that damping captures at f = 1 too. Records of samples are not periodic: only the energy bounds are used with them.
+    *Corrected adiabatic invariant.* Under periodic loads the energy bounds prove nothing for f near
+    1, because flights gain speed while the pull grows and lose it afterwards. L = 3 ln v + ln sum
+    1/alpha + O(v) falls nevertheless (`adiabatic_invariant.py`), so that damping captures at f = 1
+    too. Records of samples are not periodic: only the energy bounds are used with them.
 
-    All bounds are interval bounds over the whole forcing period, or the whole record, and over all openings and speeds in
-    question.
+    All bounds are interval bounds over the whole forcing period, or the whole record, and over all
+    openings and speeds in question.
 
     Parameters
     ----------
@@ -128,13 +171,14 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     Returns
     -------
     Any
-        The speeds, an array of the shape to which the parameters broadcast; a DataArray where they are DataArrays.
+        The speeds, an array of the shape to which the parameters broadcast; a DataArray where they
+        are DataArrays.
 
     Raises
     ------
     ParameterError
-        `system` is no system; a path leads to no number of it; a value is no number, or refused by the system; or shapes do not
-        fit together.
+        `system` is no system; a path leads to no number of it; a value is no number, or refused by
+        the system; or shapes do not fit together.
 
     Examples
     --------
@@ -143,7 +187,10 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     (True, 0.0)
     """
     check_system(system, "capture_speed", several_contacts=True)
-    arrays = {path: finite_array(path, given) for path, given in parameter_table(system, parameters).items()}
+    arrays = {
+        path: finite_array(path, given)
+        for path, given in parameter_table(system, parameters).items()
+    }
     dims, shape, coords, columns = broadcast_arrays(arrays)
     check_parameters(system, columns)
     speeds = proved_speeds(system, columns).reshape(shape)
@@ -154,17 +201,23 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     return DataArray(speeds, dims=dims, coords=coords, name="capture_speed")
 
 
-def proved_speeds(system: System, given: Mapping[str, np.ndarray], to: Mapping[str, np.ndarray] | None = None) -> np.ndarray:
-    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers alone.
+def proved_speeds(
+    system: System, given: Mapping[str, np.ndarray], to: Mapping[str, np.ndarray] | None = None
+) -> np.ndarray:
+    """`capture_speed` for flat columns of numbers that the system takes; (n,), or (1,) for numbers
+    alone.
 
-    With second columns, `to`, each speed holds for all numbers between the two columns; under a load by records it is then 0.
+    With second columns, `to`, each speed holds for all numbers between the two columns; under a
+    load by records it is then 0.
     """
     traced, law = _law_of(system)
     sides = [
-        [columns.get(path, np.asarray(value)) for path, value in system.parameters.items()] for columns in (given, to or given)
+        [columns.get(path, np.asarray(value)) for path, value in system.parameters.items()]
+        for columns in (given, to or given)
     ]
     columns = np.broadcast_arrays(*map(np.atleast_1d, sides[0] + sides[1]))
-    first, second = columns[: len(sides[0])], columns[len(sides[0]) :]
+    first = columns[: len(sides[0])]
+    second = columns[len(sides[0]) :]
     result = np.zeros(columns[0].size)
     records = [] if law is None else _record_ranges(system, traced, given)
     if law is None or (records and to is not None):
@@ -172,14 +225,17 @@ def proved_speeds(system: System, given: Mapping[str, np.ndarray], to: Mapping[s
     for start in range(0, result.size, CAPTURE.batch):
         part = slice(start, start + CAPTURE.batch)
         ranges = [
-            Interval(np.minimum(a, b)[None, part], np.maximum(a, b)[None, part]) for a, b in zip(first, second, strict=True)
+            Interval(np.minimum(a, b)[None, part], np.maximum(a, b)[None, part])
+            for a, b in zip(first, second, strict=True)
         ]
         result[part] = law.capture(Leaves(ranges, records), result[part].size)
     return result
 
 
 def _law_of(system: System) -> tuple[Trace, _Law | None]:
-    """The trace of a system and the expressions that are bounded (None without a contact), kept for each structure."""
+    """The trace of a system and the expressions that are bounded (None without a contact), kept for
+    each structure.
+    """
     key = structure_key(system)
     if key not in _laws:
         traced = trace(system)
@@ -191,10 +247,12 @@ _laws: dict[Any, tuple[Trace, _Law | None]] = {}
 
 
 def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Whether a system with several contacts stays at rest for ever once all of them are closed, proved for columns of numbers.
+    """Whether a system with several contacts stays at rest for ever once all of them are closed,
+    proved for columns of numbers.
 
-    It is proved where interval bounds of every contact's reaction, l = -r(t, q, 0) along its sign at rest, are positive over the
-    whole forcing period. Nothing is proved where a coordinate has no contact or two of them, or under a load by records.
+    It is proved where interval bounds of every contact's reaction, l = -r(t, q, 0) along its sign
+    at rest, are positive over the whole forcing period. Nothing is proved where a coordinate has no
+    contact or two of them, or under a load by records.
 
     Returns
     -------
@@ -202,28 +260,46 @@ def keeps_rest(system: System, given: Mapping[str, np.ndarray]) -> np.ndarray:
         (n,), or (1,) for numbers alone.
     """
     traced, _ = _law_of(system)
-    arrays = (given.get(path, np.asarray(value)) for path, value in numbers(system))  # those of a structure's equations too
+    # those of a structure's equations too
+    arrays = (given.get(path, np.asarray(value)) for path, value in numbers(system))
     columns = np.broadcast_arrays(*map(np.atleast_1d, arrays))
     size = columns[0].size if columns else 1
-    if traced.records or traced.dependent or sorted(traced.contact_coordinates) != list(range(traced.dof)):
+    if (
+        traced.records
+        or traced.dependent
+        or sorted(traced.contact_coordinates) != list(range(traced.dof))
+    ):
         return np.zeros(size, dtype=bool)
     state = {
-        Expr("coordinate", (), i): position for i, position in zip(traced.contact_coordinates, traced.positions, strict=True)
+        Expr("coordinate", (), i): position
+        for i, position in zip(traced.contact_coordinates, traced.positions, strict=True)
     }
-    state |= {Expr(op, (), i): number(0.0) for op in ("velocity", "acceleration") for i in range(traced.dof)}
+    state |= {
+        Expr(op, (), i): number(0.0)
+        for op in ("velocity", "acceleration")
+        for i in range(traced.dof)
+    }
     always = Leaves([Interval(c[None, :]) for c in columns], [])
-    frequency = next((i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None)
+    frequency = next(
+        (i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None
+    )
     time = Interval(-1e300, 1e300)
     if frequency is not None:
         edges = np.arange(CAPTURE.rest_cells + 1)[:, None] * (2 * np.pi / CAPTURE.rest_cells)
         time = Interval(edges[:-1], edges[1:] * (1 + SLACK)) / always.parameters[frequency]
-    pushes = enclose([substitute(reaction, state) for reaction in traced.reactions], replace(always, time=time))
+    pushes = enclose(
+        [substitute(reaction, state) for reaction in traced.reactions], replace(always, time=time)
+    )
     lowest = [np.broadcast_to(push.lo, (CAPTURE.rest_cells, size)).min(axis=0) for push in pushes]
     return np.asarray(np.min(lowest, axis=0) > 0.0)
 
 
-def _record_ranges(system: System, traced: Trace, columns: Mapping[str, np.ndarray]) -> list[Interval]:
-    """Bounds of every record (and derivative) that the trace reads, over all time and all numbers; scales left out."""
+def _record_ranges(
+    system: System, traced: Trace, columns: Mapping[str, np.ndarray]
+) -> list[Interval]:
+    """Bounds of every record (and derivative) that the trace reads, over all time and all numbers;
+    scales left out.
+    """
     breaks, tables = record_tables(system, traced.records, columns)
     if not breaks.size:
         return []
@@ -232,23 +308,30 @@ def _record_ranges(system: System, traced: Trace, columns: Mapping[str, np.ndarr
     span = Interval(np.zeros_like(length), length)
     ranges = []
     for rows in np.moveaxis(tables, 1, 0):
-        drifts = np.any(rows[:, [0, -1], 1:] != 0.0)  # a record that drifts before its start or after its end has no bounds
+        # a record that drifts before its start or after its end has no bounds
+        drifts = np.any(rows[:, [0, -1], 1:] != 0.0)
         pieces = rows.reshape(-1, rows.shape[-1]).T
-        value = reduce(lambda total, c: total * span + Interval(c), pieces[-2::-1], Interval(pieces[-1]))
+        value = reduce(
+            lambda total, c: total * span + Interval(c), pieces[-2::-1], Interval(pieces[-1])
+        )
         ranges.append(Interval(-np.inf, np.inf) if drifts else value.over_cells())
     return ranges
 
 
 @dataclass
 class _Impacts:
-    """The impacts in one cycle of sides: -ln of their factor, and the units of the gap in which all factors are equal."""
+    """The impacts in one cycle of sides: -ln of their factor, and the units of the gap in which all
+    factors are equal.
+    """
 
     loss: np.ndarray  # (1, n), at least 0; NaN where nothing is known
     stretch: dict[int, np.ndarray]  # by side, (1, n)
 
 
 class _Law:
-    """The expressions of a system near its contact, and the bounds that follow from them for many parameter sets."""
+    """The expressions of a system near its contact, and the bounds that follow from them for many
+    parameter sets.
+    """
 
     def __init__(self, traced: Trace) -> None:
         sides = (1, -1)[: traced.side_count]
@@ -260,14 +343,17 @@ class _Law:
         self.recorded = any(reads(a, "record") for a in accelerations)
         self.timed = any(reads(a, "time") for a in accelerations)
         self.by_speed = any(reads(f, "velocity") for f, _ in self.factors.values())
-        self.frequency = next((i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None)
+        self.frequency = next(
+            (i for i, path in enumerate(traced.parameters) if path == "load.frequency"), None
+        )
 
     def capture(self, leaves: Leaves, n: int) -> np.ndarray:
         """The speeds below which capture is proved, (n,)."""
         with np.errstate(all="ignore"):
             always = replace(leaves, time=self._time(leaves, 1))
             speed = self._proved(always, np.zeros((1, n)), np.full((1, n), CLIMB.widest))
-            if self.by_speed:  # the factors of the slowest impacts first, then of all below the speed so found
+            # the factors of the slowest impacts first, then of all below the speed so found
+            if self.by_speed:
                 speed = self._proved(always, speed, speed)
         return np.asarray(speed[0])
 
@@ -302,21 +388,32 @@ class _Law:
             factor, at_rest = enclose(self.factors[side], around)
             sound = (factor.lo >= 0) & (at_rest.lo == 0) & (at_rest.hi == 0)
             factors.append(np.where(sound, factor.hi, np.nan) + np.zeros_like(reach))
-        first, last = factors[0], factors[-1]
+        first = factors[0]
+        last = factors[-1]
         ratio = np.where((first > 0) & (last > 0), np.sqrt(first / last), 1.0)
         e = np.maximum(first / ratio, last * ratio)
         e = np.where(np.abs(e - 1) <= CAPTURE.one, 1.0, e)
         stretch = dict(zip(cycle, (np.ones_like(ratio), ratio), strict=False))
-        return _Impacts(np.where(e <= 1, np.minimum(-np.log(e) * (1 - SLACK), 10.0), np.nan), stretch)
+        return _Impacts(
+            np.where(e <= 1, np.minimum(-np.log(e) * (1 - SLACK), 10.0), np.nan), stretch
+        )
 
-    def _energy(self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any) -> tuple[Any, Any]:
-        """The speed from the bounds of the energy, and whether the accelerations do not depend on the time; (1, n)."""
-        everywhere = replace(always, opening=Interval(0.0, CLIMB.widest), speed=Interval(-CLIMB.widest, CLIMB.widest))
-        steady, alive = np.full(limit.shape, not self.recorded), impacts.loss >= 0
+    def _energy(
+        self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any
+    ) -> tuple[Any, Any]:
+        """The speed from the bounds of the energy, and whether the accelerations do not depend on
+        the time; (1, n).
+        """
+        everywhere = replace(
+            always, opening=Interval(0.0, CLIMB.widest), speed=Interval(-CLIMB.widest, CLIMB.widest)
+        )
+        steady = np.full(limit.shape, not self.recorded)
+        alive = impacts.loss >= 0
         for side in cycle:
             here = replace(always, stretch=Interval(impacts.stretch[side]))
             change, pull = enclose(
-                [self.openings[side].a_t, self.openings[side].jets[0][0]], replace(everywhere, stretch=here.stretch)
+                [self.openings[side].a_t, self.openings[side].jets[0][0]],
+                replace(everywhere, stretch=here.stretch),
             )
             steady &= (change.lo == 0) & (change.hi == 0)
             alive &= pull.lo > 0
@@ -324,7 +421,9 @@ class _Law:
         chosen = np.flatnonzero(speed)
         for side in cycle if chosen.size else ():
             leaves = replace(always, stretch=Interval(impacts.stretch[side])).only(chosen)
-            top = self._by_energy(side, leaves, impacts.loss[:, chosen], steady[:, chosen], limit[:, chosen])
+            top = self._by_energy(
+                side, leaves, impacts.loss[:, chosen], steady[:, chosen], limit[:, chosen]
+            )
             speed[:, chosen] = np.minimum(speed[:, chosen], top)
         return speed * (1 - SLACK), steady
 
@@ -335,26 +434,45 @@ class _Law:
         rise, bend = (enclosed_along(e, leaves, OPENING) for e in (a, a_w))
         turning, lo, hi = climb(lambda w: -rise(w), lambda w: -bend(w), allowed)
         top = np.sqrt(2 * hi)
-        (growth,) = enclose([a_u], replace(leaves, opening=Interval(0 * turning, turning), speed=Interval(-top, top)))
+        (growth,) = enclose(
+            [a_u],
+            replace(leaves, opening=Interval(0 * turning, turning), speed=Interval(-top, top)),
+        )
         falls = (lo > 0) & ((growth.hi < 0) | ((growth.hi <= 0) & (loss > 0)))
         gain = np.where(steady, 1.0, np.sqrt(hi / lo))
         return np.where(falls, np.minimum(np.sqrt(2 * lo), limit / gain), 0.0)
 
-    def _by_invariant(self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any, chosen: Any) -> Any:
-        """The speed from the corrected adiabatic invariant, for the chosen parameter sets, (1, chosen.size)."""
+    def _by_invariant(
+        self, cycle: tuple[int, ...], impacts: _Impacts, always: Leaves, limit: Any, chosen: Any
+    ) -> Any:
+        """The speed from the corrected adiabatic invariant, for the chosen parameter sets, (1,
+        chosen.size).
+        """
         result = np.zeros((1, chosen.size))
         here = [replace(always, stretch=Interval(impacts.stretch[s])).only(chosen) for s in cycle]
-        pulls = [enclose([self.openings[s].jets[0][0]], self._in_cells(x))[0] for s, x in zip(cycle, here, strict=True)]
+        pulls = [
+            enclose([self.openings[s].jets[0][0]], self._in_cells(x))[0]
+            for s, x in zip(cycle, here, strict=True)
+        ]
         alive = np.flatnonzero(reduce(np.minimum, [(p.lo + result).min(axis=0) for p in pulls]) > 0)
-        if not alive.size:  # the load lifts the system off everywhere; bounds of no parameter sets take as long as those of a few
+        # the load lifts the system off everywhere; bounds of no parameter sets take as long as
+        # those of a few
+        if not alive.size:
             return result
         here = [self._in_cells(x.only(alive)) for x in here]
         bounds = [self.openings[s].bounds(x) for s, x in zip(cycle, here, strict=True)]
-        forms = [normal_form(side, None if len(cycle) == 1 else bounds[1 - i]) for i, side in enumerate(bounds)]
-        loss, period = impacts.loss[:, chosen[alive]], np.atleast_1d(here[0].time.hi)[-1:]
+        forms = [
+            normal_form(side, None if len(cycle) == 1 else bounds[1 - i])
+            for i, side in enumerate(bounds)
+        ]
+        loss = impacts.loss[:, chosen[alive]]
+        period = np.atleast_1d(here[0].time.hi)[-1:]
         top = np.minimum(first_guess(forms, loss), limit[:, chosen[alive]])
         for v in (fraction * top for fraction in CAPTURE.boxes):
-            boxes = [self.openings[s].boxed(x, f.pull, v) for s, x, f in zip(cycle, here, forms, strict=True)]
+            boxes = [
+                self.openings[s].boxed(x, f.pull, v)
+                for s, x, f in zip(cycle, here, forms, strict=True)
+            ]
             budgets = [budget(form, box, v) for form, box in zip(forms, boxes, strict=True)]
             found = largest_start(budgets, loss, period, v)
             result[:, alive] = np.where(result[:, alive] > 0, result[:, alive], found)
@@ -367,8 +485,9 @@ class _Law:
 
 
 def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
-    """The side after an impact on `side` (0 if it is not fixed), the derivative of the gap's speed after the impact to the speed
-    before, as a function of the latter, and the velocity after an impact without speed.
+    """The side after an impact on `side` (0 if it is not fixed), the derivative of the gap's speed
+    after the impact to the speed before, as a function of the latter, and the velocity after an
+    impact without speed.
     """
     leaf = {Expr("side"): float(side)}
     assert traced.gap_rate is not None
@@ -377,14 +496,22 @@ def _factor(traced: Trace, side: int) -> tuple[int, Expr, Expr]:
     following = substitute(traced.next_side, leaf)
     if following.op != "number" or following.value not in (1.0, -1.0)[: traced.side_count]:
         return 0, number(np.nan), number(np.nan)
-    rate, next_rate = (substitute(traced.gap_rate, {Expr("side"): s}) for s in (float(side), following.value))
+    rate, next_rate = (
+        substitute(traced.gap_rate, {Expr("side"): s}) for s in (float(side), following.value)
+    )
     after = substitute(traced.velocity_after, leaf)
     change = substitute(differentiate(after, SPEED), {SPEED: -1.0 / rate * SPEED})
     return int(following.value), -1.0 * (next_rate / rate) * change, substitute(after, {SPEED: 0.0})
 
 
 def _cycles(following: dict[int, int]) -> list[tuple[int, ...]]:
-    """The sides of successive flights of a motion, for every side at which it may begin; none where that is not known."""
+    """The sides of successive flights of a motion, for every side at which it may begin; none where
+    that is not known.
+    """
     if all(after == -side for side, after in following.items()):
         return [tuple(following)]
-    return [(side,) for side in following] if all(after == side for side, after in following.items()) else []
+    return (
+        [(side,) for side in following]
+        if all(after == side for side, after in following.items())
+        else []
+    )

@@ -1,4 +1,6 @@
-"""One side of a contact as an equation of its gap, w'' = A(t, w, u) with u = w', and bounds of A and its derivatives."""
+"""One side of a contact as an equation of its gap, w'' = A(t, w, u) with u = w', and bounds of A
+and its derivatives.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from saltus.bounds.intervals import SLACK, Interval, enclose
 from saltus.systems import System
 from saltus.taylor import Expr, Trace, differentiate, ordered, substitute, trace
 
-OPENING, SPEED, TIME = Expr("coordinate", (), 0), Expr("velocity", (), 0), Expr("time")
+OPENING = Expr("coordinate", (), 0)
+SPEED = Expr("velocity", (), 0)
+TIME = Expr("time")
 STRETCH = Expr("stretch")  # the unit of the gap on one side
 
 
@@ -30,7 +34,12 @@ class Leaves:
     def __call__(self, node: Expr) -> Interval:
         if node.op in ("parameter", "record"):
             return (self.parameters if node.op == "parameter" else self.records)[int(node.value)]
-        return {"time": self.time, "coordinate": self.opening, "velocity": self.speed, "stretch": self.stretch}[node.op]
+        return {
+            "time": self.time,
+            "coordinate": self.opening,
+            "velocity": self.speed,
+            "stretch": self.stretch,
+        }[node.op]
 
     def only(self, chosen: np.ndarray) -> Leaves:
         """The parameter sets at the chosen indices."""
@@ -39,7 +48,9 @@ class Leaves:
             return Interval(x.lo[:, chosen], x.hi[:, chosen]) if x.lo.ndim else x
 
         parameters = [take(p) for p in self.parameters]
-        return replace(self, parameters=parameters, time=take(self.time), stretch=take(self.stretch))
+        return replace(
+            self, parameters=parameters, time=take(self.time), stretch=take(self.stretch)
+        )
 
 
 class Opening:
@@ -52,7 +63,8 @@ class Opening:
         state = {OPENING: traced.contact + unit * OPENING, SPEED: unit * SPEED}
         self.a = substitute(traced.acceleration[0], {**leaf, **state}) / unit
         self.a_t, self.a_w, self.a_u = (differentiate(self.a, x) for x in (TIME, OPENING, SPEED))
-        a_uu, a_wu = differentiate(self.a_u, SPEED), differentiate(self.a_w, SPEED)
+        a_uu = differentiate(self.a_u, SPEED)
+        a_wu = differentiate(self.a_w, SPEED)
         self.box = [self.a_w, differentiate(self.a_w, OPENING)]
         self.edge = [a_uu, a_wu, differentiate(a_uu, SPEED)]
         self.jets = [
@@ -70,8 +82,11 @@ class Opening:
     def boxed(self, leaves: Leaves, pull: Any, v: Any) -> Box:
         """Over the cells of the time and all states with u^2 / 2 + alpha w <= v^2 / 2."""
         around = replace(leaves, speed=Interval(-v, v))
-        inside = replace(around, opening=Interval(np.zeros_like(pull), (1 + SLACK) * v * v / (2 * pull)))
-        (w, ww), (uu, wu, uuu) = enclose(self.box, inside), enclose(self.edge, around)
+        inside = replace(
+            around, opening=Interval(np.zeros_like(pull), (1 + SLACK) * v * v / (2 * pull))
+        )
+        (w, ww) = enclose(self.box, inside)
+        (uu, wu, uuu) = enclose(self.edge, around)
         return Box(w, ww, uu, wu, uuu)
 
 
@@ -92,7 +107,7 @@ def reads(root: Expr, *ops: str) -> bool:
     return any(node.op in ops for node in ordered([root]))
 
 
-# --- areas: the flow of a system with one coordinate may never enlarge them --------------------------------------------------
+# --- areas: the flow of a system with one coordinate may never enlarge them ---
 
 PERIOD_CELLS = 4096  # number of intervals into which the forcing period is divided
 EVERYWHERE = Interval(-1e300, 1e300)
@@ -100,31 +115,46 @@ VELOCITY = Expr("velocity", (), 0)
 
 
 def area_contraction(system: System) -> float | None:
-    """The least rate -da/dv at which areas of the state plane shrink, over all sides, times and states; None if they may grow.
+    """The least rate -da/dv at which areas of the state plane shrink, over all sides, times and
+    states; None if they may grow.
 
-    Along a motion an area changes by the factor exp(integral of da/dv), and by e^2 at each impact v+ = e v-. If -da/dv >= 0
-    everywhere and no impact raises the speed, the product of an orbit's two multipliers is at most 1, and a complex pair never
-    leaves the unit circle: there is no Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic, so
-    that None does not mean that areas do grow.
+    Along a motion an area changes by the factor exp(integral of da/dv), and by e^2 at each impact
+    v+ = e v-. If -da/dv >= 0 everywhere and no impact raises the speed, the product of an orbit's
+    two multipliers is at most 1, and a complex pair never leaves the unit circle: there is no
+    Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic, so that None
+    does not mean that areas do grow.
     """
     if not system.model.has_state_plane:
         return None
     traced = trace(system)
     leaves = _leaves_over_a_period(system)
     slopes = [_on_side(s, differentiate(traced.acceleration[0], VELOCITY)) for s in _sides(traced)]
-    anywhere = Leaves(leaves.parameters, [EVERYWHERE] * len(traced.records), leaves.time, EVERYWHERE, EVERYWHERE)
+    anywhere = Leaves(
+        leaves.parameters, [EVERYWHERE] * len(traced.records), leaves.time, EVERYWHERE, EVERYWHERE
+    )
     least = min(float(np.min(-bounds.hi)) for bounds in enclose(slopes, anywhere))
     return least + 0.0 if least >= 0.0 and _loses(traced, leaves) else None
 
 
 def largest_pushes(system: System, acceleration: Expr) -> list[np.ndarray]:
-    """Upper bounds of an acceleration at the contact on the sides +1 and -1, in cells over a forcing period."""
-    return [bounds.hi for bounds in enclose([_on_side(side, acceleration) for side in (1, -1)], _leaves_over_a_period(system))]
+    """Upper bounds of an acceleration at the contact on the sides +1 and -1, in cells over a
+    forcing period.
+    """
+    return [
+        bounds.hi
+        for bounds in enclose(
+            [_on_side(side, acceleration) for side in (1, -1)], _leaves_over_a_period(system)
+        )
+    ]
 
 
 def _leaves_over_a_period(system: System) -> Leaves:
-    """The numbers of a system, and the time in cells over its forcing period, as the leaves of its trace."""
-    return Leaves([Interval(value) for value in system.parameters.values()], [], time=_cells(system))
+    """The numbers of a system, and the time in cells over its forcing period, as the leaves of its
+    trace.
+    """
+    return Leaves(
+        [Interval(value) for value in system.parameters.values()], [], time=_cells(system)
+    )
 
 
 def _on_side(side: int, root: Expr) -> Expr:
@@ -145,7 +175,9 @@ def _sides(traced: Trace) -> tuple[int, ...]:
 
 
 def _loses(traced: Trace, leaves: Leaves) -> bool:
-    """Whether no impact can raise the speed, because the law is linear in the speed with factors of at most 1."""
+    """Whether no impact can raise the speed, because the law is linear in the speed with factors of
+    at most 1.
+    """
     if traced.velocity_after is None:
         return True
     for side in _sides(traced):

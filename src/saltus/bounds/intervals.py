@@ -1,8 +1,10 @@
-"""Interval arithmetic on a traced graph: bounds of an expression that hold for every value of its leaves in given ranges.
+"""Interval arithmetic on a traced graph: bounds of an expression that hold for every value of its
+leaves in given ranges.
 
-Arrays of intervals run over parameter sets and over cells of the time or the state. After every operation the bounds are moved
-outward by more than their rounding; zero stays zero, so that a product with 0 is exactly 0. (Underflow, below 1e-307, is not
-accounted for.) If an operation leaves its domain the bounds are NaN; no comparison with NaN holds, so that nothing is proved.
+Arrays of intervals run over parameter sets and over cells of the time or the state. After every
+operation the bounds are moved outward by more than their rounding; zero stays zero, so that a
+product with 0 is exactly 0. (Underflow, below 1e-307, is not accounted for.) If an operation leaves
+its domain the bounds are NaN; no comparison with NaN holds, so that nothing is proved.
 """
 
 from __future__ import annotations
@@ -16,8 +18,10 @@ import numpy as np
 
 from saltus.taylor import FUNCTIONS, Expr, ordered
 
-ROUNDING = 2.0**-51  # relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
-LIBRARY = 2.0**-48  # relative, of the elementary functions: NumPy promises 4 units in the last place
+# relative, four times that of + - * / and sqrt: a literal factor such as 1/3 may be rounded too
+ROUNDING = 2.0**-51
+# relative, of the elementary functions: NumPy promises 4 units in the last place
+LIBRARY = 2.0**-48
 SLACK = 1e-9  # relative, far above the rounding of the few steps after the intervals
 EXACT_FACTORS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # factors that do not round
 
@@ -43,9 +47,19 @@ class Interval:
     def __mul__(self, other: Any) -> Interval:
         if isinstance(other, (int, float)):
             lo, hi = (self.lo, self.hi) if other >= 0 else (self.hi, self.lo)
-            return Interval(lo * other, hi * other) if abs(other) in EXACT_FACTORS else outward(lo * other, hi * other)
-        a, b, c, d = self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi
-        return outward(np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d)))
+            return (
+                Interval(lo * other, hi * other)
+                if abs(other) in EXACT_FACTORS
+                else outward(lo * other, hi * other)
+            )
+        a = self.lo * other.lo
+        b = self.lo * other.hi
+        c = self.hi * other.lo
+        d = self.hi * other.hi
+        return outward(
+            np.minimum(np.minimum(a, b), np.minimum(c, d)),
+            np.maximum(np.maximum(a, b), np.maximum(c, d)),
+        )
 
     def __truediv__(self, other: Any) -> Interval:
         return self * as_interval(other).inverse()
@@ -69,7 +83,8 @@ class Interval:
 
     def square(self) -> Interval:
         """x^2; the product x * x would be wider, as it treats its factors as independent."""
-        low, high = self.lo * self.lo, self.hi * self.hi
+        low = self.lo * self.lo
+        high = self.hi * self.hi
         least = np.where((self.lo <= 0) & (self.hi >= 0), 0.0, np.minimum(low, high))
         return outward(least, np.maximum(low, high))
 
@@ -79,7 +94,9 @@ class Interval:
 
     def over_cells(self) -> Interval:
         """The hull over the first axis, kept with length 1."""
-        return Interval(np.min(self.lo, axis=0, keepdims=True), np.max(self.hi, axis=0, keepdims=True))
+        return Interval(
+            np.min(self.lo, axis=0, keepdims=True), np.max(self.hi, axis=0, keepdims=True)
+        )
 
 
 def as_interval(value: Any) -> Interval:
@@ -93,18 +110,23 @@ def outward(lo: Any, hi: Any, error: float = ROUNDING) -> Interval:
 
 
 def enclose(roots: list[Expr], leaf: Callable[[Expr], Interval]) -> list[Interval]:
-    """Bounds of expressions for all values of their leaves (time, coordinate, parameter, ...) in the ranges that `leaf` gives."""
+    """Bounds of expressions for all values of their leaves (time, coordinate, parameter, ...) in
+    the ranges that `leaf` gives.
+    """
     values: dict[int, Interval] = {}
     with np.errstate(all="ignore"):
         _fill(values, _in_order(*roots), leaf)
     return [values[id(root)] for root in roots]
 
 
-def enclosed_along(root: Expr, leaf: Callable[[Expr], Interval], varied: Expr) -> Callable[[Interval], Interval]:
-    """`enclose` of an expression as a function of the range of one leaf; parts that do not depend on the leaf are bounded
-    once."""
+def enclosed_along(
+    root: Expr, leaf: Callable[[Expr], Interval], varied: Expr
+) -> Callable[[Interval], Interval]:
+    """`enclose` of an expression as a function of the range of one leaf; parts that do not depend
+    on the leaf are bounded once."""
     depends = {id(varied)}
-    fixed, others = [], []
+    fixed = []
+    others = []
     for node in _in_order(root):
         if node is varied or any(id(a) in depends for a in node.args):
             depends.add(id(node))
@@ -126,11 +148,15 @@ def enclosed_along(root: Expr, leaf: Callable[[Expr], Interval], varied: Expr) -
 
 @lru_cache(maxsize=256)
 def _in_order(*roots: Expr) -> tuple[Expr, ...]:
-    """The nodes below some roots, operands first; cached, as the same few roots are bounded many times."""
+    """The nodes below some roots, operands first; cached, as the same few roots are bounded many
+    times.
+    """
     return tuple(ordered(list(roots)))
 
 
-def _fill(values: dict[int, Interval], nodes: Iterable[Expr], leaf: Callable[[Expr], Interval]) -> None:
+def _fill(
+    values: dict[int, Interval], nodes: Iterable[Expr], leaf: Callable[[Expr], Interval]
+) -> None:
     """Add the bounds of nodes, which are given with operands first, to the known ones."""
     for node in nodes:
         if node.op == "number":
@@ -163,14 +189,19 @@ def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
 
     def bounds(x: Interval) -> Interval:
         x = outward(x.lo, x.hi, LIBRARY)
-        at_lo, at_hi = function(x.lo), function(x.hi)
+        at_lo = function(x.lo)
+        at_hi = function(x.hi)
 
         def passes(point: float) -> Any:
-            return np.floor((x.hi - point) / math.tau + LIBRARY) >= np.ceil((x.lo - point) / math.tau - LIBRARY)
+            return np.floor((x.hi - point) / math.tau + LIBRARY) >= np.ceil(
+                (x.lo - point) / math.tau - LIBRARY
+            )
 
         result = outward(np.minimum(at_lo, at_hi), np.maximum(at_lo, at_hi), LIBRARY)
-        full_turn = x.hi - x.lo >= math.tau  # False where a bound is NaN, so that the result stays NaN
-        # Over a full turn the bounds are -1 and 1, also where the ends are infinite and the function there is NaN.
+        # False where a bound is NaN, so that the result stays NaN
+        full_turn = x.hi - x.lo >= math.tau
+        # Over a full turn the bounds are -1 and 1, also where the ends are infinite and the
+        # function there is NaN.
         result.lo, result.hi = (np.where(full_turn, 0.0, end) for end in (result.lo, result.hi))
         low = np.where(full_turn | passes(peak + math.pi), -1.0, np.maximum(result.lo, -1.0))
         return Interval(low, np.where(full_turn | passes(peak), 1.0, np.minimum(result.hi, 1.0)))
@@ -179,7 +210,8 @@ def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
 
 
 def _cosh(x: Interval) -> Interval:
-    low, high = np.cosh(x.lo), np.cosh(x.hi)
+    low = np.cosh(x.lo)
+    high = np.cosh(x.hi)
     least = np.where((x.lo <= 0) & (x.hi >= 0), 1.0, np.minimum(low, high))
     return outward(least, np.maximum(low, high), LIBRARY)
 
@@ -187,7 +219,8 @@ def _cosh(x: Interval) -> Interval:
 def _pow(x: Interval, exponent: Interval) -> Interval:
     """x^p for x >= 0, monotone in both; NaN for negative x."""
     corners = [base**p for base in (x.lo, x.hi) for p in (exponent.lo, exponent.hi)]
-    low, high = np.minimum.reduce(np.broadcast_arrays(*corners)), np.maximum.reduce(np.broadcast_arrays(*corners))
+    low = np.minimum.reduce(np.broadcast_arrays(*corners))
+    high = np.maximum.reduce(np.broadcast_arrays(*corners))
     unsafe = (x.lo < 0) | ((x.lo == 0) & (exponent.lo <= 0))
     return outward(np.where(unsafe, np.nan, low), np.where(unsafe, np.nan, high), LIBRARY)
 
@@ -202,13 +235,21 @@ def _greater_equal(x: Interval, y: Interval) -> Interval:
 
 
 def _where(condition: Interval, x: Interval, y: Interval) -> Interval:
-    low, high = np.minimum(x.lo, y.lo), np.maximum(x.hi, y.hi)
-    yes, no = condition.lo == 1.0, condition.hi == 0.0
-    return Interval(np.where(yes, x.lo, np.where(no, y.lo, low)), np.where(yes, x.hi, np.where(no, y.hi, high)))
+    low = np.minimum(x.lo, y.lo)
+    high = np.maximum(x.hi, y.hi)
+    yes = condition.lo == 1.0
+    no = condition.hi == 0.0
+    return Interval(
+        np.where(yes, x.lo, np.where(no, y.lo, low)), np.where(yes, x.hi, np.where(no, y.hi, high))
+    )
 
 
 _OPERATIONS: dict[str, Callable[..., Interval]] = {
-    **{name: _increasing(function.numpy) for name, function in FUNCTIONS.items() if function.increasing},
+    **{
+        name: _increasing(function.numpy)
+        for name, function in FUNCTIONS.items()
+        if function.increasing
+    },
     "add": Interval.__add__,
     "sub": Interval.__sub__,
     "mul": Interval.__mul__,

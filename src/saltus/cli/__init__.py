@@ -1,4 +1,5 @@
-"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `doctor`, and commands that other packages add.
+"""The command line: `saltus simulate`, `run`, `plot`, `status`, `info` and `doctor`, and commands
+that other packages add.
 
 Only typer and rich are imported before a command runs, so that help is immediate.
 """
@@ -16,8 +17,9 @@ __getattr__, __dir__, __all__ = front_door(__name__, __file__)
 def main() -> None:
     """The entry point of the command `saltus`.
 
-    An interruption that falls outside a command, as while modules are loaded or options are read, ends the process at once, with
-    the sentence and the status of one within: there is nothing to clean up, and typer would say nothing.
+    An interruption that falls outside a command, as while modules are loaded or options are read,
+    ends the process at once, with the sentence and the status of one within: there is nothing to
+    clean up, and typer would say nothing.
     """
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)

@@ -1,6 +1,7 @@
 """The commands and their help; the work is in the module of each command, imported when it runs.
 
-Other packages add commands: each is an entry point of the group `saltus.commands`, a function with typer's annotations.
+Other packages add commands: each is an entry point of the group `saltus.commands`, a function with
+typer's annotations.
 """
 
 from __future__ import annotations
@@ -20,17 +21,23 @@ from saltus.cli.guard import guarded
 from saltus.errors import SaltusError
 
 GROUP = "saltus.commands"
-ELSEWHERE = {"reproduce": "saltus-paper", "report": "saltus-paper"}  # commands of packages that saltus does not need
+# commands of packages that saltus does not need
+ELSEWHERE = {"reproduce": "saltus-paper", "report": "saltus-paper"}
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add every command that an installed package gives, and for one that is known and not installed, how to get it."""
+    """Add every command that an installed package gives, and for one that is known and not
+    installed, how to get it.
+    """
     given = {entry.name: entry for entry in entry_points(group=GROUP)}
     for name, entry in sorted(given.items()):
         _add(app, name, entry)
     for name in ELSEWHERE.keys() - given.keys():
         package = ELSEWHERE[name]
-        sentence = f"`saltus {name}` comes with the package {package}; in a checkout of saltus, `make reproduce` installs it"
+        sentence = (
+            f"`saltus {name}` comes with the package {package}; in a checkout of saltus, "
+            "`make reproduce` installs it"
+        )
         _add_refusal(app, name, sentence)
 
 
@@ -39,7 +46,11 @@ def _add(app: typer.Typer, name: str, entry: EntryPoint) -> None:
         work = entry.load()
     except Exception as error:  # whatever another package does, the other commands go on
         package = entry.dist.name if entry.dist else entry.value
-        _add_refusal(app, name, f"`saltus {name}` cannot be loaded from {package} ({type(error).__name__}: {error})")
+        _add_refusal(
+            app,
+            name,
+            f"`saltus {name}` cannot be loaded from {package} ({type(error).__name__}: {error})",
+        )
     else:
         app.command(name)(_in_guard(work))
 
@@ -61,7 +72,9 @@ def _add_refusal(app: typer.Typer, name: str, sentence: str) -> None:
             raise SaltusError(sentence)
 
     any_arguments = {"allow_extra_args": True, "ignore_unknown_options": True}
-    app.command(name, help=f"{sentence[0].upper()}{sentence[1:]}.", context_settings=any_arguments)(refuse)
+    app.command(name, help=f"{sentence[0].upper()}{sentence[1:]}.", context_settings=any_arguments)(
+        refuse
+    )
 
 
 app = typer.Typer(
@@ -87,11 +100,18 @@ STUDY = """A study is a TOML file; ten lines suffice:
 [cyan]periods = 20[/]"""
 
 Study = Annotated[
-    Path, typer.Argument(metavar="STUDY.TOML", help="The study: a model, its loads, its impact law, and how to simulate it.")
+    Path,
+    typer.Argument(
+        metavar="STUDY.TOML",
+        help="The study: a model, its loads, its impact law, and how to simulate it.",
+    ),
 ]
 
 Output = Annotated[
-    Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="results/<name of the study>")
+    Path | None,
+    typer.Option(
+        "--output", "-o", help="The folder to write to.", show_default="results/<name of the study>"
+    ),
 ]
 
 
@@ -106,7 +126,10 @@ def _version(wanted: bool) -> None:
 @app.callback(epilog=STUDY)
 def saltus(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+        bool,
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Print the version and stop."
+        ),
     ] = False,
 ) -> None:
     """Exact non-smooth dynamics of the buckling-based metainterface and its kin.
@@ -124,7 +147,9 @@ def saltus(
 def simulate(
     study: Study,
     output: Output = None,
-    plot: Annotated[bool, typer.Option(help="Draw the time history and the phase portrait.")] = True,
+    plot: Annotated[
+        bool, typer.Option(help="Draw the time history and the phase portrait.")
+    ] = True,
 ) -> None:
     """Compute a motion, exactly from impact to impact; write it and draw it.
 
@@ -148,10 +173,20 @@ def run(
     plot: Annotated[bool, typer.Option(help="Draw what is computed.")] = True,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786, for diagrams, charts and basins."),
+        typer.Option(
+            metavar="ADDRESS",
+            help="A Dask scheduler, such as tcp://host:8786, for diagrams, charts and basins.",
+        ),
     ] = None,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Begin anew where a diagram, chart or basins of another study, model or version are.")
+        bool,
+        typer.Option(
+            "--fresh",
+            help=(
+                "Begin anew where a diagram, chart or basins of another study, model or version "
+                "are."
+            ),
+        ),
     ] = False,
 ) -> None:
     r"""Answer all that a study asks: a motion, a diagram, a chart, basins, ...
@@ -174,10 +209,18 @@ def run(
 def page(
     study: Study,
     results: Annotated[
-        list[Path] | None, typer.Option("--with", metavar="STORE", help="A result of the study to lay over the page; repeatable.")
+        list[Path] | None,
+        typer.Option(
+            "--with",
+            metavar="STORE",
+            help="A result of the study to lay over the page; repeatable.",
+        ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The file to write.", show_default="<name of the study>.html")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="The file to write.", show_default="<name of the study>.html"
+        ),
     ] = None,
 ) -> None:
     """Make a page that computes: the exact motion in a browser, as one file.
@@ -198,7 +241,12 @@ def page(
 def explore(
     study: Study,
     results: Annotated[
-        list[Path] | None, typer.Option("--with", metavar="STORE", help="A result of the study to lay over the page; repeatable.")
+        list[Path] | None,
+        typer.Option(
+            "--with",
+            metavar="STORE",
+            help="A result of the study to lay over the page; repeatable.",
+        ),
     ] = None,
 ) -> None:
     """Make the page of a study that computes, and open it in the browser.
@@ -217,9 +265,13 @@ def explore(
 
 @app.command()
 def plot(
-    store: Annotated[Path, typer.Argument(metavar="STORE", help="A .nc file or .zarr folder that saltus has written.")],
+    store: Annotated[
+        Path,
+        typer.Argument(metavar="STORE", help="A .nc file or .zarr folder that saltus has written."),
+    ],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The folder to write to.", show_default="beside it")
+        Path | None,
+        typer.Option("--output", "-o", help="The folder to write to.", show_default="beside it"),
     ] = None,
 ) -> None:
     """Draw a result of `saltus run` or `saltus simulate` again.
@@ -237,9 +289,18 @@ def plot(
 
 @app.command()
 def status(
-    store: Annotated[Path, typer.Argument(metavar="STORE", help="The .zarr folder of a sweep; with --verify any result.")],
+    store: Annotated[
+        Path,
+        typer.Argument(
+            metavar="STORE", help="The .zarr folder of a sweep; with --verify any result."
+        ),
+    ],
     verify: Annotated[
-        bool, typer.Option("--verify", help="Compare every file with its checksum: of a .zarr, a .nc, or a folder of results.")
+        bool,
+        typer.Option(
+            "--verify",
+            help="Compare every file with its checksum: of a .zarr, a .nc, or a folder of results.",
+        ),
     ] = False,
 ) -> None:
     """Say how far a sweep is: running, stopped or complete, and what has failed.
@@ -291,13 +352,16 @@ def doctor() -> None:
 
 add_commands(app)
 
-# What numpy's libraries of linear algebra read when they are loaded. The matrices of saltus have some ten rows and its processes
-# use all cores: further threads only wait for one another, which took up to a third of the processor time of following orbits.
+# What numpy's libraries of linear algebra read when they are loaded. The matrices of saltus have
+# some ten rows and its processes use all cores: further threads only wait for one another, which
+# took up to a third of the processor time of following orbits.
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def begin() -> None:
-    """Run the command that stands in `sys.argv`; what a terminal's encoding lacks is written as an escape."""
+    """Run the command that stands in `sys.argv`; what a terminal's encoding lacks is written as an
+    escape.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -1,4 +1,6 @@
-"""`saltus doctor`: the machine and packages on which saltus runs, and whether it computes correctly there."""
+"""`saltus doctor`: the machine and packages on which saltus runs, and whether it computes correctly
+there.
+"""
 
 from __future__ import annotations
 
@@ -20,18 +22,25 @@ from saltus.errors import ParameterError
 if TYPE_CHECKING:
     import numpy as np
 
-DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)  # default_rng(12345).random(3) in NumPy's documentation of its generators
+# default_rng(12345).random(3) in NumPy's documentation of its generators
+DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)
 
 
 def print_doctor() -> None:
-    """Print the machine, the cache and the versions, test what saltus assumes of other packages, then a motion with a closed
-    form, alone and in lanes.
+    """Print the machine, the cache and the versions, test what saltus assumes of other packages,
+    then a motion with a closed form, alone and in lanes.
 
     If anything is wrong, the command ends with one sentence about it, after everything is printed.
     """
     console = Console(highlight=False)
     wrong: list[str] = []
-    for block in (_machine(), _cache(wrong), _versions(wrong), _leaned_on(wrong), _trial(console, wrong)):
+    for block in (
+        _machine(),
+        _cache(wrong),
+        _versions(wrong),
+        _leaned_on(wrong),
+        _trial(console, wrong),
+    ):
         console.print(f"\n{block.title}", style="bold", markup=False)
         console.print(block_table(block))
     if wrong:
@@ -51,7 +60,11 @@ def _machine() -> Block:
         ("processor", get_host_cpu_name()),
         ("cores", f"{available_cores()} that this process may use"),
         ("memory", f"{free_memory() / 2**30:.1f} GiB free"),
-        ("lanes", f"{WIDTH} motions at once in a vector" + (" (SALTUS_LANES)" if "SALTUS_LANES" in os.environ else "")),
+        (
+            "lanes",
+            f"{WIDTH} motions at once in a vector"
+            + (" (SALTUS_LANES)" if "SALTUS_LANES" in os.environ else ""),
+        ),
     ]
     return Block("Machine", rows)
 
@@ -71,7 +84,10 @@ def _cache(wrong: list[str]) -> Block:
         ("compiled", f"{kernels} kernels and models, {size:.0f} MiB"),
         (
             "private",
-            "yes: it is the user's own, nobody else may write to it, and code is compared with its digest before it runs",
+            (
+                "yes: it is the user's own, nobody else may write to it, and code is compared with "
+                "its digest before it runs"
+            ),
         ),
     ]
     return Block("Compiled code", rows)
@@ -80,11 +96,17 @@ def _cache(wrong: list[str]) -> Block:
 def _versions(wrong: list[str]) -> Block:
     from saltus import __version__
 
-    rows: list[Row] = [("saltus", __version__, "", ""), ("Python", platform.python_version(), ">=3.11", "")]
+    rows: list[Row] = [
+        ("saltus", __version__, "", ""),
+        ("Python", platform.python_version(), ">=3.11", ""),
+    ]
     try:
         rows += _requirements(wrong)
     except metadata.PackageNotFoundError:
-        wrong.append("saltus is not installed but run from its files, so the versions were not compared with those allowed")
+        wrong.append(
+            "saltus is not installed but run from its files, so the versions were not compared "
+            "with those allowed"
+        )
     return Block("Versions", rows, ("", "installed", "allowed", ""))
 
 
@@ -103,18 +125,36 @@ def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
             there = ""
         fits = need.specifier.contains(there, prereleases=True) if there else extra
         if not fits:
-            wrong.append(f"{need.name} {there or 'is missing:'} {'is not allowed:' if there else ''} saltus needs {need}")
-        remark = "for clusters: pip install saltus[cluster]" if extra and not there else "" if fits else "not allowed"
+            wrong.append(
+                f"{need.name} {there or 'is missing:'} {'is not allowed:' if there else ''} "
+                f"saltus needs {need}"
+            )
+        remark = (
+            "for clusters: pip install saltus[cluster]"
+            if extra and not there
+            else ""
+            if fits
+            else "not allowed"
+        )
         yield need.name, there or "no", str(need.specifier), remark
 
 
 def _leaned_on(wrong: list[str]) -> Block:
     """Tests of what saltus relies on in other packages, if its loss would cause no error elsewhere."""
     trials = {
-        "public functions (lazy_loader)": (_answers, "an unknown argument is not answered with the near ones"),
-        "netCDF files (xarray, h5netcdf, h5py)": (_comes_back, "a dataset does not come back from its file as it was"),
+        "public functions (lazy_loader)": (
+            _answers,
+            "an unknown argument is not answered with the near ones",
+        ),
+        "netCDF files (xarray, h5netcdf, h5py)": (
+            _comes_back,
+            "a dataset does not come back from its file as it was",
+        ),
         "stores (Zarr, numcodecs)": (_notices, "a flipped bit in a chunk is not noticed"),
-        "random numbers (NumPy)": (_repeats, "a seed gives other random numbers than in NumPy's documentation"),
+        "random numbers (NumPy)": (
+            _repeats,
+            "a seed gives other random numbers than in NumPy's documentation",
+        ),
     }
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -142,7 +182,11 @@ def _comes_back(folder: Path) -> bool:
 
     from saltus.files import read_dataset, write_dataset
 
-    values = {"number": ("x", [1.5, math.nan]), "text": ("x", ["a", "beta"]), "whole": ("x", [1, -1])}
+    values = {
+        "number": ("x", [1.5, math.nan]),
+        "text": ("x", ["a", "beta"]),
+        "whole": ("x", [1, -1]),
+    }
     data = xarray.Dataset(values, coords={"x": [0.0, 1.0]}, attrs={"kind": "trial", "list": [1, 2]})
     tree = xarray.DataTree.from_dict({"/": xarray.Dataset(attrs={"kind": "tree"}), "/part": data})
     first = write_dataset(folder / "first.nc", tree).read_bytes()
@@ -155,8 +199,17 @@ def _notices(folder: Path) -> bool:
 
     from saltus.sweep import Plan, Variable, run, status
 
-    store, axes = folder / "trial.zarr", {"x": np.arange(4.0)}
-    run(Plan(function=f"{__name__}:trial_chunk", axes=axes, chunk={"x": 2}, variables={"y": Variable()}), store)
+    store = folder / "trial.zarr"
+    axes = {"x": np.arange(4.0)}
+    run(
+        Plan(
+            function=f"{__name__}:trial_chunk",
+            axes=axes,
+            chunk={"x": 2},
+            variables={"y": Variable()},
+        ),
+        store,
+    )
     sound = not status(store, verify=True).damaged
     chunk = store / "y" / "c" / "1"
     content = bytearray(chunk.read_bytes())
@@ -173,20 +226,29 @@ def trial_chunk(_: Any, block: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def _repeats(_: Path) -> bool:
     import numpy as np
 
-    return bool(np.allclose(np.random.default_rng(12345).random(3), DOCUMENTED, rtol=0.0, atol=1e-8))
+    return bool(
+        np.allclose(np.random.default_rng(12345).random(3), DOCUMENTED, rtol=0.0, atol=1e-8)
+    )
 
 
 def _trial(console: Console, wrong: list[str]) -> Block:
-    """The trial motion: x'' + x = 0 from (0, 1) with a wall at x = 1/2 and e = 1, with impacts at pi/6 + 4 pi n / 3."""
+    """The trial motion: x'' + x = 0 from (0, 1) with a wall at x = 1/2 and e = 1, with impacts at
+    pi/6 + 4 pi n / 3.
+    """
     import numpy as np
 
     from saltus.flow import simulate, simulate_many
     from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
-    system = System(model=WallOscillator(wall=0.5), load=Load(frequency=1.0, force=Harmonic(0.0)), impact=VelocityReduction(1.0))
+    system = System(
+        model=WallOscillator(wall=0.5),
+        load=Load(frequency=1.0, force=Harmonic(0.0)),
+        impact=VelocityReduction(1.0),
+    )
     periods = 10  # fifteen impacts, which would show a wrong root or a wrong impact law
     since = (2 * math.pi * periods - math.pi / 6) % (4 * math.pi / 3)
-    x, velocity = math.sin(5 * math.pi / 6 + since), math.cos(5 * math.pi / 6 + since)
+    x = math.sin(5 * math.pi / 6 + since)
+    velocity = math.cos(5 * math.pi / 6 + since)
     with console.status("compiling what is not compiled yet, and trying it"):
         one = simulate(system, x=0.0, velocity=1.0, periods=periods, tol=1e-14)
         many = simulate_many(system, x=np.zeros(64), velocity=1.0, periods=periods, tol=1e-14)
@@ -196,6 +258,11 @@ def _trial(console: Console, wrong: list[str]) -> Block:
     }
     for name, error in errors.items():
         if not error <= 1e-12:  # at tol = 1e-14 rounding alone gives some 1e-15 for each impact
-            wrong.append(f"{name} of an oscillator with a wall is wrong by {error:.1e}: please tell the developers")
-    rows: list[Row] = [(name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()]
+            wrong.append(
+                f"{name} of an oscillator with a wall is wrong by {error:.1e}: please tell the "
+                "developers"
+            )
+    rows: list[Row] = [
+        (name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()
+    ]
     return Block("Trial", rows)

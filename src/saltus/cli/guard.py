@@ -1,4 +1,6 @@
-"""How commands say how far they are, and how they end: errors and interruptions with one sentence and an exit status."""
+"""How commands say how far they are, and how they end: errors and interruptions with one sentence
+and an exit status.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from saltus.errors import SaltusError, shortened
 if TYPE_CHECKING:  # `saltus --help` imports no NumPy
     from saltus.progress import Progress
 
-BAD_INPUT, INTERRUPTED = 2, 130  # the second is 128 + SIGINT, as shells have it
+# the second is 128 + SIGINT, as shells have it
+BAD_INPUT = 2
+INTERRUPTED = 130
 INTERRUPTION = "interrupted; no file was left half-written"
 REMINDER_AFTER = 1.0  # s; enough for the clean-up after an interrupt, before it is raised again
 
@@ -24,9 +28,10 @@ REMINDER_AFTER = 1.0  # s; enough for the clean-up after an interrupt, before it
 def interruptible() -> Iterator[None]:
     """Let SIGINT end the block with a KeyboardInterrupt.
 
-    Python raises the KeyboardInterrupt in whatever code is running, where it can be lost: a callback from C drops it, and the
-    import of an extension module turns it into an ImportError. So it is raised again until the block ends, and any error that it
-    causes is treated as the interrupt. A process that ignores SIGINT continues to ignore it.
+    Python raises the KeyboardInterrupt in whatever code is running, where it can be lost: a
+    callback from C drops it, and the import of an extension module turns it into an ImportError. So
+    it is raised again until the block ends, and any error that it causes is treated as the
+    interrupt. A process that ignores SIGINT continues to ignore it.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
@@ -67,21 +72,27 @@ def _remind() -> None:
 
 @contextmanager
 def guarded() -> Iterator[None]:
-    """Turn an error that a user can act on, or an interruption, into a sentence on stderr and an exit status."""
+    """Turn an error that a user can act on, or an interruption, into a sentence on stderr and an
+    exit status.
+    """
     try:
         with interruptible():
             yield
     except SaltusError as error:
         stop(str(error), BAD_INPUT)
     except KeyboardInterrupt as error:
-        # Python records that an interrupt has left an exec of text, and `python -m` then dies of SIGINT; another exec clears it.
+        # Python records that an interrupt has left an exec of text, and `python -m` then dies of
+        # SIGINT; another exec clears it.
         exec("")
         stop(str(error) or INTERRUPTION, INTERRUPTED)  # a sweep says how to go on
     except BrokenPipeError:  # `saltus info ... | head`: typer ends this quietly
         raise
     except OSError as error:
         place = f"{error.filename} " if error.filename else ""
-        stop(f"{place}cannot be read or written ({(error.strerror or str(error)).lower()})", BAD_INPUT)
+        stop(
+            f"{place}cannot be read or written ({(error.strerror or str(error)).lower()})",
+            BAD_INPUT,
+        )
     except MemoryError:
         stop("there is not enough memory for this; ask for fewer samples or periods", BAD_INPUT)
     except RecursionError:
@@ -98,9 +109,11 @@ def stop(sentence: str, status: int) -> NoReturn:
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
-    """A bar with a clock on a terminal; elsewhere a line on stderr whenever another step of the work begins.
+    """A bar with a clock on a terminal; elsewhere a line on stderr whenever another step of the
+    work begins.
 
-    The commands of saltus draw theirs in this way; a command that another package adds can do the same.
+    The commands of saltus draw theirs in this way; a command that another package adds can do the
+    same.
 
     Parameters
     ----------
@@ -110,7 +123,8 @@ def progress_bar(title: str) -> Iterator[Progress]:
     Yields
     ------
     Progress
-        The `progress(fraction, what)` that the work calls; `what` names the step, and after a comma what changes in it.
+        The `progress(fraction, what)` that the work calls; `what` names the step, and after a comma
+        what changes in it.
 
     Examples
     --------
@@ -122,8 +136,14 @@ def progress_bar(title: str) -> Iterator[Progress]:
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
-    messages, step = Console(stderr=True, highlight=False), ""
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TimeElapsedColumn())
+    messages = Console(stderr=True, highlight=False)
+    step = ""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=20),
+        TimeElapsedColumn(),
+    )
     with Bar(*columns, console=messages, transient=True, disable=not messages.is_terminal) as bar:
         task = bar.add_task(title, total=1.0)
 

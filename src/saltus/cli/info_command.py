@@ -69,7 +69,9 @@ def print_info(path: Path) -> None:
         console.print(block_table(block))
 
 
-PHASES = 64  # Instants at which a load is compared with its mirror image: enough to see every harmonic below the 32nd.
+# Instants at which a load is compared with its mirror image: enough to see every harmonic below the
+# 32nd.
+PHASES = 64
 
 
 def describe(system: System, start: float | None = None) -> Iterator[Block]:
@@ -90,7 +92,12 @@ def describe(system: System, start: float | None = None) -> Iterator[Block]:
 
 def _load(system: System) -> list[Row]:
     period = system.load.period
-    rows: list[Row] = [("forcing period 2 pi / Omega", "none: the load has no frequency" if period is None else number(period))]
+    rows: list[Row] = [
+        (
+            "forcing period 2 pi / Omega",
+            "none: the load has no frequency" if period is None else number(period),
+        )
+    ]
     channels = ", ".join(system.load.channels) or "none"
     rows.append(("channels given", channels))
     rows.append(("channels that the model reads", ", ".join(system.model.channels) or "none"))
@@ -116,9 +123,13 @@ def _equal(load: Load, other: Load, shift: float) -> bool:
     span = load.period or max((_end(s) for s in _passing(load)), default=1.0)
     times = span * np.arange(PHASES) / PHASES
     for name in load.channels:
-        order = 2 if name.startswith("ground") else 0  # for the ground only the acceleration matters
+        # for the ground only the acceleration matters
+        order = 2 if name.startswith("ground") else 0
         pairs = ((load, times + shift), (other, times))
-        here, there = (np.broadcast_to(x.channels[name].derivative(t, x.frequency, order), times.shape) for x, t in pairs)
+        here, there = (
+            np.broadcast_to(x.channels[name].derivative(t, x.frequency, order), times.shape)
+            for x, t in pairs
+        )
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12 * (1 + np.abs(there).max())):
             return False
     return True
@@ -126,18 +137,26 @@ def _equal(load: Load, other: Load, shift: float) -> bool:
 
 def _passing(load: Load) -> list[Any]:
     """The records and pulses of a load."""
-    return [term for signal in load.channels.values() for term in getattr(signal, "terms", (signal,)) if term.once]
+    return [
+        term
+        for signal in load.channels.values()
+        for term in getattr(signal, "terms", (signal,))
+        if term.once
+    ]
 
 
 def _end(signal: Any) -> float:
     return float(signal.time[-1] if hasattr(signal, "time") else signal.start + signal.length)
 
 
-SMALL_START = 0.1  # rad; the start of the free vibration whose period is given if the study has no start
+# rad; the start of the free vibration whose period is given if the study has no start
+SMALL_START = 0.1
 
 
 def _metainterface(system: System, start: float | None) -> Iterator[Block]:
-    """Equilibria under the mean load, vibrations and periods, critical loads, limits of the mechanism."""
+    """Equilibria under the mean load, vibrations and periods, critical loads, limits of the
+    mechanism.
+    """
     model = system.model
     assert isinstance(model, Metainterface)
     model = dataclasses.replace(model, smoothing=None)
@@ -152,9 +171,18 @@ def _equilibria(system: System) -> Block:
     rows: list[Row] = []
     for e in equilibria(system):
         place = "" if e.within_line else "beyond the straight line"
-        rows.append((number(e.theta), f"{math.degrees(e.theta):.6g}", e.stability.value, number(e.energy), place))
+        rows.append(
+            (
+                number(e.theta),
+                f"{math.degrees(e.theta):.6g}",
+                e.stability.value,
+                number(e.energy),
+                place,
+            )
+        )
     title = (
-        f"Equilibria under the mean load (H = {float(system.load.horizontal(0.0)):g}, V = {float(system.load.vertical(0.0)):g})"
+        f"Equilibria under the mean load (H = {float(system.load.horizontal(0.0)):g}, V = "
+        f"{float(system.load.vertical(0.0)):g})"
     )
     return Block(title, rows, ("theta (rad)", "(deg)", "", "energy P / K2", ""))
 
@@ -163,17 +191,33 @@ def _vibrations(system: System, model: Metainterface, start: float) -> Block:
     rows: list[Row] = []
     try:
         for name, v in zip(("lower", "upper"), vibrations(system), strict=True):
-            rows.append((f"apparent frequency, {name} layer", f"{number(v.frequency)}, damping ratio {number(v.damping_ratio)}"))
+            rows.append(
+                (
+                    f"apparent frequency, {name} layer",
+                    f"{number(v.frequency)}, damping ratio {number(v.damping_ratio)}",
+                )
+            )
     except ParameterError as error:
         rows.append(("apparent frequencies", f"none: {error}"))
     free = system.with_({"model.damping": 0.0, "impact": VelocityReduction(1.0)})
-    rows.append((f"undamped free period from theta = {start:g} rad", attempt(lambda: number(peaks(free, start).period))))
+    rows.append(
+        (
+            f"undamped free period from theta = {start:g} rad",
+            attempt(lambda: number(peaks(free, start).period)),
+        )
+    )
     vertical = float(system.load.vertical(0.0))
-    if _alike(model) and not any(getattr(system.load, name)(0.0) for name in system.load.channels if name != "vertical"):
+    if _alike(model) and not any(
+        getattr(system.load, name)(0.0) for name in system.load.channels if name != "vertical"
+    ):
         small = attempt(lambda: number(linear_period(start, beta0=model.beta0, vertical=vertical)))
         rows.append(("the same, small angles: T0 (t-beta)", small))
     forth, back = (float(model.inelastic_factor(side)) for side in (1, -1))
-    factors = number(forth) if forth == back else f"{number(forth)} from lower to upper, {number(back)} back"
+    factors = (
+        number(forth)
+        if forth == back
+        else f"{number(forth)} from lower to upper, {number(back)} back"
+    )
     rows.append(("velocity factor of an inelastic impact", factors))
     return Block("Vibrations", rows)
 
@@ -184,19 +228,39 @@ def _alike(model: Metainterface) -> bool:
 
 
 def _critical_loads(system: System, model: Metainterface, frequency: float | None) -> Block:
-    beta0, vertical = model.beta0, float(system.load.vertical(0.0))
+    beta0 = model.beta0
+    vertical = float(system.load.vertical(0.0))
     rows: list[Row] = [
-        ("Hcr = |V / tan(beta0)|, the undeformed state is lost", attempt(lambda: number(critical_horizontal(beta0, vertical))))
+        (
+            "Hcr = |V / tan(beta0)|, the undeformed state is lost",
+            attempt(lambda: number(critical_horizontal(beta0, vertical))),
+        )
     ]
     if _alike(model) and beta0 < math.pi / 2:
         least = subcritical_vertical(beta0)
         rows.append(("the buckling at Hcr is subcritical for V below", number(least)))
-        rows.append(("deformed equilibria exist without any H for V below", number(unloaded_fold(beta0)[0])))
+        rows.append(
+            ("deformed equilibria exist without any H for V below", number(unloaded_fold(beta0)[0]))
+        )
         if vertical <= least:
-            rows.append(("fold of equilibria, at |H|", attempt(lambda: number(fold_horizontal(beta0, vertical)))))
-    if _alike(model) and model.dissipation_ratio == 1 and model.damping > 0 and frequency is not None:
+            rows.append(
+                (
+                    "fold of equilibria, at |H|",
+                    attempt(lambda: number(fold_horizontal(beta0, vertical))),
+                )
+            )
+    if (
+        _alike(model)
+        and model.dissipation_ratio == 1
+        and model.damping > 0
+        and frequency is not None
+    ):
         damping = model.damping
-        onset = attempt(lambda: number(high_frequency_onset(frequency, beta0=beta0, vertical=vertical, damping=damping)))
+        onset = attempt(
+            lambda: number(
+                high_frequency_onset(frequency, beta0=beta0, vertical=vertical, damping=damping)
+            )
+        )
         rows.append(("period-1 motion exists above H amplitude (fast load, e = 1)", onset))
     return Block("Critical loads", rows)
 
@@ -205,7 +269,10 @@ def _limits(model: Metainterface) -> Block:
     opening = math.pi - model.beta0
     return Block(
         "Limits of the mechanism, |theta|",
-        [("straight line, pi - beta0", angle(opening)), ("kinematic limit, 2 (pi - beta0)", angle(2 * opening))],
+        [
+            ("straight line, pi - beta0", angle(opening)),
+            ("kinematic limit, 2 (pi - beta0)", angle(2 * opening)),
+        ],
     )
 
 
@@ -216,15 +283,24 @@ def _rocking_block(system: System, start: float | None) -> Iterator[Block]:
         ("overturning equilibria, theta = +-alpha", angle(alpha)),
         ("the block lies on its side at +-pi/2", angle(math.pi / 2)),
         ("rest is left where |zeta''| exceeds (1 + nu'') tan(alpha)", number(math.tan(alpha))),
-        ("velocity factor of an inelastic impact (Housner)", number(system.one_contact.inelastic_factor(1))),
+        (
+            "velocity factor of an inelastic impact (Housner)",
+            number(system.one_contact.inelastic_factor(1)),
+        ),
     ]
     yield Block("Closed forms", [*rows, *_rocking_periods(alpha, start or alpha / 2)])
 
 
 def _rocking_periods(alpha: float, start: float) -> list[Row]:
     return [
-        (f"free rocking period from {angle(start)}", attempt(lambda: number(rocking_period(start, alpha=alpha)))),
-        ("the same for a slender block", attempt(lambda: number(slender_rocking_period(start, alpha=alpha)))),
+        (
+            f"free rocking period from {angle(start)}",
+            attempt(lambda: number(rocking_period(start, alpha=alpha))),
+        ),
+        (
+            "the same for a slender block",
+            attempt(lambda: number(slender_rocking_period(start, alpha=alpha))),
+        ),
     ]
 
 
@@ -233,10 +309,19 @@ def _wall_oscillator(system: System, start: float | None) -> Iterator[Block]:
     k, c, wall = (system.get(f"model.{name}") for name in ("stiffness", "damping", "wall"))
     rows: list[Row] = []
     if k > 0:
-        frequency, ratio = math.sqrt(k), c / (2 * math.sqrt(k))
-        rows += [("natural frequency sqrt(k)", number(frequency)), ("damping ratio c / (2 sqrt(k))", number(ratio))]
+        frequency = math.sqrt(k)
+        ratio = c / (2 * math.sqrt(k))
+        rows += [
+            ("natural frequency sqrt(k)", number(frequency)),
+            ("damping ratio c / (2 sqrt(k))", number(ratio)),
+        ]
         if ratio < 1:
-            rows.append(("free period away from the wall", number(2 * math.pi / (frequency * math.sqrt(1 - ratio**2)))))
+            rows.append(
+                (
+                    "free period away from the wall",
+                    number(2 * math.pi / (frequency * math.sqrt(1 - ratio**2))),
+                )
+            )
         force = mean(system.load.channels["force"]) if "force" in system.load.channels else 0.0
         place = force / k
         held = f"on the wall, x = {number(wall)}" if place >= wall else f"x = {number(place)}"
@@ -296,11 +381,23 @@ def attempt(formula: Callable[[], str]) -> str:
 
 def mean_load(load: Load) -> Load:
     """The constant parts of all forces, to which closed forms for constant loads can be applied."""
-    return Load(**{name: mean(signal) for name, signal in load.channels.items() if not name.startswith("ground")})
+    return Load(
+        **{
+            name: mean(signal)
+            for name, signal in load.channels.items()
+            if not name.startswith("ground")
+        }
+    )
 
 
 def mean(signal: Signal) -> float:
     """The constant part of a signal; 0 for a record."""
     if isinstance(signal, Sum):
         return sum(mean(term) for term in signal.terms)
-    return signal.value if isinstance(signal, Constant) else signal.mean if isinstance(signal, Harmonic) else 0.0
+    return (
+        signal.value
+        if isinstance(signal, Constant)
+        else signal.mean
+        if isinstance(signal, Harmonic)
+        else 0.0
+    )

@@ -1,5 +1,5 @@
-"""`saltus simulate`, `run`, `plot`, `page` and `explore`: a study's motion and the answers to its questions, computed, written
-and drawn, and its page."""
+"""`saltus simulate`, `run`, `plot`, `page` and `explore`: a study's motion and the answers to its
+questions, computed, written and drawn, and its page."""
 
 from __future__ import annotations
 
@@ -19,17 +19,21 @@ if TYPE_CHECKING:
     from saltus.flow import Motion
 
 DIAGRAMS = ("response_spectrum", "bifurcation_diagram")
-SWEPT = ("basins", "stability_chart", *DIAGRAMS)  # computed in parts into a store, so that a run that was stopped goes on
+# computed in parts into a store, so that a run that was stopped goes on
+SWEPT = ("basins", "stability_chart", *DIAGRAMS)
 
 
-def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False) -> None:
-    """Answer every question of the study at `path` into `output`, the motion first; `fresh` begins every store anew.
+def run_study(
+    path: Path, output: Path | None, plot: bool, scheduler: str | None, fresh: bool = False
+) -> None:
+    """Answer every question of the study at `path` into `output`, the motion first; `fresh` begins
+    every store anew.
 
     Raises
     ------
     SaltusError
-        A bad study or one that asks nothing, a folder that cannot be written to, a scheduler that does not answer,
-        all before anything is computed; then what a question's function raises.
+        A bad study or one that asks nothing, a folder that cannot be written to, a scheduler that
+        does not answer, all before anything is computed; then what a question's function raises.
     """
     from saltus.config import load_study
     from saltus.files import check_writable
@@ -38,7 +42,11 @@ def run_study(path: Path, output: Path | None, plot: bool, scheduler: str | None
     study = load_study(path)
     if study.simulate is None and not study.asks:
         study.source.refuse(
-            (), "asks for nothing; add [simulate], or [response_spectrum], [stability_chart], ... (docs/study.md)"
+            (),
+            (
+                "asks for nothing; add [simulate], or [response_spectrum], [stability_chart], ... "
+                "(docs/study.md)"
+            ),
         )
     output = Path("results") / study.name if output is None else output
     check_writable(output)
@@ -63,7 +71,9 @@ def check(study: Study, ask: Ask, output: Path | None) -> None:
         An argument without meaning, or a store of something else in `output`, if that is given.
     """
     function: Any = ask.function
-    store = {} if output is None or ask.kind not in SWEPT else {"store": output / f"{ask.kind}.zarr"}
+    store = (
+        {} if output is None or ask.kind not in SWEPT else {"store": output / f"{ask.kind}.zarr"}
+    )
     study.answer(ask, function.check, **store)
 
 
@@ -74,10 +84,14 @@ def check_scheduler(study: Study, scheduler: str) -> None:
     from saltus.sweep import on_cluster
 
     if "://" not in scheduler:
-        raise ParameterError(f"--scheduler must be an address such as tcp://host:8786, got {scheduler!r}")
+        raise ParameterError(
+            f"--scheduler must be an address such as tcp://host:8786, got {scheduler!r}"
+        )
     if not any(ask.kind in SWEPT for ask in study.asks):
         known = "diagrams, [stability_chart] and [basins]"
-        raise ParameterError(f"--scheduler is for {known}, of which the study has none; leave it out")
+        raise ParameterError(
+            f"--scheduler is for {known}, of which the study has none; leave it out"
+        )
     unused: Any = None
     next(on_cluster(unused, deque(), scheduler), None)  # connects without computing a chunk
 
@@ -94,15 +108,24 @@ def answer(study: Study, ask: Ask, output: Path, plot: bool, scheduler: str | No
         files = written(ask, data, output, plot)
     for line in summarise(ask.kind, data):
         console.print(line, markup=False, soft_wrap=True)
-    console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
+    console.print(
+        f"Results are in {output}: {', '.join(file.name for file in files)}",
+        markup=False,
+        soft_wrap=True,
+    )
 
 
-def computed(study: Study, ask: Ask, output: Path, progress: Progress, scheduler: str | None) -> Any:
+def computed(
+    study: Study, ask: Ask, output: Path, progress: Progress, scheduler: str | None
+) -> Any:
     """The Dataset or DataTree that answers a question."""
     from saltus.flow import available_cores
 
-    more: dict[str, Any] = {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
-    known = type(study.system.model).__module__.startswith("saltus.")  # other processes do not know a model of one's own
+    more: dict[str, Any] = (
+        {"store": output / f"{ask.kind}.zarr", "scheduler": scheduler} if ask.kind in SWEPT else {}
+    )
+    # other processes do not know a model of one's own
+    known = type(study.system.model).__module__.startswith("saltus.")
     if ask.kind in DIAGRAMS and scheduler is None and known and available_cores() > 1:
         more["workers"] = available_cores()
     data = study.answer(ask, ask.function, progress=progress, **more)
@@ -118,7 +141,9 @@ def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
         files = [store]
     else:
         data.attrs["kind"] = ask.kind
-        files = [write_dataset(output / f"{ask.kind}.nc", data)] + ([store] if ask.kind in SWEPT else [])
+        files = [write_dataset(output / f"{ask.kind}.nc", data)] + (
+            [store] if ask.kind in SWEPT else []
+        )
     if plot:
         files += draw_file(files[0], output / ask.kind, data)
     return files
@@ -128,9 +153,11 @@ def written(ask: Ask, data: Any, output: Path, plot: bool) -> list[Path]:
 class SampleSettings:
     """How densely a motion is written if the study does not say it."""
 
-    max_samples: int = 1_000_000  # With more samples other programs could not read motion.nc at once.
+    # With more samples other programs could not read motion.nc at once.
+    max_samples: int = 1_000_000
     per_period: int = 200  # Number of samples in a forcing period if the study gives none.
-    max_dense_periods: int = 20_000  # The dense output of a longer motion takes more memory than a laptop has.
+    # The dense output of a longer motion takes more memory than a laptop has.
+    max_dense_periods: int = 20_000
 
 
 SETTINGS = SampleSettings()
@@ -142,7 +169,8 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
     Raises
     ------
     SaltusError
-        A bad study, a folder that cannot be written to (before anything is computed), a motion that cannot go on.
+        A bad study, a folder that cannot be written to (before anything is computed), a motion that
+        cannot go on.
     """
     from saltus.cli.guard import progress_bar
     from saltus.cli.summaries import print_summary
@@ -159,11 +187,17 @@ def simulate_study(path: Path, output: Path | None, plot: bool) -> None:
         files = write_motion(motion, study, output, plot)
     console = Console(highlight=False)
     print_summary(motion, console)
-    console.print(f"Results are in {output}: {', '.join(file.name for file in files)}", markup=False, soft_wrap=True)
+    console.print(
+        f"Results are in {output}: {', '.join(file.name for file in files)}",
+        markup=False,
+        soft_wrap=True,
+    )
 
 
 def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list[Path]:
-    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each complete or not at all; their paths."""
+    """Write motion.nc and, with `plot`, motion.png and motion.pdf, each complete or not at all;
+    their paths.
+    """
     from saltus.files import write_dataset, write_figure
 
     dataset = motion.to_xarray(sample_times(motion, study.settings().samples))
@@ -179,10 +213,13 @@ def write_motion(motion: Motion, study: Study, output: Path, plot: bool) -> list
 
 
 def long_samples(study: Study) -> Any:
-    """The times at which states are kept if a motion is too long for dense output; None if it is not."""
+    """The times at which states are kept if a motion is too long for dense output; None if it is
+    not.
+    """
     import numpy as np
 
-    given, period = study.settings().arguments, study.system.load.period
+    given = study.settings().arguments
+    period = study.system.load.period
     span = given["periods"] * (period or 1.0) if "periods" in given else given["duration"]
     if span / (period or 2 * np.pi) <= SETTINGS.max_dense_periods:
         return None
@@ -195,34 +232,47 @@ def sample_times(motion: Motion, samples: int | None) -> Any:
     import numpy as np
 
     period = motion.system.load.period
-    short = period is None or SETTINGS.per_period * (motion.time - motion.start) / period <= SETTINGS.max_samples
+    short = (
+        period is None
+        or SETTINGS.per_period * (motion.time - motion.start) / period <= SETTINGS.max_samples
+    )
     if motion.kept is not None or (samples is None and short):
         return None
-    return np.linspace(motion.start, motion.time, SETTINGS.max_samples if samples is None else samples)
+    return np.linspace(
+        motion.start, motion.time, SETTINGS.max_samples if samples is None else samples
+    )
 
 
 def plot_store(path: Path, output: Path | None) -> None:
-    """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the folder `output`.
+    """Draw the result at `path` (netCDF, or the Zarr store of a sweep) beside it, or into the
+    folder `output`.
 
     Raises
     ------
     ParameterError
-        There is no result of saltus at `path`, a sweep is not complete, `output` is no folder or cannot be written to.
+        There is no result of saltus at `path`, a sweep is not complete, `output` is no folder or
+        cannot be written to.
     """
     from saltus.config import open_result
     from saltus.files import UNCHECKED, check_writable, has_checksum
 
     folder = path.parent if output is None else output
     if folder.suffix in (".png", ".pdf") and not folder.is_dir():
-        raise ParameterError(f"--output names a folder, in which the picture is {path.stem}.png, got {folder}")
+        raise ParameterError(
+            f"--output names a folder, in which the picture is {path.stem}.png, got {folder}"
+        )
     check_writable(folder)
     data = open_result(path)
     _check_sizes(path, data)
     files = draw_file(path, folder / path.stem, data)
     names = ", ".join(file.name for file in files)
     if path.is_file() and not has_checksum(path.read_bytes()):
-        Console(highlight=False, stderr=True).print(f"{path} {UNCHECKED}.", markup=False, soft_wrap=True)
-    Console(highlight=False).print(f"The picture is in {folder}: {names}", markup=False, soft_wrap=True)
+        Console(highlight=False, stderr=True).print(
+            f"{path} {UNCHECKED}.", markup=False, soft_wrap=True
+        )
+    Console(highlight=False).print(
+        f"The picture is in {folder}: {names}", markup=False, soft_wrap=True
+    )
 
 
 def _check_sizes(path: Path, data: Any) -> None:
@@ -233,8 +283,14 @@ def _check_sizes(path: Path, data: Any) -> None:
 
     for node in getattr(data, "subtree", (data,)):
         for name, variable in node.variables.items():
-            if variable.dtype.kind == "f" and (np.isfinite(variable.values) & (np.abs(variable.values) > LIMITS.value)).any():
-                raise ParameterError(f"{path} cannot be drawn: {name!s:.60} has numbers above {LIMITS.value:g} in size")
+            if (
+                variable.dtype.kind == "f"
+                and (np.isfinite(variable.values) & (np.abs(variable.values) > LIMITS.value)).any()
+            ):
+                raise ParameterError(
+                    f"{path} cannot be drawn: {name!s:.60} has numbers above {LIMITS.value:g} in "
+                    "size"
+                )
 
 
 def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
@@ -252,7 +308,10 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     kind = kind_of(data)
     if kind not in DRAWINGS:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
-        raise ParameterError(f"{path} is no result that `saltus plot` draws: {what:.60}; it draws {', '.join(DRAWINGS)}")
+        raise ParameterError(
+            f"{path} is no result that `saltus plot` draws: {what:.60}; it draws "
+            f"{', '.join(DRAWINGS)}"
+        )
     try:
         with style():
             return write_figure(stem, figure_of(DRAWINGS[kind](data)))
@@ -261,10 +320,14 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     except Exception as error:  # a file of another program may lack anything, or contain anything
         said = "" if isinstance(error, SaltusError) else f"{type(error).__name__}: "
         said += " ".join(str(error).split())
-        raise ParameterError(f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})") from None
+        raise ParameterError(
+            f"{path} says that it is of the kind {kind!r}, but it cannot be drawn ({said:.150})"
+        ) from None
 
 
-def write_page(path: Path, results: Iterable[Path], output: Path | None, show: bool = False) -> None:
+def write_page(
+    path: Path, results: Iterable[Path], output: Path | None, show: bool = False
+) -> None:
     """Write the page of the study at `path`, open it if it is to be shown, and print where it is.
 
     Raises
@@ -280,8 +343,14 @@ def write_page(path: Path, results: Iterable[Path], output: Path | None, show: b
     given = dict(study.simulate.arguments) if study.simulate else {}
     known = (*study.system.model.coordinates, "velocity", "periods", "duration", "tol", "time")
     settings = {name: value for name, value in given.items() if name in known}
-    file = (Path("results") / study.name if show else Path()) / f"{study.name}.html" if output is None else output
-    made = saltus.page(study.system, *map(saltus.load, results), path=file, title=study.name, **settings)
+    file = (
+        (Path("results") / study.name if show else Path()) / f"{study.name}.html"
+        if output is None
+        else output
+    )
+    made = saltus.page(
+        study.system, *map(saltus.load, results), path=file, title=study.name, **settings
+    )
     opened = show and webbrowser.open(made.absolute().as_uri())
     said = "your browser opens it" if opened else "open it in a browser"
     Console(highlight=False).print(f"The page is {made}; {said}.", markup=False, soft_wrap=True)

@@ -1,4 +1,6 @@
-"""Summaries of a motion, of the answers to a study's questions, and of how far a sweep is (`saltus status`), in a few lines."""
+"""Summaries of a motion, of the answers to a study's questions, and of how far a sweep is (`saltus
+status`), in a few lines.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ if TYPE_CHECKING:
 
 
 def print_summary(motion: Motion, console: Console) -> None:
-    """Print the end state, the impacts, why the motion ended, and whether the mechanism could follow it."""
+    """Print the end state, the impacts, why the motion ended, and whether the mechanism could
+    follow it.
+    """
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -41,7 +45,9 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
         rows.append((f"{name} at the end", f"{position:.15g}"))
         rows.append((f"{name}' at the end", f"{velocity:.15g}"))
     period = motion.system.load.period
-    count = "" if period is None else f", {(motion.time - motion.start) / period:.6g} forcing periods"
+    count = (
+        "" if period is None else f", {(motion.time - motion.start) / period:.6g} forcing periods"
+    )
     end = motion.stop.meaning + (f": {motion.limit}" if motion.limit else "")
     return [("end", end), ("time", f"{motion.start:.12g} to {motion.time:.12g}{count}"), *rows]
 
@@ -56,7 +62,9 @@ def _events(motion: Motion) -> list[tuple[str, str]]:
     rows = [("impacts", f"{len(impacts)}{last}")]
     kinds = Counter(event.kind for event in motion.events if event.kind is not EventKind.IMPACT)
     if kinds:
-        rows.append(("other events", ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))))
+        rows.append(
+            ("other events", ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())))
+        )
     rest = motion.rest_time
     rows.append(("at rest from", "not at rest at the end" if rest is None else f"{rest:.15g}"))
     if not motion.phase_known:
@@ -68,12 +76,19 @@ def _validity(motion: Motion) -> list[tuple[str, str]]:
     rows = []
     for name, first in motion.validity.first.items():
         share = 100 * motion.validity.share[name]
-        verdict = "respected" if first is None else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
+        verdict = (
+            "respected"
+            if first is None
+            else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
+        )
         rows.append((name.replace("_", " "), verdict))
-    return rows + [(f"impacts at {name}", motion.validity.gain(name)) for name in motion.validity.gains]
+    return rows + [
+        (f"impacts at {name}", motion.validity.gain(name)) for name in motion.validity.gains
+    ]
 
 
-MOST_LISTED = 8  # the most special points, or failed chunks, that are named; further ones are only counted
+# the most special points, or failed chunks, that are named; further ones are only counted
+MOST_LISTED = 8
 
 
 def summarise(kind: str, data: Any) -> Iterator[str]:
@@ -94,11 +109,18 @@ def _chart(data: Any) -> Iterator[str]:
         yield from _chart(data["chart"].to_dataset())
         yield from _borders(data)
         return
-    moving, unit = int((data["count"] > 0).sum()), data["amplitude"].attrs["units"].replace("1", "")
+    moving = int((data["count"] > 0).sum())
+    unit = data["amplitude"].attrs["units"].replace("1", "")
     text = f"Stable motions beside rest in {moving} of {data['count'].size} cells"
-    yield text + (f", the largest amplitude is {float(data['amplitude'].max()):.4g} {unit}".rstrip() + "." if moving else ".")
+    yield text + (
+        f", the largest amplitude is {float(data['amplitude'].max()):.4g} {unit}".rstrip() + "."
+        if moving
+        else "."
+    )
     outcome = data["outcome"]
-    for value, name in zip(outcome.attrs["flag_values"], outcome.attrs["flag_meanings"].split(), strict=True):
+    for value, name in zip(
+        outcome.attrs["flag_values"], outcome.attrs["flag_meanings"].split(), strict=True
+    ):
         number = int((outcome == value).sum())
         if number and name in ("chaos", "motions_and_chaos", "long", "undecided"):
             yield f"{name.replace('_', ' ').capitalize()} in {number} cells."
@@ -108,9 +130,12 @@ def _borders(tree: Any) -> Iterator[str]:
     """What is known of the changes between neighbouring cells."""
     from saltus.plots import border_curves
 
-    left, kinds = tree["disagreements"].to_dataset(), [str(curve.attrs["kind"]) for curve in border_curves(tree)]
+    left = tree["disagreements"].to_dataset()
+    kinds = [str(curve.attrs["kind"]) for curve in border_curves(tree)]
     curves = ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds))) or "none"
-    total, located, harmless = (int(left.attrs[name]) for name in ("changes", "located", "harmless"))
+    total, located, harmless = (
+        int(left.attrs[name]) for name in ("changes", "located", "harmless")
+    )
     added = int(tree["chart"].attrs["added_by_continuation"])
     yield (
         f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells {located} are located between "
@@ -128,23 +153,32 @@ def _diagram(tree: Any) -> Iterator[str]:
         special = (branch[name].values for name in ("kind", "special_parameter"))
         kinds = [f"{kind} {value:.6g}" for kind, value in zip(*special, strict=True)]
         more = f" and {len(kinds) - MOST_LISTED} more" if len(kinds) > MOST_LISTED else ""
-        period = int(branch["period"].max())  # at an end at its own image, a branch has the orbit of half the period
-        x, listed = branch["parameter"].values, ", ".join(kinds[:MOST_LISTED]) or "no special points"
+        # at an end at its own image, a branch has the orbit of half the period
+        period = int(branch["period"].max())
+        x = branch["parameter"].values
+        listed = ", ".join(kinds[:MOST_LISTED]) or "no special points"
         yield (
             f"branch {number}: period {period}, {path} {x.min():.6g} to {x.max():.6g}, "
             f"{int(branch['stable'].sum())} of {x.size} points stable; {listed}{more}"
         )
-    for low, high, rate in zip(*(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True):
+    for low, high, rate in zip(
+        *(tree["bands"][name].values for name in ("low", "high", "exponent")), strict=True
+    ):
         yield f"chaos: {path} {low:.6g} to {high:.6g}, largest exponent {rate:.3g}"
 
 
 def _sweep(data: Any) -> Iterator[str]:
-    path, reached = data.attrs["path"], int(data["amplitude"].notnull().all("direction").sum())
+    path = data.attrs["path"]
+    reached = int(data["amplitude"].notnull().all("direction").sum())
     yield f"{reached} values of {path} up and down; they differ at {int(data['hysteresis'].sum())}."
     for jump in range(data.sizes["jump"]):
-        way, *numbers = (data[f"jump_{name}"].values[jump] for name in ("direction", "before", "after"))
+        way, *numbers = (
+            data[f"jump_{name}"].values[jump] for name in ("direction", "before", "after")
+        )
         sizes = (float(data[f"jump_amplitude_{when}"][jump]) for when in ("before", "after"))
-        yield "{}: a jump between {:.8g} and {:.8g}, amplitude {:.4g} to {:.4g}".format(way, *numbers, *sizes)
+        yield "{}: a jump between {:.8g} and {:.8g}, amplitude {:.4g} to {:.4g}".format(
+            way, *numbers, *sizes
+        )
 
 
 def _attractors(data: Any) -> Iterator[str]:
@@ -152,7 +186,8 @@ def _attractors(data: Any) -> Iterator[str]:
     for i, label in enumerate(data["attractor"].values):
         periods = int(data["attractor_period"][i])
         kind = str(data["attractor_kind"].values[i]) + (f", period {periods}" if periods else "")
-        part, size = 100 * float(data[share][i]), float(data["amplitude"][i])
+        part = 100 * float(data[share][i])
+        size = float(data["amplitude"][i])
         yield f"{int(label)}: {kind}, amplitude {size:.4g}, {part:.3g} % of the {of}"
     left = float(data.attrs.get("undecided", 0.0))
     if left:
@@ -174,10 +209,11 @@ SEARCH = "diagram"  # the kind of a store whose number of parts is not known bef
 
 
 def print_status(path: Path, verify: bool = False) -> None:
-    """Print how far the sweep in the store at `path` is, from its files alone: it may be running, stopped or killed.
+    """Print how far the sweep in the store at `path` is, from its files alone: it may be running,
+    stopped or killed.
 
-    Of a folder with stores inside, each is told. With `verify`, every file is compared with its checksum; `path` may then also
-    be a netCDF file.
+    Of a folder with stores inside, each is told. With `verify`, every file is compared with its
+    checksum; `path` may then also be a netCDF file.
 
     Raises
     ------
@@ -186,10 +222,16 @@ def print_status(path: Path, verify: bool = False) -> None:
     """
     from saltus.sweep import damage, status
 
-    if verify and not (path / "zarr.json").is_file() and (path.suffix != ".zarr" or not path.exists()):
+    if (
+        verify
+        and not (path / "zarr.json").is_file()
+        and (path.suffix != ".zarr" or not path.exists())
+    ):
         print_verified(path)
         return
-    within = sorted(path.rglob("*.zarr")) if path.is_dir() and not (path / "zarr.json").is_file() else []
+    within = (
+        sorted(path.rglob("*.zarr")) if path.is_dir() and not (path / "zarr.json").is_file() else []
+    )
     if within:
         for store in within:
             print_status(store)
@@ -208,14 +250,17 @@ def print_status(path: Path, verify: bool = False) -> None:
         table.add_row(head, Text(printable(text)))
     console.print(table)
     if found.damaged:
-        raise ParameterError(f"{damage(found)}; start the sweep again, and what they held is computed anew")
+        raise ParameterError(
+            f"{damage(found)}; start the sweep again, and what they held is computed anew"
+        )
     console.print(ending(found), markup=False, soft_wrap=True)
     if verify:
         console.print("Every file is what was written.", markup=False)
 
 
 def print_verified(path: Path) -> None:
-    """Print whether the netCDF file at `path`, or each result below that folder, is still as it was written.
+    """Print whether the netCDF file at `path`, or each result below that folder, is still as it was
+    written.
 
     Raises
     ------
@@ -225,18 +270,25 @@ def print_verified(path: Path) -> None:
     from saltus.files import UNCHECKED, checked_content, has_checksum
     from saltus.sweep import damage, status
 
-    found = [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
-    console, wrong = Console(highlight=False), list[str]()
+    found = (
+        [path] if path.is_file() else [*sorted(path.rglob("*.nc")), *sorted(path.rglob("*.zarr"))]
+    )
+    console = Console(highlight=False)
+    wrong = list[str]()
     if not found:
-        raise ParameterError(f"there is no result of saltus at {path}; give a .nc file, a .zarr folder, or a folder with such")
+        raise ParameterError(
+            f"there is no result of saltus at {path}; give a .nc file, a .zarr folder, or a folder with such"
+        )
     for file in found:
         try:
             if file.is_dir():
                 store = status(file, verify=True)
-                said, bad = "sound", damage(store) if store.damaged else ""
+                said = "sound"
+                bad = damage(store) if store.damaged else ""
             else:
                 checked_content(file)
-                said, bad = "sound" if has_checksum(file.read_bytes()) else UNCHECKED, ""
+                said = "sound" if has_checksum(file.read_bytes()) else UNCHECKED
+                bad = ""
         except ParameterError as error:
             bad = str(error)
         wrong += [bad] if bad else []
@@ -277,7 +329,8 @@ def ending(found: StoreStatus) -> str:
 
 def size(count: int) -> str:
     """A number of bytes, in the unit that fits."""
-    value, unit = float(count), "B"
+    value = float(count)
+    unit = "B"
     for larger in ("kB", "MB", "GB", "TB"):
         if value < 1000:
             break

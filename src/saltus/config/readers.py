@@ -1,4 +1,6 @@
-"""The file of a study, refusals that name it, and how its values are read: a function for each kind."""
+"""The file of a study, refusals that name it, and how its values are read: a function for each
+kind.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ class Source:
     path: Path
 
     def refuse(self, keys: Keys, problem: str) -> NoReturn:
-        """Raise a ParameterError of one sentence: the file and the `problem`, which names the dotted key."""
+        """Raise a ParameterError of one sentence: the file and the `problem`, which names the
+        dotted key.
+        """
         raise ParameterError(one_line(f"{self.path}: {problem}"), ".".join(keys) or "path")
 
     def refuse_error(self, error: ParameterError) -> NoReturn:
@@ -37,8 +41,12 @@ class Source:
 
 
 def one_line(text: str) -> str:
-    """`text` with line breaks and other control characters, which a quoted key may hold, written as escapes."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    """`text` with line breaks and other control characters, which a quoted key may hold, written as
+    escapes.
+    """
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+    )
 
 
 def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
@@ -51,11 +59,16 @@ def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
     """
     source = Source(path)
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):  # reading a device or a pipe may never end
+        # reading a device or a pipe may never end
+        if path.exists() and not (path.is_file() or path.is_dir()):
             source.refuse((), "is no file; give the path of a study in TOML")
         if path.is_file() and path.stat().st_size > LIMITS.count:
             source.refuse(
-                (), f"has {path.stat().st_size} bytes; a study has at most {LIMITS.count}, long records have files of their own"
+                (),
+                (
+                    f"has {path.stat().st_size} bytes; a study has at most {LIMITS.count}, long "
+                    "records have files of their own"
+                ),
             )
         text = path.read_text(encoding="utf-8-sig")
     except ParameterError:
@@ -81,16 +94,20 @@ def _syntax_problem(message: str) -> str:
     if place is None:
         return f"is not valid TOML: {message[:1].lower()}{message[1:]}"
     problem = message[: place.start()]
-    return f"line {place[1]}, column {place[2]} is not valid TOML: {problem[:1].lower()}{problem[1:]}"
+    return (
+        f"line {place[1]}, column {place[2]} is not valid TOML: {problem[:1].lower()}{problem[1:]}"
+    )
 
 
-Reader = Callable[[Any], Any]  # gives the value, or raises a ValueError such as "must be a number, got true"
+# gives the value, or raises a ValueError such as "must be a number, got true"
+Reader = Callable[[Any], Any]
 Pair = tuple[float, float]
 
 ANGLE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|°)\s*")
 SPACED = ("from", "to", "count")
 EXAMPLE = "{ from = 0, to = 0.5, count = 101 }"
-MAX_COUNT = 100_000  # The longest axis: a longer one is a typing error, as a chart of that width takes years.
+# The longest axis: a longer one is a typing error, as a chart of that width takes years.
+MAX_COUNT = 100_000
 
 
 def show(value: Any) -> str:
@@ -100,10 +117,16 @@ def show(value: Any) -> str:
     if isinstance(value, str):
         text = value if len(value) <= 40 else value[:37] + "..."
         return "the text " + '"' + text.encode("unicode_escape").decode("ascii") + '"'
-    for kind, name in ((Mapping, "a table"), ((list, tuple), "a list"), ((datetime.date, datetime.time), "a date or a time")):
+    for kind, name in (
+        (Mapping, "a table"),
+        ((list, tuple), "a list"),
+        ((datetime.date, datetime.time), "a date or a time"),
+    ):
         if isinstance(value, kind):
             return name
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a very large number"
+    text = (
+        repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a very large number"
+    )
     return text if len(text) <= 40 else text[:37] + "..."
 
 
@@ -150,7 +173,10 @@ def read_angle(value: Any) -> float:
         return read_number(value)
     match = ANGLE.fullmatch(value)
     if match is None:
-        raise ValueError(f'must be an angle such as "80 deg", "1.4 rad" or a number of radians without quotes, got {show(value)}')
+        raise ValueError(
+            'must be an angle such as "80 deg", "1.4 rad" or a number of radians without '
+            f"quotes, got {show(value)}"
+        )
     number = read_number(float(match[1]))
     return number if match[2] == "rad" else math.radians(number)
 
@@ -199,12 +225,18 @@ def _spaced(table: dict[str, Any]) -> np.ndarray:
         raise ValueError(f"has the unknown key {unknown[0]!r}; {near(str(unknown[0]), SPACED)}")
     missing = [name for name in SPACED if name not in table]
     if missing:
-        raise ValueError(f"needs from, to and count, such as {EXAMPLE}, and has no {' and no '.join(missing)}")
-    low, high, count = _part(table, "from", read_angle), _part(table, "to", read_angle), _part(table, "count", read_whole)
+        raise ValueError(
+            f"needs from, to and count, such as {EXAMPLE}, and has no {' and no '.join(missing)}"
+        )
+    low = _part(table, "from", read_angle)
+    high = _part(table, "to", read_angle)
+    count = _part(table, "count", read_whole)
     if not 2 <= count <= MAX_COUNT:
         raise ValueError(f"needs a count from 2 to {MAX_COUNT}, got {show(table['count'])}")
     if low >= high:
-        raise ValueError(f"must go from the smaller number to the larger one, got from = {low:g}, to = {high:g}")
+        raise ValueError(
+            f"must go from the smaller number to the larger one, got from = {low:g}, to = {high:g}"
+        )
     return np.linspace(low, high, count)
 
 
@@ -229,13 +261,22 @@ def read_pairs(value: Any) -> tuple[tuple[float, float], ...]:
     try:
         return tuple(read_pair(item) for item in value)
     except ValueError as error:
-        raise ValueError(f"must be pairs of numbers, such as [[-2, 2], [-2, 2]], of which each {error}") from None
+        raise ValueError(
+            f"must be pairs of numbers, such as [[-2, 2], [-2, 2]], of which each {error}"
+        ) from None
 
 
 def read_paths(value: Any) -> tuple[str, str]:
     """Two dotted paths."""
-    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(item, str) for item in value):
-        raise ValueError(f'must be two dotted paths, such as ["load.horizontal.amplitude", "load.vertical"], got {show(value)}')
+    if (
+        not isinstance(value, list)
+        or len(value) != 2
+        or not all(isinstance(item, str) for item in value)
+    ):
+        raise ValueError(
+            'must be two dotted paths, such as ["load.horizontal.amplitude", "load.vertical"], '
+            f"got {show(value)}"
+        )
     return value[0], value[1]
 
 
@@ -272,22 +313,30 @@ READERS: dict[Any, Reader] = {
 
 
 def reader_of(hint: Any) -> Reader | None:
-    """The reader of values of a type, or None if a file cannot give such values; X | None is an X that may be left out."""
+    """The reader of values of a type, or None if a file cannot give such values; X | None is an X
+    that may be left out.
+    """
     kinds = [kind for kind in typing.get_args(hint) if kind is not type(None)]
-    return READERS.get(kinds[0] if len(kinds) == 1 and type(None) in typing.get_args(hint) else hint)
+    return READERS.get(
+        kinds[0] if len(kinds) == 1 and type(None) in typing.get_args(hint) else hint
+    )
 
 
 def readers_of(cls: type) -> dict[str, Reader]:
     """The readers of the fields of a dataclass; a field whose metadata says "rad" is an angle."""
     hints = typing.get_type_hints(cls)
     return {
-        f.name: read_angle if f.metadata.get("unit") == "rad" else reader_of(hints.get(f.name)) or read_anything
+        f.name: read_angle
+        if f.metadata.get("unit") == "rad"
+        else reader_of(hints.get(f.name)) or read_anything
         for f in dataclasses.fields(cls)
         if f.init and not f.name.startswith("_")
     }
 
 
-def read_table(source: Source, keys: Keys, data: Any, readers: Mapping[str, Reader]) -> dict[str, Any]:
+def read_table(
+    source: Source, keys: Keys, data: Any, readers: Mapping[str, Reader]
+) -> dict[str, Any]:
     """The values in the table `data` that stands at `keys`, each as its reader gives it."""
     name = ".".join(keys)
     if not isinstance(data, Mapping):

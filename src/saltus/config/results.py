@@ -19,18 +19,21 @@ if TYPE_CHECKING:
 
     from saltus.config.study import Study
 
-PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}  # what stores keep beside a netCDF file
+# what stores keep beside a netCDF file
+PARTIAL = {"basin_cells": "the cells of basins", "diagram": "the parts of a diagram"}
 LONGEST_MATLAB_NAME = 63  # the most characters of a name in MATLAB
 
 
 @answered
 def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
-    """The contents of a file or a folder that saltus has written, or that describes a study or a system.
+    """The contents of a file or a folder that saltus has written, or that describes a study or a
+    system.
 
-    A result in netCDF (.nc) becomes a Dataset or a DataTree, whose attribute `kind` says which result it is; the complete store
-    of a sweep (a folder) a Dataset; a study (.toml) a `Study`; a system (.json, of `System.to_json`) a `System`. The orbits of a
-    branch are given by `saltus.orbits.orbits_of(load(...))`. No code in a result is run; Python files with models that a study
-    names are run.
+    A result in netCDF (.nc) becomes a Dataset or a DataTree, whose attribute `kind` says which
+    result it is; the complete store of a sweep (a folder) a Dataset; a study (.toml) a `Study`; a
+    system (.json, of `System.to_json`) a `System`. The orbits of a branch are given by
+    `saltus.orbits.orbits_of(load(...))`. No code in a result is run; Python files with models that
+    a study names are run.
 
     Parameters
     ----------
@@ -51,7 +54,13 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
     """
     path = Path(path)
     if not os.path.exists(path):  # which a name that is too long is not, either
-        raise ParameterError(f"there is no file or folder {path}; give a .nc, .zarr, .toml or .json that saltus can read", "path")
+        raise ParameterError(
+            (
+                f"there is no file or folder {path}; give a .nc, .zarr, .toml or .json that saltus "
+                "can read"
+            ),
+            "path",
+        )
     if path.is_dir() or path.suffix not in (".toml", ".json"):
         try:
             found: xarray.Dataset | xarray.DataTree = open_result(path)
@@ -75,12 +84,19 @@ def open_result(path: Path) -> Any:
     Raises
     ------
     ParameterError
-        No such file, or one that saltus has not written, or is damaged; a sweep that is not complete.
+        No such file, or one that saltus has not written, or is damaged; a sweep that is not
+        complete.
     """
     from saltus.files import read_dataset
 
     if not os.path.exists(path):  # which a name that is too long is not, either
-        raise ParameterError(f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has written", "path")
+        raise ParameterError(
+            (
+                f"there is no file or folder {path}; give the .nc or .zarr that `saltus run` has "
+                "written"
+            ),
+            "path",
+        )
     return _open_store(path) if path.is_dir() else read_dataset(path)
 
 
@@ -93,7 +109,10 @@ def _open_store(path: Path) -> Any:
     data = open_store(path)
     check_memory(str(path), float(data.nbytes), "its arrays")
     if kind_of(data) in PARTIAL:
-        raise ParameterError(f"{path} keeps {PARTIAL[kind_of(data)]} alone; read {path.with_suffix('.nc').name} beside it")
+        raise ParameterError(
+            f"{path} keeps {PARTIAL[kind_of(data)]} alone; read {path.with_suffix('.nc').name} "
+            "beside it"
+        )
     return data
 
 
@@ -104,19 +123,21 @@ def kind_of(data: Any) -> str:
 
 @answered
 def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
-    """Write a result, a picture or a text to a file that is complete or not there, also after a kill; returns its path.
+    """Write a result, a picture or a text to a file that is complete or not there, also after a
+    kill; returns its path.
 
-    Results become netCDF with a checksum behind it, which `load` compares; a dataset of one's own gets the version of saltus
-    among its attributes. A picture has the format that its suffix names, and the same bytes whenever it is drawn again. Folders
-    are made as needed.
+    Results become netCDF with a checksum behind it, which `load` compares; a dataset of one's own
+    gets the version of saltus among its attributes. A picture has the format that its suffix names,
+    and the same bytes whenever it is drawn again. Folders are made as needed.
 
     Parameters
     ----------
     path
-        The file; that of a result ends in ".nc". If there is no suffix, ".nc" is appended for a result, ".png" for a picture.
+        The file; that of a result ends in ".nc". If there is no suffix, ".nc" is appended for a
+        result, ".png" for a picture.
     result
-        A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a Matplotlib figure, or axes, such as
-        `plot` returns; a text, or bytes.
+        A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a Matplotlib
+        figure, or axes, such as `plot` returns; a text, or bytes.
     title
         The title of a picture in the description of a PDF.
 
@@ -143,17 +164,28 @@ def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
         if hasattr(data, "data_vars") and hasattr(data, "attrs"):
             path = path if path.suffix else path.with_suffix(".nc")
             if path.suffix.lower() != ".nc":
-                others = "`to_csv` writes tables, `to_mat` files for MATLAB; a picture, as of `plot`, ends in .png, .pdf or .svg"
-                raise ParameterError(f"{path} must end in .nc, as a result becomes netCDF; {others}", "path")
+                others = (
+                    "`to_csv` writes tables, `to_mat` files for MATLAB; a picture, as of "
+                    "`plot`, ends in .png, .pdf or .svg"
+                )
+                raise ParameterError(
+                    f"{path} must end in .nc, as a result becomes netCDF; {others}", "path"
+                )
             return files.write_dataset(path, _with_version(data))
         figure = _figure_of(data)
         if figure is None:
             raise ParameterError(
-                f"result must be a Dataset, a DataTree, a figure, a text or what has to_xarray, got {shown(result)}", "result"
+                (
+                    "result must be a Dataset, a DataTree, a figure, a text or what has to_xarray, "
+                    f"got {shown(result)}"
+                ),
+                "result",
             )
         return files.write_picture(path if path.suffix else path.with_suffix(".png"), figure, title)
     except OSError as error:
-        raise ParameterError(f"{path} cannot be written ({(error.strerror or str(error)).lower()})", "path") from error
+        raise ParameterError(
+            f"{path} cannot be written ({(error.strerror or str(error)).lower()})", "path"
+        ) from error
 
 
 def _with_version(data: Any) -> Any:
@@ -176,10 +208,12 @@ def _figure_of(data: Any) -> Any:
 
 @answered
 def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) -> Path:
-    """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns its path.
+    """Write a result as a MATLAB file (version 5), which `load` of MATLAB and Octave reads; returns
+    its path.
 
-    Each variable and coordinate is an array under its name, in which characters that MATLAB does not take become "_"; texts are
-    cell arrays; `attributes` is a struct, and so is each group of a tree.
+    Each variable and coordinate is an array under its name, in which characters that MATLAB does
+    not take become "_"; texts are cell arrays; `attributes` is a struct, and so is each group of a
+    tree.
 
     Parameters
     ----------
@@ -207,7 +241,10 @@ def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) 
 
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not (hasattr(data, "data_vars") and hasattr(data, "attrs")):
-        raise ParameterError(f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}", "result")
+        raise ParameterError(
+            f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}",
+            "result",
+        )
     path = Path(path)
     if not path.name:
         raise ParameterError("path must name a file, such as motion.mat", "path")
@@ -218,8 +255,13 @@ def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) 
 
 def _struct(node: Any) -> dict[str, Any]:
     """A Dataset, or a node of a tree with its children, as arrays and structs by MATLAB's names."""
-    parts: dict[str, Any] = {str(name): _array(values.values) for name, values in {**node.coords, **node.data_vars}.items()}
-    parts["attributes"] = _named({str(name): _array(np.asarray(value)) for name, value in node.attrs.items()})
+    parts: dict[str, Any] = {
+        str(name): _array(values.values)
+        for name, values in {**node.coords, **node.data_vars}.items()
+    }
+    parts["attributes"] = _named(
+        {str(name): _array(np.asarray(value)) for name, value in node.attrs.items()}
+    )
     children = getattr(node, "children", {})
     return _named(parts | {str(name): _struct(child) for name, child in children.items()})
 
@@ -235,5 +277,7 @@ def _named(parts: dict[str, Any]) -> dict[str, Any]:
     names = [name if name[:1].isalpha() else f"x{name}"[:LONGEST_MATLAB_NAME] for name in names]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise ParameterError(f"two names of the result become {twice} in MATLAB; rename one", "result")
+        raise ParameterError(
+            f"two names of the result become {twice} in MATLAB; rename one", "result"
+        )
     return dict(zip(names, parts.values(), strict=True))

@@ -1,5 +1,5 @@
-"""A study: a system, how to simulate it, and the other questions about it: a table for each, whose keys are the
-arguments of a function."""
+"""A study: a system, how to simulate it, and the other questions about it: a table for each, whose
+keys are the arguments of a function."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def read_settings(source: Source, system: System, data: Any) -> Settings:
     """The settings of a study of `system`."""
     values = read_table(source, ("simulate",), data, _readers(system.model, margin_names(system)))
     _check_horizon(source, system, values)
-    return Settings(samples=values.pop("samples", None), arguments={**dict.fromkeys(system.model.coordinates, 0.0), **values})
+    return Settings(
+        samples=values.pop("samples", None),
+        arguments={**dict.fromkeys(system.model.coordinates, 0.0), **values},
+    )
 
 
 def margin_names(system: System) -> tuple[str, ...]:
@@ -57,14 +60,24 @@ def margin_names(system: System) -> tuple[str, ...]:
 
 def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) -> None:
     if "periods" in values and "duration" in values:
-        source.refuse(("simulate", "duration"), "simulate has both periods and duration; keep one of them")
+        source.refuse(
+            ("simulate", "duration"), "simulate has both periods and duration; keep one of them"
+        )
     if "periods" not in values and "duration" not in values:
         source.refuse(
-            ("simulate",), "simulate needs periods (of the load) or duration (dimensionless time), such as duration = 50"
+            ("simulate",),
+            (
+                "simulate needs periods (of the load) or duration (dimensionless time), such as "
+                "duration = 50"
+            ),
         )
     if "periods" in values and system.load.period is None:
         source.refuse(
-            ("simulate", "periods"), "simulate.periods needs load.frequency, which is not given; give simulate.duration instead"
+            ("simulate", "periods"),
+            (
+                "simulate.periods needs load.frequency, which is not given; give simulate.duration "
+                "instead"
+            ),
         )
 
 
@@ -75,16 +88,23 @@ def _readers(model: Model, margins: tuple[str, ...]) -> dict[str, Reader]:
         names = tuple(read_text(item) for item in (value if isinstance(value, list) else [value]))
         for name in names:
             if name not in margins:
-                raise ValueError(f"names no margin of this model with {show(name)}; {near(name, margins)}")
+                raise ValueError(
+                    f"names no margin of this model with {show(name)}; {near(name, margins)}"
+                )
         return names
 
     def read_velocities(value: Any) -> tuple[float, ...]:
         if not isinstance(value, list) or len(value) != len(model.coordinates):
-            raise ValueError(f"must be a list of {len(model.coordinates)} numbers, got {show(value)}")
+            raise ValueError(
+                f"must be a list of {len(model.coordinates)} numbers, got {show(value)}"
+            )
         return tuple(read_number(item) for item in value)
 
     return {
-        **{name: read_angle if model.unit_of(name) == "rad" else read_number for name in model.coordinates},
+        **{
+            name: read_angle if model.unit_of(name) == "rad" else read_number
+            for name in model.coordinates
+        },
         "velocity": read_velocities if len(model.coordinates) > 1 else read_number,
         "periods": read_within(read_number, above=0.0, at_most=LIMITS.periods),
         "duration": read_within(read_number, above=0.0, at_most=LIMITS.periods),
@@ -112,7 +132,8 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "basins": ("basins_of_attraction",),
     "stability_chart": ("stability_chart", "studies.bordered_chart"),
 }  # The first function that takes all the given keys answers; a function with open-ended options passes them to the other.
-NOT_IN_FILES = ("system", "store", "workers", "scheduler")  # these come from the rest of the file or the command line
+# these come from the rest of the file or the command line
+NOT_IN_FILES = ("system", "store", "workers", "scheduler")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +148,9 @@ class Ask:
         """The function that answers it."""
         for function in functions_of(self.kind):
             arguments = inspect.signature(function).parameters
-            if any(a.kind is a.VAR_KEYWORD for a in arguments.values()) or set(self.options) <= set(arguments):
+            if any(a.kind is a.VAR_KEYWORD for a in arguments.values()) or set(self.options) <= set(
+                arguments
+            ):
                 return function
         raise ParameterError(f"no function answers {self.kind} with {', '.join(self.options)}")
 
@@ -138,12 +161,14 @@ def functions_of(kind: str) -> list[Callable[..., Any]]:
 
 
 def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
-    """The keys that the table of a question may have, with their readers: the arguments of types that a file can give.
+    """The keys that the table of a question may have, with their readers: the arguments of types
+    that a file can give.
 
     Parameters
     ----------
     coordinates
-        The names of the coordinates; the state variables of such a model stand for an open-ended argument.
+        The names of the coordinates; the state variables of such a model stand for an open-ended
+        argument.
     """
     keys: dict[str, Reader] = {}
     for function in functions_of(kind):
@@ -152,17 +177,28 @@ def keys_of(kind: str, coordinates: tuple[str, ...] = ()) -> dict[str, Reader]:
             reader = reader_of(hints[argument.name])
             if reader is not None and argument.name not in NOT_IN_FILES:
                 lists = reader is read_values_or_number
-                if argument.kind is argument.VAR_KEYWORD:  # with one coordinate, values must be lists
-                    keys |= dict.fromkeys(coordinates, read_values if lists and len(coordinates) == 1 else reader)
+                # with one coordinate, values must be lists
+                if argument.kind is argument.VAR_KEYWORD:
+                    keys |= dict.fromkeys(
+                        coordinates, read_values if lists and len(coordinates) == 1 else reader
+                    )
                 else:
                     keys[argument.name] = reader
     return keys
 
 
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """The types of a function's arguments, without that of its result, which may need a module that is not there at run time."""
-    annotations = {argument.name: argument.annotation for argument in inspect.signature(function).parameters.values()}
-    return get_type_hints(SimpleNamespace(__annotations__=annotations), globalns=vars(sys.modules[function.__module__]))
+    """The types of a function's arguments, without that of its result, which may need a module that
+    is not there at run time.
+    """
+    annotations = {
+        argument.name: argument.annotation
+        for argument in inspect.signature(function).parameters.values()
+    }
+    return get_type_hints(
+        SimpleNamespace(__annotations__=annotations),
+        globalns=vars(sys.modules[function.__module__]),
+    )
 
 
 def read_ask(source: Source, system: System, kind: str, data: Any) -> Ask:
@@ -217,11 +253,14 @@ class Study:
             The file has no [simulate].
         """
         if self.simulate is None:
-            self.source.refuse((), "has no [simulate]; add one, such as [simulate] theta = 0.3, periods = 20")
+            self.source.refuse(
+                (), "has no [simulate]; add one, such as [simulate] theta = 0.3, periods = 20"
+            )
         return self.simulate
 
     def run(self, **more: Any) -> Any:
-        """The motion that the study asks for; `more` is passed to `saltus.simulate` and replaces settings of the file.
+        """The motion that the study asks for; `more` is passed to `saltus.simulate` and replaces
+        settings of the file.
 
         Parameters
         ----------
@@ -269,7 +308,9 @@ class Study:
             return function(self.system, **ask.options, **more)
         except ParameterError as error:
             known = error.parameter in ask.options
-            self.source.refuse_error((error if known else ParameterError(str(error))).inside(ask.kind))
+            self.source.refuse_error(
+                (error if known else ParameterError(str(error))).inside(ask.kind)
+            )
         except (MotionError, TraceError, SweepError) as error:
             raise type(error)(f"{self.source.path}, {ask.kind}: {error}") from error
 
@@ -301,8 +342,14 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
         if name not in PARTS:
             source.refuse((name,), f"unknown key {shown(name)}; {near(name, PARTS)}")
     if "model" not in tables:
-        source.refuse((), 'has no [model]; begin with [model] type = "Metainterface", beta0 = "80 deg"')
-    parts: dict[str, Any] = {name: read_part(source, name, tables[name]) for name in ("model", "impact") if name in tables}
+        source.refuse(
+            (), 'has no [model]; begin with [model] type = "Metainterface", beta0 = "80 deg"'
+        )
+    parts: dict[str, Any] = {
+        name: read_part(source, name, tables[name])
+        for name in ("model", "impact")
+        if name in tables
+    }
     if "load" in tables:
         parts["load"] = read_load(source, tables["load"])
     try:
@@ -310,5 +357,9 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
     except ParameterError as error:
         source.refuse_error(error)
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
-    asks = tuple(read_ask(source, system, name, tables[name]) for name in tables if questions and name in QUESTIONS)
+    asks = tuple(
+        read_ask(source, system, name, tables[name])
+        for name in tables
+        if questions and name in QUESTIONS
+    )
     return Study(name=source.path.stem, system=system, simulate=settings, asks=asks, source=source)

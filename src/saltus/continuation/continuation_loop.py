@@ -1,4 +1,6 @@
-"""The loop of a continuation: it follows a curve step by step, through its events, up to an end for which it gives the reason."""
+"""The loop of a continuation: it follows a curve step by step, through its events, up to an end for
+which it gives the reason.
+"""
 
 from __future__ import annotations
 
@@ -17,30 +19,47 @@ from saltus.continuation.test_functions import Cut, Events, located
 from saltus.continuation.trail import Trail, TrailPoint
 from saltus.progress import Progress, silent
 
-Bounds = Mapping[str, tuple[float, float]]  # the least and the largest value of each parameter, by its name
+# the least and the largest value of each parameter, by its name
+Bounds = Mapping[str, tuple[float, float]]
 
 
 class Watch:
-    """Reports the progress along a curve: the share of the range of its first parameter, or of the largest number of points."""
+    """Reports the progress along a curve: the share of the range of its first parameter, or of the
+    largest number of points.
+    """
 
     def __init__(self, progress: Progress, bounds: Bounds, most_points: int) -> None:
-        self.progress, self.names, self.most_points = progress, tuple(bounds), most_points
-        self.bounds, self.seen, self.points = next(iter(bounds.values())), (np.inf, -np.inf), 0
+        self.progress = progress
+        self.names = tuple(bounds)
+        self.most_points = most_points
+        self.bounds = next(iter(bounds.values()))
+        self.seen = (np.inf, -np.inf)
+        self.points = 0
 
     def __call__(self, point: Any) -> None:
         """Report a new point."""
         if self.progress is silent:
             return
-        self.seen, self.points = (min(self.seen[0], point.parameter), max(self.seen[1], point.parameter)), self.points + 1
+        self.seen, self.points = (
+            (min(self.seen[0], point.parameter), max(self.seen[1], point.parameter)),
+            self.points + 1,
+        )
         low, high = np.clip(self.seen, *self.bounds)
-        share = max((high - low) / (self.bounds[1] - self.bounds[0]), self.points / self.most_points)
-        what = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, point.parameters, strict=True))
+        share = max(
+            (high - low) / (self.bounds[1] - self.bounds[0]), self.points / self.most_points
+        )
+        what = ", ".join(
+            f"{name} = {value:.6g}"
+            for name, value in zip(self.names, point.parameters, strict=True)
+        )
         self.progress(min(1.0, float(share)), what)
 
 
 @dataclass
 class Continuation:
-    """The continuation of a curve in one direction: its settings, and the points and special points found so far."""
+    """The continuation of a curve in one direction: its settings, and the points and special points
+    found so far.
+    """
 
     bounds: Bounds
     events: Events
@@ -53,44 +72,64 @@ class Continuation:
     trail: Trail = field(init=False)
 
     def follow(self, first: Any, born: bool = False) -> None:
-        """Follow the curve from a point until it ends. `born` says that this is a special point of another curve, whose events
-        are not to be found again."""
+        """Follow the curve from a point until it ends. `born` says that this is a special point of
+        another curve, whose events are not to be found again."""
         self.points.append(first)
-        self.end, self.trail = self._on_a_bound(first), Trail(self.events, first)
-        before, step = None, min(self.steps.first, self.steps.longest)
+        self.end = self._on_a_bound(first)
+        self.trail = Trail(self.events, first)
+        before = None
+        step = min(self.steps.first, self.steps.longest)
         while self.end is None:
             point = self.points[-1]
             ahead, step = self._step(before, point, step)
             if isinstance(ahead, End):
                 self.end = ahead
             elif isinstance(ahead, Cut):
-                step = min(self.steps.restart, self.events.first_step(self.points) if self._cross(ahead) else np.inf)
+                step = min(
+                    self.steps.restart,
+                    self.events.first_step(self.points) if self._cross(ahead) else np.inf,
+                )
             elif self._accept(point, ahead, born):
-                step = min(self.steps.restart, max(0.1 * step, self.steps.renewed), self.events.first_step(self.points))
-            before, born = point, False
+                step = min(
+                    self.steps.restart,
+                    max(0.1 * step, self.steps.renewed),
+                    self.events.first_step(self.points),
+                )
+            before = point
+            born = False
             if self.end is None and len(self.points) > self.steps.most_points:
-                self.end = End(CurveEnd.MOST_POINTS, self.points[-1].parameter, detail=str(self.steps.most_points))
+                self.end = End(
+                    CurveEnd.MOST_POINTS,
+                    self.points[-1].parameter,
+                    detail=str(self.steps.most_points),
+                )
 
     def course(self, start: End) -> Course[Any, Any]:
         """The curve as it was followed; `start` says why it begins where it does."""
         assert self.end is not None
-        return Course(tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed))
+        return Course(
+            tuple(self.points), tuple(self.special), (start, self.end), tuple(self.missed)
+        )
 
     def _step(self, before: Any, point: Any, step: float) -> tuple[Any, float]:
         """The next point, or a cut or an end in its place, and the length of the step after it."""
-        curve, length = point.curve, step
+        curve = point.curve
+        length = step
         while step > self.steps.least:
             length = min(step, curve.reach(point))
             ahead = curve.advance(before, point, length)
             if ahead is not None and self.events.accepts(point, ahead):
                 turn = curve.turn(point, ahead)
-                if turn < self.steps.most and (length < self.steps.restart or self.trail.explains(ahead)):
+                if turn < self.steps.most and (
+                    length < self.steps.restart or self.trail.explains(ahead)
+                ):
                     return ahead, self.steps.following(step, turn, ahead.iterations)
             step = self.steps.shrink * length
         return self.events.stalled(self, point, length), step
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
-        """Accept a step up to its first event; returns whether the curve goes on with other equations.
+        """Accept a step up to its first event; returns whether the curve goes on with other
+        equations.
 
         The step is cut at the bounds first, so that events outside of them are not found.
         """
@@ -100,7 +139,9 @@ class Continuation:
             return False
         ahead, end = bounded
         samples = [] if born else self.trail.to_barrier(ahead)
-        ahead, end = (ahead, end) if not samples or samples[-1].point is ahead else (samples[-1].point, None)
+        ahead, end = (
+            (ahead, end) if not samples or samples[-1].point is ahead else (samples[-1].point, None)
+        )
         cut = self.events.cut(point, ahead)
         if isinstance(cut, End):
             self.end = cut
@@ -116,7 +157,9 @@ class Continuation:
             self._locate(self.trail.examined(self.trail.up_to(samples, ahead)))
         else:
             self.trail.begin(ahead)
-        self.points += [ahead, self.points[0]] if closed and ahead is not self.points[0] else [ahead]
+        self.points += (
+            [ahead, self.points[0]] if closed and ahead is not self.points[0] else [ahead]
+        )
         self.watch(ahead)
         self.end = self.end or end or self.events.ended(self, ahead, cut)
         return self.end is None and cut is not None and self._cross(cut)
@@ -143,18 +186,32 @@ class Continuation:
         found = []
         for a, b in pairwise(samples):
             signs = zip(self.trail.tests, a.values * b.values, strict=True)
-            changed = [test for test, sign in signs if sign < 0.0 and test is not self.trail.barrier]
+            changed = [
+                test for test, sign in signs if sign < 0.0 and test is not self.trail.barrier
+            ]
             singular = any(test.singular for test in changed)
             for test in changed:
                 zero = located(test, a.point, b.point, singular)
                 if zero is None:
-                    self.missed.append(Missed(CurveMissed.NOT_LOCATED, test.kind, a.point.parameters, b.point.parameters))
+                    self.missed.append(
+                        Missed(
+                            CurveMissed.NOT_LOCATED,
+                            test.kind,
+                            a.point.parameters,
+                            b.point.parameters,
+                        )
+                    )
                 else:
                     found.append(zero)
             if not self.trail.explained(a, b):
-                self.missed.append(Missed(CurveMissed.STABILITY, "", a.point.parameters, b.point.parameters))
+                self.missed.append(
+                    Missed(CurveMissed.STABILITY, "", a.point.parameters, b.point.parameters)
+                )
         first = samples[0].point
-        for zero in sorted(self.events.distinct(found), key=lambda zero: first.curve.norm(zero.point.place - first.place)):
+        for zero in sorted(
+            self.events.distinct(found),
+            key=lambda zero: first.curve.norm(zero.point.place - first.place),
+        ):
             self.special.append(zero)
             if self.events.keeps_special:
                 self.points.append(zero.point)
@@ -164,17 +221,25 @@ class Continuation:
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
         tangent = point.tangent[-len(self.bounds) :]
-        for (name, (low, high)), value, rate in zip(self.bounds.items(), point.parameters, tangent, strict=True):
+        for (name, (low, high)), value, rate in zip(
+            self.bounds.items(), point.parameters, tangent, strict=True
+        ):
             if (value <= low and rate < 0.0) or (value >= high and rate > 0.0):
                 return self._bound(name, value)
         return None
 
     def _bound(self, name: str, value: float) -> End:
-        return End(CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else "")
+        return End(
+            CurveEnd.BOUND, float(value), detail=f"{name} = " if len(self.bounds) > 1 else ""
+        )
 
     def _beyond(self, a: Any, b: Any) -> tuple[Any, End | None] | End:
-        """The point on the first bound that a step crosses or reaches, with the end there; an end alone if it is not found."""
-        passed = [crossing for i in range(len(self.bounds)) for crossing in self._crossings(a, b, i)]
+        """The point on the first bound that a step crosses or reaches, with the end there; an end
+        alone if it is not found.
+        """
+        passed = [
+            crossing for i in range(len(self.bounds)) for crossing in self._crossings(a, b, i)
+        ]
         if not passed:
             return b, self._on_a_bound(b)
         if any(point is None for _, _, point in passed):
@@ -183,24 +248,33 @@ class Continuation:
         return point, self._bound(list(self.bounds)[index], bound)
 
     def _crossings(self, a: Any, b: Any, i: int) -> list[tuple[int, float, Any]]:
-        """The places at which a step leaves the bounds of a parameter, even if it comes back: the parameter's index, the bound,
-        and the point if it is found."""
+        """The places at which a step leaves the bounds of a parameter, even if it comes back: the
+        parameter's index, the bound, and the point if it is found."""
         found: list[tuple[int, float, Any]] = []
-        index, (low, high) = i - len(self.bounds), list(self.bounds.values())[i]
-        room = min(a.place[index] - low, b.place[index] - low, high - a.place[index], high - b.place[index])
+        index = i - len(self.bounds)
+        (low, high) = list(self.bounds.values())[i]
+        room = min(
+            a.place[index] - low, b.place[index] - low, high - a.place[index], high - b.place[index]
+        )
         if room * a.curve.weights[index] > a.curve.norm(b.place - a.place):
             return found  # not even a step that turns round reaches a bound
         turn = turning_point(a, b, index)
         for bound, beyond in zip((low, high), (np.less, np.greater), strict=True):
-            if beyond(b.place[index], bound) or (turn is not None and beyond(turn.place[index], bound)):
+            if beyond(b.place[index], bound) or (
+                turn is not None and beyond(turn.place[index], bound)
+            ):
                 found.append((i, bound, next(iter(solved_between(a, b, index, bound)), None)))
         return found
 
     def _closes(self, a: Any, b: Any) -> bool:
-        """Whether a step passes through the first point of the curve, in the direction in which the curve was followed there."""
+        """Whether a step passes through the first point of the curve, in the direction in which the
+        curve was followed there.
+        """
         if len(self.points) <= 3:
             return False
-        first, across, k = self.points[0], b.place - a.place, len(self.bounds)
+        first = self.points[0]
+        across = b.place - a.place
+        k = len(self.bounds)
         length = b.curve.norm(across)
         if np.linalg.norm(b.curve.weights[-k:] * (first.parameters - a.parameters)) > 1.1 * length:
             return False
@@ -209,12 +283,15 @@ class Continuation:
             return False
         along = place - a.place
         share = float(along @ (b.curve.weights**2 * across)) / length**2
-        if not (0.0 < share <= 1.0 and b.curve.norm(along - share * across) < STEPS.closing * length):
+        if not (
+            0.0 < share <= 1.0 and b.curve.norm(along - share * across) < STEPS.closing * length
+        ):
             return False
         moved = self.events.nearest(first, first.place + STEPS.ahead * first.tangent, b)
         if moved is None:
             return False
-        return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0  # otherwise the curve has turned round
+        # otherwise the curve has turned round
+        return float((moved - place) @ (b.curve.weights**2 * b.tangent)) > 0.0
 
 
 def both_ways(
@@ -225,7 +302,8 @@ def both_ways(
     progress: Progress = silent,
     growing: Callable[[tuple[Any, ...]], object] | None = None,
 ) -> Course[Any, Any]:
-    """The curve through a point, followed against its tangent and then along it, or once if it closes.
+    """The curve through a point, followed against its tangent and then along it, or once if it
+    closes.
 
     `growing` is called with all points so far, in order, whenever there is a new one.
     """

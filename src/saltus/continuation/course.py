@@ -15,14 +15,16 @@ from saltus.continuation.test_functions import TestFunction, located
 
 
 def solved_between(a: Any, b: Any, index: int, value: float) -> list[Any]:
-    """The points from a up to before b at which the component `index` of the place has a value, solved there.
+    """The points from a up to before b at which the component `index` of the place has a value,
+    solved there.
 
-    Each lies near the cubic through a and b. If Newton's method at this value leads to another solution, the curve is followed to
-    the value first.
+    Each lies near the cubic through a and b. If Newton's method at this value leads to another
+    solution, the curve is followed to the value first.
     """
     found = []
     for first, last in _rising_parts(a, b, index):
-        start, end = first.place[index] - value, last.place[index] - value
+        start = first.place[index] - value
+        end = last.place[index] - value
         if end == 0.0 or start * end > 0.0:
             continue
         point = first if start == 0.0 else _solved(first, last, index, value)
@@ -37,7 +39,9 @@ def _rising_parts(a: Any, b: Any, index: int) -> list[tuple[Any, Any]]:
 
 
 def turning_point(a: Any, b: Any, index: int) -> Any:
-    """The point near which a component of the place has an extremum between a and b; None if it has none."""
+    """The point near which a component of the place has an extremum between a and b; None if it has
+    none.
+    """
     if not a.tangent[index] * b.tangent[index] < 0.0:
         return None
     shares = np.linspace(0.0, 1.0, 33)
@@ -47,7 +51,9 @@ def turning_point(a: Any, b: Any, index: int) -> Any:
 
 
 def _solved(a: Any, b: Any, index: int, value: float) -> Any:
-    """The point between a and b at which a component that is monotonic between them has a value; None if it cannot be found."""
+    """The point between a and b at which a component that is monotonic between them has a value;
+    None if it cannot be found.
+    """
     share = _share(a, b, index, value)
     point = _near(a, b, between(a, b, share), index, value)
     if point is not None:
@@ -59,11 +65,14 @@ def _solved(a: Any, b: Any, index: int, value: float) -> Any:
 
 
 def _near(a: Any, b: Any, guess: np.ndarray, index: int, value: float) -> Any:
-    """The solution at a value, near to a guess and with a tangent along a to b; None if Newton's method finds another one."""
+    """The solution at a value, near to a guess and with a tangent along a to b; None if Newton's
+    method finds another one.
+    """
     guess = guess.copy()
     guess[index] = value
     chord = b.place - a.place
-    point, length = a.curve.solve_at(guess, chord, index), a.curve.norm(chord)
+    point = a.curve.solve_at(guess, chord, index)
+    length = a.curve.norm(chord)
     if point is None or a.curve.norm(point.place - guess) > STEPS.beside * length:
         return None
     return point if max(a.curve.turn(a, point), a.curve.turn(point, b)) < STEPS.most else None
@@ -77,7 +86,9 @@ def _at_share(a: Any, b: Any, share: float) -> Any:
 
 def _share(a: Any, b: Any, index: int, value: float) -> float:
     """The share of the way at which the cubic has the value, by bisection."""
-    low, high, component = 0.0, 1.0, cubic(a, b, index)
+    low = 0.0
+    high = 1.0
+    component = cubic(a, b, index)
     below = a.place[index] < value
     while high - low > 1e-9:
         middle = 0.5 * (low + high)
@@ -94,12 +105,15 @@ Special = TypeVar("Special")
 
 @dataclass(frozen=True, eq=False)
 class Course(Generic[Point, Special]):
-    """A curve as it was followed: its points in order, its special points, and the reasons for both ends."""
+    """A curve as it was followed: its points in order, its special points, and the reasons for both
+    ends.
+    """
 
     points: tuple[Point, ...]
     special: tuple[Special, ...]
     ends: tuple[End, End]
-    missed: tuple[Missed, ...]  # special points between neighbouring points that were noticed but not located
+    # special points between neighbouring points that were noticed but not located
+    missed: tuple[Missed, ...]
 
     @cached_property
     def parameters(self) -> np.ndarray:
@@ -113,38 +127,50 @@ class Course(Generic[Point, Special]):
         return self.ends[0].reason is CurveEnd.CLOSED
 
     def is_joined(self, before: int) -> bool:
-        """Whether the point with this number and the next one solve the same equations, with the same order of unknowns.
+        """Whether the point with this number and the next one solve the same equations, with the
+        same order of unknowns.
 
         The last point of a loop is its first one again, with the equations with which it was begun.
         """
         check_count("before", before, 0, len(self.points) - 2)
-        a, b = self.points[before], self.points[before + 1]
+        a = self.points[before]
+        b = self.points[before + 1]
         if a.curve.joins(b.curve):
             return True
         closing = self.closed and before == len(self.points) - 2 and a.place.size == b.place.size
         return bool(closing and a.curve.norm(b.place - a.place) <= 2.0 * STEPS.longest)
 
     def solved_at(self, value: float, index: int = -1) -> list[Point]:
-        """All points of the curve at which one component of the place has a value, solved there, in order."""
-        found = [point for i in self._around(value, index) for point in self.solved_between(i, value, index)]
+        """All points of the curve at which one component of the place has a value, solved there, in
+        order.
+        """
+        found = [
+            point
+            for i in self._around(value, index)
+            for point in self.solved_between(i, value, index)
+        ]
         return found + [point for point in self.points[-1:] if point.place[index] == value]
 
     def _around(self, value: float, index: int) -> list[int]:
-        """The numbers of the points from which, to the next point, a component of the place may take a value: because the value
-        lies between theirs, or because the component has an extremum between them."""
+        """The numbers of the points from which, to the next point, a component of the place may
+        take a value: because the value lies between theirs, or because the component has an
+        extremum between them."""
         places, tangents = self._last if index == -1 else _numbers(self.points, index)
         beyond = places - value
-        return np.flatnonzero((beyond[:-1] * beyond[1:] <= 0.0) | (tangents[:-1] * tangents[1:] < 0.0)).tolist()
+        return np.flatnonzero(
+            (beyond[:-1] * beyond[1:] <= 0.0) | (tangents[:-1] * tangents[1:] < 0.0)
+        ).tolist()
 
     @cached_property
     def _last(self) -> tuple[np.ndarray, np.ndarray]:
         return _numbers(self.points, -1)
 
     def solved_between(self, before: int, value: float, index: int = -1) -> list[Point]:
-        """The points at which one component of the place has a value, from the point with number `before` up to before the
-        next."""
+        """The points at which one component of the place has a value, from the point with number
+        `before` up to before the next."""
         check_count("before", before, 0, len(self.points) - 2)
-        a, b = self.points[before], self.points[before + 1]
+        a = self.points[before]
+        b = self.points[before + 1]
         check_count("index", index, -a.place.size, a.place.size - 1)
         return solved_between(a, b, index, value) if self.is_joined(before) else []
 
@@ -153,4 +179,6 @@ def _numbers(points: tuple[Any, ...], index: int) -> tuple[np.ndarray, np.ndarra
     """One component of the places of points, and its derivative along the curve, (n,) each."""
     for point in points:
         check_count("index", index, -point.place.size, point.place.size - 1)
-    return np.array([point.place[index] for point in points]), np.array([point.tangent[index] for point in points])
+    return np.array([point.place[index] for point in points]), np.array(
+        [point.tangent[index] for point in points]
+    )

@@ -1,5 +1,5 @@
-"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from one point to the next;
-and its special points, with their evidence."""
+"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from
+one point to the next; and its special points, with their evidence."""
 
 from __future__ import annotations
 
@@ -106,7 +106,9 @@ class Point:
 
 
 class Curve(ABC, Generic[P]):
-    """The solutions of F(y, p) = 0 with one equation fewer than there are unknowns y and parameters p."""
+    """The solutions of F(y, p) = 0 with one equation fewer than there are unknowns y and parameters
+    p.
+    """
 
     count: int  # of the parameters, which are the last numbers of a place
 
@@ -117,7 +119,9 @@ class Curve(ABC, Generic[P]):
 
     @abstractmethod
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point near a guess, in the hyperplane through the guess that is normal to a direction of length 1."""
+        """The point near a guess, in the hyperplane through the guess that is normal to a direction
+        of length 1.
+        """
 
     def solve_beside(self, guess: np.ndarray, direction: np.ndarray, point: P) -> P | None:
         """`solve` beside a point that is known, whose derivatives may be used."""
@@ -125,19 +129,27 @@ class Curve(ABC, Generic[P]):
 
     @abstractmethod
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
-        """The point near a guess that has the guess's value in the component `index`; its tangent points along the direction."""
+        """The point near a guess that has the guess's value in the component `index`; its tangent
+        points along the direction.
+        """
 
     def beside_singular(self, place: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point at a place that solves the equations, with a given tangent, for use where the equations may be singular."""
+        """The point at a place that solves the equations, with a given tangent, for use where the
+        equations may be singular.
+        """
         return self.solve(place, direction)
 
     @abstractmethod
     def advance(self, before: P | None, point: P, step: float) -> P | None:
-        """The point a step further, given the point before if there is one; None where the step is too long."""
+        """The point a step further, given the point before if there is one; None where the step is
+        too long.
+        """
 
     @abstractmethod
     def turn(self, a: P, b: P) -> float:
-        """A measure of the change of the curve from a point to the next, by which the length of the steps is controlled."""
+        """A measure of the change of the curve from a point to the next, by which the length of the
+        steps is controlled.
+        """
 
     def reach(self, point: P) -> float:
         """The longest step from a point that makes sense."""

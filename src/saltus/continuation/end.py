@@ -1,4 +1,6 @@
-"""What a curve says in a sentence: why it ends, and why a special point that was noticed on it could not be located."""
+"""What a curve says in a sentence: why it ends, and why a special point that was noticed on it
+could not be located.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,10 @@ from saltus.enumerations import Sentence
 
 
 class EndReason(Sentence):
-    """A reason for which a curve ends. Its value is the sentence, in which the numbers of an `End` are filled in."""
+    """A reason for which a curve ends.
+
+    Its value is the sentence, in which the numbers of an `End` are filled in.
+    """
 
 
 class CurveEnd(EndReason):
@@ -25,13 +30,17 @@ class CurveEnd(EndReason):
     BOUND = "bound {detail}{parameter:g}"
     CLOSED = "closes"
     MOST_POINTS = "more than {detail} points"
-    NO_STEP = "the steps shrink to nothing: the {detail} has a singularity that is none of the known kinds"
+    NO_STEP = (
+        "the steps shrink to nothing: the {detail} has a singularity that is none of the "
+        "known kinds"
+    )
     NOT_LOCATED = "a {kind} that could not be located"
 
 
 @dataclass(frozen=True)
 class End:
-    """An end of a curve: its reason, the parameter there, and the special point and detail that its sentence mentions.
+    """An end of a curve: its reason, the parameter there, and the special point and detail that its
+    sentence mentions.
 
     Attributes
     ----------
@@ -59,11 +68,16 @@ class End:
         return f"End({str(self)!r})"
 
     def __str__(self) -> str:
-        return str(self.reason.value.format(parameter=self.parameter, kind=self.kind, detail=self.detail))
+        return str(
+            self.reason.value.format(parameter=self.parameter, kind=self.kind, detail=self.detail)
+        )
 
 
 class MissedReason(Sentence):
-    """The reason why a special point was not located. Its value is the text, in which a `Missed` fills in its numbers."""
+    """The reason why a special point was not located.
+
+    Its value is the text, in which a `Missed` fills in its numbers.
+    """
 
 
 class CurveMissed(MissedReason):
@@ -103,5 +117,9 @@ class Missed:
     detail: str = ""
 
     def __str__(self) -> str:
-        first, last = (", ".join(f"{value:.9g}" for value in values) for values in (self.first, self.last))
-        return str(self.reason.value.format(kind=self.kind, first=first, last=last, detail=self.detail))
+        first, last = (
+            ", ".join(f"{value:.9g}" for value in values) for values in (self.first, self.last)
+        )
+        return str(
+            self.reason.value.format(kind=self.kind, first=first, last=last, detail=self.detail)
+        )

@@ -1,5 +1,5 @@
-"""Pseudo-arclength continuation: curves of equations with derivatives, which may fold in every parameter; and the corrector,
-which is Newton's method.
+"""Pseudo-arclength continuation: curves of equations with derivatives, which may fold in every
+parameter; and the corrector, which is Newton's method.
 
 The next step's end is predicted on the cubic through the last two points with their tangents.
 """
@@ -23,11 +23,16 @@ class NewtonSettings:
 
     converged: float = 5e-14  # residual relative to the unknowns: a few dozen rounding errors
     stalled: float = 1e-10  # residual that is accepted where rounding keeps it above `converged`
-    slowdown: float = 0.3  # rounding stops the method if a step leaves more than this share of the residual before it
-    circling: float = 0.5  # if two steps leave more than this share, the method circles between two smooth parts of the equations
+    # rounding stops the method if a step leaves more than this share of the residual before it
+    slowdown: float = 0.3
+    # if two steps leave more than this share, the method circles between two smooth parts of the
+    # equations
+    circling: float = 0.5
     diverged: float = 1e6  # residual above which the iteration is given up
     longest: float = 1.0  # largest component of a step: beyond it the equations are far from linear
-    last: float = 1e-6  # below this residual the next step is probably the last one, as it squares the error: evaluate thoroughly
+    # below this residual the next step is probably the last one, as it squares the error: evaluate
+    # thoroughly
+    last: float = 1e-6
 
 
 NEWTON = NewtonSettings()
@@ -71,17 +76,18 @@ def newton(
     Parameters
     ----------
     evaluate
-        The equations at (place, thorough), None where they have no value. A thorough evaluation has all that is needed of a
-        solution; the one that is returned is thorough.
+        The equations at (place, thorough), None where they have no value. A thorough evaluation has
+        all that is needed of a solution; the one that is returned is thorough.
     linear
-        The matrix and the right-hand side of the equations for a step, from an evaluation and its place.
+        The matrix and the right-hand side of the equations for a step, from an evaluation and its
+        place.
     guess
         Where to begin.
     iterations
         The most steps.
     residual_floor
-        The largest residual that rounding may leave if derivatives are large. It is accepted if a further step would move the
-        unknowns by no more than `converged`.
+        The largest residual that rounding may leave if derivatives are large. It is accepted if a
+        further step would move the unknowns by no more than `converged`.
     near
         Whether the guess itself is probably a solution: it is then evaluated thoroughly at once.
     before
@@ -93,7 +99,8 @@ def newton(
         found = evaluate(place, thorough)
         if found is None:
             return None
-        error, scale = np.abs(found.residual).max(), max(1.0, np.abs(place).max())
+        error = np.abs(found.residual).max()
+        scale = max(1.0, np.abs(place).max())
         slow = error > NEWTON.slowdown * before
         if error <= NEWTON.converged * scale or (slow and error <= NEWTON.stalled * scale):
             looked = found if thorough else evaluate(place, True)
@@ -121,38 +128,54 @@ def _step(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
 
 
 class EquationCurve(Curve[P]):
-    """A curve of equations: each point is predicted from the last ones and corrected by Newton's method in a hyperplane."""
+    """A curve of equations: each point is predicted from the last ones and corrected by Newton's
+    method in a hyperplane.
+    """
 
-    iterations = 7  # the most iterations of Newton's method in a hyperplane: if it needs more, the step is too long
-    iterations_at = 12  # the most iterations with one component fixed, where the guess may be farther away
-    # Share of a step: a corrector that leads farther than this from where the step was predicted is given up.
+    # the most iterations of Newton's method in a hyperplane: if it needs more, the step is too long
+    iterations = 7
+    # the most iterations with one component fixed, where the guess may be farther away
+    iterations_at = 12
+    # Share of a step: a corrector that leads farther than this from where the step was predicted is
+    # given up.
     corrector_radius: float = math.inf
-    residual_floor: float = 0.0  # The largest residual that rounding may leave, where derivatives are large.
+    # The largest residual that rounding may leave, where derivatives are large.
+    residual_floor: float = 0.0
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
-        """The equations at a place, with all that is wanted of a solution if `thorough`; None where they have no value."""
+        """The equations at a place, with all that is wanted of a solution if `thorough`; None where
+        they have no value.
+        """
 
     @abstractmethod
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> P:
         """A solution as a point."""
 
     def residual(self, place: np.ndarray) -> np.ndarray | None:
-        """F alone at a place, up to rounding, where that takes far less time than with its derivatives; else None."""
+        """F alone at a place, up to rounding, where that takes far less time than with its
+        derivatives; else None.
+        """
         return None
 
     def derivatives_at(self, point: P) -> np.ndarray:
         """The derivatives at a point of the curve, for curves that have `residual`."""
         raise NotImplementedError
 
-    def approached(self, guess: np.ndarray, direction: np.ndarray, point: P, reach: float = math.inf) -> tuple[np.ndarray, float]:
-        """A place in the hyperplane of `solve` that is nearer to the curve than the guess, by Broyden's method from the
-        derivatives at a point beside it, with its residual; the guess and inf without `residual`."""
+    def approached(
+        self, guess: np.ndarray, direction: np.ndarray, point: P, reach: float = math.inf
+    ) -> tuple[np.ndarray, float]:
+        """A place in the hyperplane of `solve` that is nearer to the curve than the guess, by
+        Broyden's method from the derivatives at a point beside it, with its residual; the guess and
+        inf without `residual`."""
         found = self.residual(guess) if point.curve.joins(self) else None
         if found is None:
             return guess, math.inf
-        normal, place, right = direction * self.weights**2, guess, bordered(found, 0.0)
-        matrix, error = bordered(self.derivatives_at(point), normal), float(np.abs(found).max())
+        normal = direction * self.weights**2
+        place = guess
+        right = bordered(found, 0.0)
+        matrix = bordered(self.derivatives_at(point), normal)
+        error = float(np.abs(found).max())
         for _ in range(self.iterations_at):
             step = _step(matrix, -right) if NEWTON.converged < error < NEWTON.diverged else None
             if step is None or self.norm(place + step - guess) > reach:
@@ -160,23 +183,39 @@ class EquationCurve(Curve[P]):
             found = self.residual(place + step)
             if found is None or not (left := float(np.abs(found).max())) < NEWTON.circling * error:
                 break
-            place, before, right, error = place + step, right, bordered(found, normal @ (place + step - guess)), left
+            place, before, right, error = (
+                place + step,
+                right,
+                bordered(found, normal @ (place + step - guess)),
+                left,
+            )
             matrix += np.outer(right - before - matrix @ step, step) / (step @ step)
         return place, error
 
     def solve_beside(self, guess: np.ndarray, direction: np.ndarray, point: P) -> P | None:
         place, before = self.approached(guess, direction, point)
-        return self.solve(guess, direction) if place is guess else self.solve_within(place, direction, math.inf, before=before)
+        return (
+            self.solve(guess, direction)
+            if place is guess
+            else self.solve_within(place, direction, math.inf, before=before)
+        )
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> P | None:
-        return self.solve_within(guess, direction, math.inf, near=True)  # most guesses lie between points that are known
+        # most guesses lie between points that are known
+        return self.solve_within(guess, direction, math.inf, near=True)
 
     def solve_within(
-        self, guess: np.ndarray, direction: np.ndarray, reach: float, near: bool = False, before: float = math.inf
+        self,
+        guess: np.ndarray,
+        direction: np.ndarray,
+        reach: float,
+        near: bool = False,
+        before: float = math.inf,
     ) -> P | None:
-        """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a finite `reach`, in circles.
-        `near` and `before` are those of `newton`."""
-        normal, errors = direction * self.weights**2, list[float]()
+        """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a
+        finite `reach`, in circles. `near` and `before` are those of `newton`."""
+        normal = direction * self.weights**2
+        errors = list[float]()
 
         def within_reach(place: np.ndarray, thorough: bool) -> Evaluation | None:
             found = self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
@@ -187,7 +226,9 @@ class EquationCurve(Curve[P]):
             return found
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return bordered(found.derivatives(), normal), -bordered(found.residual, normal @ (place - guess))
+            return bordered(found.derivatives(), normal), -bordered(
+                found.residual, normal @ (place - guess)
+            )
 
         evaluate = self.evaluate if reach == math.inf else within_reach
         found = newton(evaluate, linear, guess, self.iterations, self.residual_floor, near, before)
@@ -210,17 +251,25 @@ class EquationCurve(Curve[P]):
         found = newton(evaluate, linear, guess[free], self.iterations_at, self.residual_floor)
         if found is None:
             return None
-        return self.with_tangent(Corrected(filled(found.place), found.evaluation, found.iterations), direction)
+        return self.with_tangent(
+            Corrected(filled(found.place), found.evaluation, found.iterations), direction
+        )
 
     def beside_singular(self, place: np.ndarray, direction: np.ndarray) -> P | None:
-        """The point at a place that solves the equations to rounding, with the direction of its tangent; None if it does not."""
+        """The point at a place that solves the equations to rounding, with the direction of its
+        tangent; None if it does not.
+        """
         evaluation = self.evaluate(place, True)
-        if evaluation is None or not np.abs(evaluation.residual).max() <= NEWTON.stalled * max(1.0, np.abs(place).max()):
+        if evaluation is None or not np.abs(evaluation.residual).max() <= NEWTON.stalled * max(
+            1.0, np.abs(place).max()
+        ):
             return None
         return self.point_at(Corrected(place, evaluation, 0), direction / self.norm(direction))
 
     def with_tangent(self, found: Corrected[Any], direction: np.ndarray) -> P | None:
-        """A solution as a point, with the tangent that goes along a direction; None where the tangent is not unique."""
+        """A solution as a point, with the tangent that goes along a direction; None where the
+        tangent is not unique.
+        """
         matrix = bordered(found.evaluation.derivatives(), direction * self.weights**2)
         right = np.zeros(len(matrix))
         right[-1] = 1.0
@@ -232,12 +281,16 @@ class EquationCurve(Curve[P]):
         return self.point_at(found, tangent / length) if 0.0 < length < np.inf else None
 
     def along_kernel(self, found: Corrected[Any]) -> P:
-        """A solution as a point, with its tangent from the kernel of the derivatives, where no direction is known."""
+        """A solution as a point, with its tangent from the kernel of the derivatives, where no
+        direction is known.
+        """
         tangent = np.linalg.svd(found.evaluation.derivatives() / self.weights)[2][-1] / self.weights
         return self.point_at(found, tangent / self.norm(tangent))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:
-        """The point a step further; None if Newton's method does not converge, or converges too far from the predicted place."""
+        """The point a step further; None if Newton's method does not converge, or converges too far
+        from the predicted place.
+        """
         guess = predicted(before, point, step)
         reach = self.corrector_radius * step
         begin, before_it = self.approached(guess, point.tangent, point, reach)
@@ -255,54 +308,74 @@ class EquationCurve(Curve[P]):
 
 
 def bordered(rows: np.ndarray, last: Any) -> np.ndarray:
-    """An array (n, ...) with one more row below it; NumPy's functions for this would take longer than the rest of a step."""
+    """An array (n, ...) with one more row below it; NumPy's functions for this would take longer
+    than the rest of a step.
+    """
     result = np.empty((len(rows) + 1, *rows.shape[1:]))
-    result[:-1], result[-1] = rows, last
+    result[:-1] = rows
+    result[-1] = last
     return result
 
 
-# --- the next step: its length, and the prediction of its end -----------------------------------------------------------------
+# --- the next step: its length, and the prediction of its end ----------------
 
 
 @dataclass(frozen=True)
 class StepSettings:
     """The control of the steps, whose lengths are in the norm of the curve."""
 
-    aim: float = 0.12  # the angle between the tangents of neighbouring points that a step aims at, rad
+    # the angle between the tangents of neighbouring points that a step aims at, rad
+    aim: float = 0.12
     most: float = 0.5  # the angle above which a step is taken again, shorter, rad
-    longest: float = 0.1  # a thirtieth of the range of the parameter, or a tenth of a unit of the unknowns
+    # a thirtieth of the range of the parameter, or a tenth of a unit of the unknowns
+    longest: float = 0.1
     first: float = 1e-3  # the length of the first step
     restart: float = 1e-3  # the largest length of the first step after the equations have changed
-    # The least length of this step: steps that end at a change of equations may be extremely short, as there are no solutions
-    # beyond it.
+    # The least length of this step: steps that end at a change of equations may be extremely short,
+    # as there are no solutions beyond it.
     renewed: float = 1e-6
     least: float = 1e-11  # the length below which steps have shrunk to nothing
-    shrink: float = 0.4  # the length of a step that has to be taken again, as a share of the one that failed
-    grow: tuple[float, float] = (0.5, 2.0)  # the least and the largest ratio of a step to the one before
+    # the length of a step that has to be taken again, as a share of the one that failed
+    shrink: float = 0.4
+    # the least and the largest ratio of a step to the one before
+    grow: tuple[float, float] = (0.5, 2.0)
     easy: int = 5  # iterations of the corrector up to which the next step may grow
-    hard: float = 0.7  # after more iterations, the largest length of the next step as a share of this one
+    # after more iterations, the largest length of the next step as a share of this one
+    hard: float = 0.7
     most_points: int = 20_000  # points after which the curve is given up
-    most_stretched: float = 3.0  # the largest ratio to the last step for which the curvature of the last step is used
-    off: float = 0.05  # the largest distance of a step's end from the predicted place, as a share of the step; farther is a jump
-    off_tangent: float = 0.3  # the same share for predictions along the tangent alone, which may itself be inexact
-    beside: float = 0.1  # the largest distance of a point within a step from the cubic through its ends, as a share of the step
-    closing: float = 0.2  # the largest distance of the curve's first point from a step that closes it, as a share of the step
-    ahead: float = 1e-6  # distance of a second point that gives the tangent's direction after the impacts are renumbered
+    # the largest ratio to the last step for which the curvature of the last step is used
+    most_stretched: float = 3.0
+    # the largest distance of a step's end from the predicted place, as a share of the step; farther
+    # is a jump
+    off: float = 0.05
+    # the same share for predictions along the tangent alone, which may itself be inexact
+    off_tangent: float = 0.3
+    # the largest distance of a point within a step from the cubic through its ends, as a share of
+    # the step
+    beside: float = 0.1
+    # the largest distance of the curve's first point from a step that closes it, as a share of the
+    # step
+    closing: float = 0.2
+    # distance of a second point that gives the tangent's direction after the impacts are renumbered
+    ahead: float = 1e-6
 
     def following(self, step: float, turn: float, iterations: int) -> float:
         """The length of the step after one that was accepted."""
         factor = min(self.grow[1], max(self.grow[0], self.aim / max(turn, 1e-3)))
-        return min(self.longest, step * (factor if iterations <= self.easy else min(factor, self.hard)))
+        return min(
+            self.longest, step * (factor if iterations <= self.easy else min(factor, self.hard))
+        )
 
 
 STEPS = StepSettings()
 
 
 def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
-    """The place a step beyond a point, on the cubic through the last two points with their tangents.
+    """The place a step beyond a point, on the cubic through the last two points with their
+    tangents.
 
-    Its error is of fourth order in the step. If there is no point before, or the equations have changed since, the place is on
-    the tangent, with an error of second order.
+    Its error is of fourth order in the step. If there is no point before, or the equations have
+    changed since, the place is on the tangent, with an error of second order.
     """
     straight = point.place + step * point.tangent
     if before is None or not before.curve.joins(point.curve):
@@ -312,24 +385,31 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     if not 0.0 < step <= STEPS.most_stretched * length:
         return straight
     u = step / length
-    bend = point.tangent * length - chord  # the deviation of the cubic from the tangent has terms of second and of third order
+    # the deviation of the cubic from the tangent has terms of second and of third order
+    bend = point.tangent * length - chord
     twist = before.tangent * length - chord
     return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
 
 
 def between(a: Point, b: Point, share: float) -> np.ndarray:
-    """The place at a share of the way from a to b, on the cubic through both, or on their chord if the equations have changed."""
+    """The place at a share of the way from a to b, on the cubic through both, or on their chord if
+    the equations have changed.
+    """
     return np.asarray(cubic(a, b)(share))
 
 
 def cubic(a: Point, b: Point, index: Any = slice(None)) -> Callable[[Any], Any]:
     """`between` as a function of the share, or one component of it."""
-    start, chord = a.place[index], b.place[index] - a.place[index]
+    start = a.place[index]
+    chord = b.place[index] - a.place[index]
     if not a.curve.joins(b.curve):
         return lambda share: start + share * chord
     length = arc(a, b)
-    begin, end = length * a.tangent[index] - chord, length * b.tangent[index] - chord
-    return lambda share: start + share * chord + share * (1.0 - share) * ((1.0 - share) * begin - share * end)
+    begin = length * a.tangent[index] - chord
+    end = length * b.tangent[index] - chord
+    return lambda share: (
+        start + share * chord + share * (1.0 - share) * ((1.0 - share) * begin - share * end)
+    )
 
 
 def arc(a: Point, b: Point) -> float:

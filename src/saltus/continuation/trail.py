@@ -1,4 +1,6 @@
-"""The values of the test functions along a curve, and the search between two points that finds all of their zeros."""
+"""The values of the test functions along a curve, and the search between two points that finds all
+of their zeros.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,21 @@ from saltus.continuation.test_functions import Events
 class TrailSettings:
     """How closely the test functions are examined between two points of a curve."""
 
-    most_looks: int = 40  # The most points solved for within one step; more would be needed only if a function is nearly 0 in it.
-    narrowest: float = 1e-6  # An interval narrower than this share of its step is not divided: two zeros in it count as one.
-    # A step is taken again if a value differs from the parabola through the last three by more than this share of them.
+    # The most points solved for within one step; more would be needed only if a function is nearly
+    # 0 in it.
+    most_looks: int = 40
+    # An interval narrower than this share of its step is not divided: two zeros in it count as one.
+    narrowest: float = 1e-6
+    # A step is taken again if a value differs from the parabola through the last three by more than
+    # this share of them.
     unexpected: float = 0.5
-    doubt: float = 1.0  # The uncertainty of the cubic through four points, in units of its term of third order.
-    grid: int = 17  # Places in an interval at which the cubic and its uncertainty are compared with 0.
-    inner: float = 0.1  # A new point is no nearer to an end of the interval than this share of it: little would be gained.
+    # The uncertainty of the cubic through four points, in units of its term of third order.
+    doubt: float = 1.0
+    # Places in an interval at which the cubic and its uncertainty are compared with 0.
+    grid: int = 17
+    # A new point is no nearer to an end of the interval than this share of it: little would be
+    # gained.
+    inner: float = 0.1
 
 
 SETTINGS = TrailSettings()
@@ -42,9 +52,10 @@ class TrailPoint:
 class Trail:
     """The last points of a curve, with the values of its test functions.
 
-    Between two points a test function is approximated by the cubic through them and the two nearest other points. The cubic's
-    uncertainty is its term of third order, which is large where the function turns unexpectedly. If the cubic, within its
-    uncertainty, may have more zeros than its values at both ends show, a point between is solved for, and so on.
+    Between two points a test function is approximated by the cubic through them and the two nearest
+    other points. The cubic's uncertainty is its term of third order, which is large where the
+    function turns unexpectedly. If the cubic, within its uncertainty, may have more zeros than its
+    values at both ends show, a point between is solved for, and so on.
     """
 
     def __init__(self, events: Events, first: Any) -> None:
@@ -62,11 +73,15 @@ class Trail:
         self.last = [self.latest]
 
     def explains(self, ahead: Any) -> bool:
-        """Whether the smooth test functions at a point ahead are near to the values extrapolated from their last three values."""
+        """Whether the smooth test functions at a point ahead are near to the values extrapolated
+        from their last three values.
+        """
         if len(self.last) < 3 or not self.guides.any():
             return True
-        (a, b, c), point = self.last, self._sample(ahead)
-        x, values = point.arc, np.array([sample.values[self.guides] for sample in self.last])
+        (a, b, c) = self.last
+        point = self._sample(ahead)
+        x = point.arc
+        values = np.array([sample.values[self.guides] for sample in self.last])
         expected = (
             (x - b.arc) * (x - c.arc) / ((a.arc - b.arc) * (a.arc - c.arc)) * values[0]
             + (x - a.arc) * (x - c.arc) / ((b.arc - a.arc) * (b.arc - c.arc)) * values[1]
@@ -83,7 +98,8 @@ class Trail:
     def to_barrier(self, ahead: Any) -> list[TrailPoint]:
         """The points of a step up to the first one at which the barrier is negative."""
         samples = self.up_to([], ahead)
-        if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:  # a curve may begin on the barrier
+        # a curve may begin on the barrier
+        if self.barrier is None or samples[-1].values[0] < 0.0 or len(self.last) == 1:
             return samples
         samples = self.examined(samples)
         beyond = next((i for i, sample in enumerate(samples) if i and sample.values[0] < 0.0), None)
@@ -93,19 +109,25 @@ class Trail:
         """The points of a step that ends at a point, given those of a longer one."""
         if samples and samples[-1].point is ahead:
             return samples
-        before, last = self.last[-1], self._sample(ahead)
+        before = self.last[-1]
+        last = self._sample(ahead)
         return [*(sample for sample in samples[:-1] or [before] if sample.arc < last.arc), last]
 
     def examined(self, samples: list[TrailPoint]) -> list[TrailPoint]:
-        """The points of a step, with as many further points between as are needed to see every zero of the test functions."""
+        """The points of a step, with as many further points between as are needed to see every zero
+        of the test functions.
+        """
         if samples is self.seen:
             return samples
-        looks, i, known = 0, 0, self.last[:-1]
+        looks = 0
+        i = 0
+        known = self.last[:-1]
         narrowest = SETTINGS.narrowest * (samples[-1].arc - samples[0].arc)
         while i + 1 < len(samples) and looks < SETTINGS.most_looks:
             a, b = samples[i : i + 2]
             near = sorted(
-                [*[*known, *samples[:i]][-2:], *samples[i + 2 : i + 4]], key=lambda s: max(a.arc - s.arc, s.arc - b.arc)
+                [*[*known, *samples[:i]][-2:], *samples[i + 2 : i + 4]],
+                key=lambda s: max(a.arc - s.arc, s.arc - b.arc),
             )
             share = None
             if b.arc - a.arc > narrowest:
@@ -119,20 +141,25 @@ class Trail:
         return samples
 
     def explained(self, a: TrailPoint, b: TrailPoint) -> bool:
-        """Whether the counts of `Events.outside` at two points are equal, or a decisive test function changes its sign
-        between."""
+        """Whether the counts of `Events.outside` at two points are equal, or a decisive test
+        function changes its sign between."""
         if a.outside == b.outside or None in (a.outside, b.outside):
             return True
         return bool((a.values * b.values <= 0.0)[self.decisive].any())
 
     def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
-        """The trail point at a share of the way between two, or None if the curve cannot be solved for there."""
+        """The trail point at a share of the way between two, or None if the curve cannot be solved
+        for there.
+        """
         chord = b.point.place - a.point.place
         curve = a.point.curve
-        point = curve.solve_beside(between(a.point, b.point, share), chord / curve.norm(chord), a.point)
+        point = curve.solve_beside(
+            between(a.point, b.point, share), chord / curve.norm(chord), a.point
+        )
         if point is None:
             return None
-        first, second = arc(a.point, point), arc(point, b.point)
+        first = arc(a.point, point)
+        second = arc(point, b.point)
         return self._at(point, a.arc + (b.arc - a.arc) * first / (first + second))
 
     def _sample(self, ahead: Any) -> TrailPoint:
@@ -144,13 +171,19 @@ class Trail:
 
     def _at(self, point: Any, length: float) -> TrailPoint:
         """A point at a length along the curve, with the values of all test functions."""
-        return TrailPoint(point, length, np.array([test.value(point) for test in self.tests]), self.events.outside(point))
+        return TrailPoint(
+            point,
+            length,
+            np.array([test.value(point) for test in self.tests]),
+            self.events.outside(point),
+        )
 
 
 def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> float | None:
-    """The share of the way from a to b at which a test function may have zeros that its values at both ends do not show; None if
-    there is no such place."""
-    begin, end = a.values, b.values
+    """The share of the way from a to b at which a test function may have zeros that its values at
+    both ends do not show; None if there is no such place."""
+    begin = a.values
+    end = b.values
     with np.errstate(all="ignore"):
         rise = end - begin
         bend, twist, unsure, lever = _higher(a, b, near)
@@ -158,7 +191,9 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> 
         room = np.where(signs > 0, 4.0 * np.minimum(np.abs(begin), np.abs(end)), np.abs(rise))
         swing = np.abs(bend) + 1.25 * np.abs(lever).max() * (np.abs(twist) + unsure)
         doubtful = (room <= swing) & (signs != 0) & np.isfinite(swing)
-    worst, place, parabola = 0.0, None, GRID * (1.0 - GRID)
+    worst = 0.0
+    place = None
+    parabola = GRID * (1.0 - GRID)
     for row in np.flatnonzero(doubtful):
         cubic = begin[row] + rise[row] * GRID - parabola * (bend[row] + twist[row] * lever)
         margin = SETTINGS.doubt * parabola * unsure[row] * np.abs(lever)
@@ -167,19 +202,29 @@ def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> 
             k = int(np.argmin(least))
             depth = -least[k] / max(abs(begin[row]), abs(end[row]))
             if depth > worst:
-                worst, place = depth, float(np.clip(GRID[k], SETTINGS.inner, 1.0 - SETTINGS.inner))
-        elif any(np.count_nonzero(np.diff(np.sign(side))) > 1 for side in (cubic - margin, cubic + margin)):
+                worst = depth
+                place = float(np.clip(GRID[k], SETTINGS.inner, 1.0 - SETTINGS.inner))
+        elif any(
+            np.count_nonzero(np.diff(np.sign(side))) > 1
+            for side in (cubic - margin, cubic + margin)
+        ):
             worst, place = max(worst, 1.0), place or 0.5
     return place
 
 
 def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> tuple[np.ndarray, ...]:
-    """The coefficients of second and third order, the uncertainty, and the factor of the last two at the places of the grid.
+    """The coefficients of second and third order, the uncertainty, and the factor of the last two
+    at the places of the grid.
 
-    With fewer than two further points the last known term is the uncertain one; for a straight line this is half of its rise.
+    With fewer than two further points the last known term is the uncertain one; for a straight line
+    this is half of its rise.
     """
-    begin, end, length = a.values, b.values, b.arc - a.arc
-    slope, nothing, everywhere = (end - begin) / length, np.zeros(len(begin)), np.ones(GRID.size)
+    begin = a.values
+    end = b.values
+    length = b.arc - a.arc
+    slope = (end - begin) / length
+    nothing = np.zeros(len(begin))
+    everywhere = np.ones(GRID.size)
     seconds = [((end - c.values) / (b.arc - c.arc) - slope) / (c.arc - a.arc) for c in near]
     if len(near) < 2:
         bend = length**2 * seconds[0] if near else nothing

@@ -1,8 +1,10 @@
-"""The motion of a system: its model is traced into Taylor recurrences, compiled once for its structure, and followed by events.
+"""The motion of a system: its model is traced into Taylor recurrences, compiled once for its
+structure, and followed by events.
 
-Impacts are roots of the gap's series, and no root is missed; rest, release, accumulations of impacts and chatter are modes of
-their own. Nothing is smoothed. `simulate` returns a `Motion`, `sensitivities` differentiates it, and `simulate_many` follows
-many motions, up to millions. Names are imported at their first use: one motion does not load the code for lanes.
+Impacts are roots of the gap's series, and no root is missed; rest, release, accumulations of
+impacts and chatter are modes of their own. Nothing is smoothed. `simulate` returns a `Motion`,
+`sensitivities` differentiates it, and `simulate_many` follows many motions, up to millions. Names
+are imported at their first use: one motion does not load the code for lanes.
 """
 
 from saltus._front_door import front_door

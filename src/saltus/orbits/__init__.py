@@ -1,4 +1,6 @@
-"""Periodic orbits of the exact system, their branches along parameters, and the special points of these branches."""
+"""Periodic orbits of the exact system, their branches along parameters, and the special points of
+these branches.
+"""
 
 from saltus._front_door import front_door
 

@@ -1,5 +1,6 @@
-"""The energy balance of a motion: the work of each load, what damping, frictions and impacts take, what is stored; averages over
-time, at Gauss's points of its steps; and the transmissibility that experimenters measure."""
+"""The energy balance of a motion: the work of each load, what damping, frictions and impacts take,
+what is stored; averages over time, at Gauss's points of its steps; and the transmissibility that
+experimenters measure."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ Response = Callable[[np.ndarray, Any, Any], Any]
 
 
 def _slopes(nodes: np.ndarray) -> np.ndarray:
-    """The matrix that takes the values of a polynomial at the nodes to its slopes there, by the barycentric formula."""
+    """The matrix that takes the values of a polynomial at the nodes to its slopes there, by the
+    barycentric formula.
+    """
     one = np.eye(nodes.size)
     apart = nodes[:, None] - nodes + one
     products = np.prod(apart, axis=1)
@@ -42,7 +45,9 @@ SLOPES = _slopes(NODES)
 
 @dataclass(frozen=True)
 class SampledPart:
-    """A motion between two times, sampled at Gauss's points of its steps: states are (coordinates, n), all else is (n,)."""
+    """A motion between two times, sampled at Gauss's points of its steps: states are (coordinates,
+    n), all else is (n,).
+    """
 
     motion: Motion
     begin: float
@@ -70,20 +75,25 @@ class SampledPart:
         return self.integral(values) / self.length
 
     def rate(self, values: np.ndarray) -> np.ndarray:
-        """The derivatives in time of values (..., n), by the polynomial through Gauss's points of each step."""
+        """The derivatives in time of values (..., n), by the polynomial through Gauss's points of
+        each step.
+        """
         steps = np.reshape(values, (*values.shape[:-1], -1, NODES.size))
         half = self.weight.reshape(-1, NODES.size)[:, :1] / WEIGHTS[0]
         return np.reshape(steps @ SLOPES.T / half, values.shape)
 
 
 @answered
-def transmissibility(of: Followed, channel: str, response: Response | None = None, *, periods: int | None = None) -> float:
+def transmissibility(
+    of: Followed, channel: str, response: Response | None = None, *, periods: int | None = None
+) -> float:
     """The ratio of the standard deviations over time of a response and of the load that drives it,
 
         T = sigma(r) / sigma(u),    sigma(f)^2 = (1/D) int (f - mean f)^2 dt,
 
-    for the channel u of the load (its value: a force, or a displacement of the ground) and the response r, over one period of an
-    orbit or the last forcing periods of a motion, of duration D. For harmonic functions it is the ratio of their amplitudes.
+    for the channel u of the load (its value: a force, or a displacement of the ground) and the
+    response r, over one period of an orbit or the last forcing periods of a motion, of duration D.
+    For harmonic functions it is the ratio of their amplitudes.
 
     Parameters
     ----------
@@ -92,16 +102,18 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
     channel
         The name of a channel of the load, such as "horizontal".
     response
-        r(t, position, velocity) of arrays, such as the force on the ground k x + c x', or x plus the ground's
-        displacement; by default the first coordinate. With several coordinates positions and velocities are arrays
-        (coordinates, n).
+        r(t, position, velocity) of arrays, such as the force on the ground k x + c x', or x plus
+        the ground's displacement; by default the first coordinate. With several coordinates
+        positions and velocities are arrays (coordinates, n).
     periods
-        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
+        How many of the last forcing periods of a motion are used, by default 1; under a load
+        without a frequency all of it.
 
     Raises
     ------
     ParameterError
-        The channel does not vary, the motion was not kept densely or is too short, or the response does not return numbers.
+        The channel does not vary, the motion was not kept densely or is too short, or the response
+        does not return numbers.
 
     Examples
     --------
@@ -113,18 +125,28 @@ def transmissibility(of: Followed, channel: str, response: Response | None = Non
     np.float64(1.0)
     """
     course = course_of(of, periods)
-    model, load = course.system.model, course.system.load
+    model = course.system.model
+    load = course.system.load
     if channel not in load.channels:
-        raise ParameterError(f"the load has no channel {channel!r}; {near(channel, load.channels)}", "channel")
+        raise ParameterError(
+            f"the load has no channel {channel!r}; {near(channel, load.channels)}", "channel"
+        )
     single = len(model.coordinates) == 1
-    state = (course.position[0], course.velocity[0]) if single else (course.position, course.velocity)
+    state = (
+        (course.position[0], course.velocity[0]) if single else (course.position, course.velocity)
+    )
     answer = course.position[0] if response is None else response(course.time, *state)
     try:
         values = np.broadcast_to(np.asarray(answer, dtype=float), course.time.shape)
     except (TypeError, ValueError):
-        raise ParameterError("response must return a number for each time, position and velocity", "response") from None
+        raise ParameterError(
+            "response must return a number for each time, position and velocity", "response"
+        ) from None
     driving = _deviation(
-        course, np.broadcast_to(load.channels[channel].derivative(course.time, load.frequency), course.time.shape)
+        course,
+        np.broadcast_to(
+            load.channels[channel].derivative(course.time, load.frequency), course.time.shape
+        ),
     )
     if driving == 0.0:
         raise ParameterError(f"load.{channel} does not vary, so nothing is transmitted", "channel")
@@ -139,27 +161,44 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
     """An orbit's period, or the last periods of a motion."""
     if not isinstance(of, Followed):
         hint = "give saltus.find_orbit(system, ...) or saltus.simulate(system, ...)"
-        raise ParameterError(f"of must be an orbit or a motion, got a {type(of).__name__}; {hint}", "of")
+        raise ParameterError(
+            f"of must be an orbit or a motion, got a {type(of).__name__}; {hint}", "of"
+        )
     if periods is not None:
         check_count("periods", periods, 1)
     if isinstance(of, Motion):
-        motion, length = of, of.system.load.period
-        begin, end = of.start if length is None else of.time - length * (1 if periods is None else periods), of.time
+        motion = of
+        length = of.system.load.period
+        begin = (
+            of.start if length is None else of.time - length * (1 if periods is None else periods)
+        )
+        end = of.time
     else:
         motion, begin, end = _round(of)
-    if motion.dense is None or begin < motion.start - 1e-9 * max(1.0, abs(motion.time)) or not end > begin:
+    if (
+        motion.dense is None
+        or begin < motion.start - 1e-9 * max(1.0, abs(motion.time))
+        or not end > begin
+    ):
         raise ParameterError(
-            "the motion must have been kept densely for so many forcing periods; simulate it for longer", "periods"
+            "the motion must have been kept densely for so many forcing periods; simulate it for longer",
+            "periods",
         )
     dense = motion.dense
     first = np.clip(dense.start, begin, end)
     length_left = np.clip(np.minimum(dense.start + dense.length, end) - first, 0.0, None)
-    used = first + 0.5 * (1.0 + NODES[0]) * length_left > first  # else a node could not be told from the end of the step
-    middle, half = (first + 0.5 * length_left)[used], 0.5 * length_left[used]
+    # else a node could not be told from the end of the step
+    used = first + 0.5 * (1.0 + NODES[0]) * length_left > first
+    middle = (first + 0.5 * length_left)[used]
+    half = 0.5 * length_left[used]
     time = (middle[:, None] + half[:, None] * NODES).reshape(-1)
     position, velocity, side = dense.states(time)
-    position, velocity = (np.array(rows) for rows in motion.system.from_gaps(time, position, velocity))
-    return SampledPart(motion, begin, end, time, position, velocity, side, (half[:, None] * WEIGHTS).reshape(-1))
+    position, velocity = (
+        np.array(rows) for rows in motion.system.from_gaps(time, position, velocity)
+    )
+    return SampledPart(
+        motion, begin, end, time, position, velocity, side, (half[:, None] * WEIGHTS).reshape(-1)
+    )
 
 
 def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
@@ -168,12 +207,16 @@ def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
         motion = orbit.motion()
         return motion, motion.start, motion.time
     motion = orbit.motion(2 * orbit.period)
-    edges = [time for time in motion.impacts.time.tolist() if time > motion.start + 1e-9 * orbit.duration]
+    edges = [
+        time for time in motion.impacts.time.tolist() if time > motion.start + 1e-9 * orbit.duration
+    ]
     begin = 0.5 * (edges[0] + motion.start) if edges else motion.start
     return motion, begin, begin + orbit.duration
 
 
-SUPPLIED, DISSIPATED, STORED = "supplied", "dissipated", "stored"
+SUPPLIED = "supplied"
+DISSIPATED = "dissipated"
+STORED = "stored"
 Parts = dict[tuple[str, str], float]  # the energy of each part, by its role and its name
 
 
@@ -185,37 +228,44 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
 
     With the generalised force f = M q'' it is, over a time D,
 
-        v f = sum over channels c of v [f_c - f_0] + v f_d + v f_0,    f_d = [f(t, q, v) - f(t, q, -v)] / 2,
+        v f = sum over channels c of v [f_c - f_0] + v f_d + v f_0,    f_d = [f(t, q, v) - f(t, q,
+        -v)] / 2,
 
-    f_0 being the part of f without loads that is even in v, f_c that with the channel c alone. The work of a load is int v (f_c -
-    f_0) dt; damping takes -int v f_d dt; an impact takes [v- M- v- - v+ M+ v+] / 2; the potential energy changes by -int [v f_0 +
-    v M' v / 2] dt. A friction of the force F on a ground of speed w takes int F (w - v) dt, of which the ground supplies int F w
-    dt. Velocities are relative to the ground: of a ground that moves by a channel the force of inertia does the work.
+    f_0 being the part of f without loads that is even in v, f_c that with the channel c alone. The
+    work of a load is int v (f_c - f_0) dt; damping takes -int v f_d dt; an impact takes [v- M- v- -
+    v+ M+ v+] / 2; the potential energy changes by -int [v f_0 + v M' v / 2] dt. A friction of the
+    force F on a ground of speed w takes int F (w - v) dt, of which the ground supplies int F w dt.
+    Velocities are relative to the ground: of a ground that moves by a channel the force of inertia
+    does the work.
 
-    A coordinate of first order, such as a voltage, takes -int v [f_0 - f_0'] dt, with f_0' the forces where it is 0, which the
-    potential energy has then. Over a period of an orbit that is the electric energy which a harvester delivers.
+    A coordinate of first order, such as a voltage, takes -int v [f_0 - f_0'] dt, with f_0' the
+    forces where it is 0, which the potential energy has then. Over a period of an orbit that is the
+    electric energy which a harvester delivers.
 
     Parameters
     ----------
     of
         An orbit, or a motion that was kept densely.
     periods
-        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
+        How many of the last forcing periods of a motion are used, by default 1; under a load
+        without a frequency all of it.
 
     Returns
     -------
     xarray.Dataset
-        Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied (`load.force`, `load.together` of
-        channels that act on one another, `ground.belt`), dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a
-        single contact, `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has no part: what
-        all take together is the sum where `part.str.startswith("impact")`, of no parts 0. The attribute `defect` is what is
-        missing in the sum by rounding, `duration` is D. Of loads on a metainterface the unit is that of K2.
+        Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied
+        (`load.force`, `load.together` of channels that act on one another, `ground.belt`),
+        dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a single contact,
+        `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has
+        no part: what all take together is the sum where `part.str.startswith("impact")`, of no
+        parts 0. The attribute `defect` is what is missing in the sum by rounding, `duration` is D.
+        Of loads on a metainterface the unit is that of K2.
 
     Raises
     ------
     ParameterError
-        The motion was not kept densely or is too short; or the model gives neither its kinetic energy nor its mass
-        matrix; or walls that move do work at its contacts.
+        The motion was not kept densely or is too short; or the model gives neither its kinetic
+        energy nor its mass matrix; or walls that move do work at its contacts.
 
     Examples
     --------
@@ -237,7 +287,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
         "role": ("part", list(roles), "1", "supplied, dissipated or stored"),
     }
     facts = {"duration": course.length, "defect": float(np.sum(signs * energy))}
-    return result_dataset("energies", columns, {"part": list(names)}, course.system, tol=course.motion.tol, **facts)
+    return result_dataset(
+        "energies", columns, {"part": list(names)}, course.system, tol=course.motion.tol, **facts
+    )
 
 
 def _refuse_moving_walls(system: System) -> None:
@@ -253,19 +305,23 @@ def _refuse_moving_walls(system: System) -> None:
 
 @answered
 def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
-    """The energy that damping, friction and impacts dissipate, divided by the time: the dissipated parts of `energies`,
+    """The energy that damping, friction and impacts dissipate, divided by the time: the dissipated
+    parts of `energies`,
 
-        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions int F (w - v) dt },
+        P = (1/D) { sum over impacts [v- M- v- - v+ M+ v+] / 2 - int v f_d dt + sum over frictions
+        int F (w - v) dt },
 
-    over one period of an orbit or the last forcing periods of a motion, of duration D. On a periodic orbit P equals the mean
-    power that the load and moving grounds supply. For load (i) its unit is that of K2 over the unit of time.
+    over one period of an orbit or the last forcing periods of a motion, of duration D. On a
+    periodic orbit P equals the mean power that the load and moving grounds supply. For load (i) its
+    unit is that of K2 over the unit of time.
 
     Parameters
     ----------
     of
         An orbit, or a motion that was kept densely.
     periods
-        How many of the last forcing periods of a motion are used, by default 1; under a load without a frequency all of it.
+        How many of the last forcing periods of a motion are used, by default 1; under a load
+        without a frequency all of it.
 
     Raises
     ------
@@ -289,7 +345,8 @@ def mean_dissipated_power(of: Followed, *, periods: int | None = None) -> float:
 
 def _parts(course: SampledPart) -> Parts:
     """The energies by their parts, those of the loads first."""
-    load, v = course.system.load, _moving(course, course.velocity)
+    load = course.system.load
+    v = _moving(course, course.velocity)
     mass = _mass(course, course.time, course.position, course.side)
     forth, back = (_force(course, load, mass, w) for w in (v, -v))
     own = _even_force(course, Load(frequency=load.frequency), mass)
@@ -299,7 +356,9 @@ def _parts(course: SampledPart) -> Parts:
         alone = _even_force(course, Load(frequency=load.frequency, **{name: signal}), mass) - own
         parts[SUPPLIED, f"load.{name}"] = course.integral(v * alone)
         left = left - alone
-    if len(load.channels) > 1 and np.abs(left).max(initial=0.0) > 1e-12 * np.abs(forth).max(initial=0.0):
+    if len(load.channels) > 1 and np.abs(left).max(initial=0.0) > 1e-12 * np.abs(forth).max(
+        initial=0.0
+    ):
         parts[SUPPLIED, "load.together"] = course.integral(v * left)
     parts |= _friction_parts(course, mass, forth)
     if course.system.model.first_order:
@@ -314,15 +373,28 @@ def _parts(course: SampledPart) -> Parts:
 
 
 def _moving(course: SampledPart, velocity: np.ndarray) -> np.ndarray:
-    """Velocities (coordinates, n), 0 for those of first order, which have no inertia and on which no force does work."""
+    """Velocities (coordinates, n), 0 for those of first order, which have no inertia and on which
+    no force does work.
+    """
     count = len(course.system.model.moving)
-    return np.concatenate([velocity[:count], 0.0 * velocity[count:]]) if count < len(velocity) else velocity
+    return (
+        np.concatenate([velocity[:count], 0.0 * velocity[count:]])
+        if count < len(velocity)
+        else velocity
+    )
 
 
-def _first_order_parts(course: SampledPart, own: np.ndarray, mass: np.ndarray) -> tuple[Parts, np.ndarray]:
-    """What each coordinate of first order takes by the forces that it changes, and the forces where all of them are 0."""
-    model, load, v = course.system.model, Load(frequency=course.system.load.frequency), _moving(course, course.velocity)
-    count, parts = len(model.moving), Parts()
+def _first_order_parts(
+    course: SampledPart, own: np.ndarray, mass: np.ndarray
+) -> tuple[Parts, np.ndarray]:
+    """What each coordinate of first order takes by the forces that it changes, and the forces where
+    all of them are 0.
+    """
+    model = course.system.model
+    load = Load(frequency=course.system.load.frequency)
+    v = _moving(course, course.velocity)
+    count = len(model.moving)
+    parts = Parts()
 
     def forces(kept: int) -> np.ndarray:
         position = course.position.copy()
@@ -335,36 +407,53 @@ def _first_order_parts(course: SampledPart, own: np.ndarray, mass: np.ndarray) -
         alone = forces(count + i) - without
         parts[DISSIPATED, f"first_order.{name}"] = -course.integral(v * alone)
         left = left - alone
-    if len(model.first_order) > 1 and np.abs(v * left).max(initial=0.0) > 1e-12 * np.abs(v * own).max(initial=0.0):
+    if len(model.first_order) > 1 and np.abs(v * left).max(initial=0.0) > 1e-12 * np.abs(
+        v * own
+    ).max(initial=0.0):
         parts[DISSIPATED, "first_order.together"] = -course.integral(v * left)
     return parts, without
 
 
 def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) -> Parts:
     """What the grounds of frictions supply, where they move, and what the frictions take."""
-    system, parts = course.system, Parts()
+    system = course.system
+    parts = Parts()
     if not isinstance(system.model, ContactModel) or not system.contact_model.frictions:
         return parts
-    inner, load, velocity = system.in_gap_coordinates, system.load, course.velocity
-    state, touching = _state(course.position, velocity), inner.contact_model
+    inner = system.in_gap_coordinates
+    load = system.load
+    velocity = course.velocity
+    state = _state(course.position, velocity)
+    touching = inner.contact_model
     normals = system.contact_model.normal_forces(course.time, *state, load)
-    holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force  # what makes a coordinate stick
+    # what makes a coordinate stick
+    holding = np.einsum("ijn,jn->in", mass, course.rate(course.velocity)) - force
     if inner is not system:  # each friction and each contact acts along one of its coordinates
         made: Any = touching
         place, rate = made.gap_values(course.time, load, *state)
         columns = zip(*made.own_slopes(course.time, place, load), strict=True)
-        holding = [sum(share * each for share, each in zip(column, holding, strict=True)) for column in columns]
+        holding = [
+            sum(share * each for share, each in zip(column, holding, strict=True))
+            for column in columns
+        ]
         velocity = np.array(rate if isinstance(rate, tuple) else (rate,))
     slides = modes_of(touching, course.side)[1]
     for friction, normal, slide in zip(touching.frictions, normals, slides, strict=True):
-        i, ground = touching.coordinates.index(friction.coordinate), friction.ground_speed
+        i = touching.coordinates.index(friction.coordinate)
+        ground = friction.ground_speed
         for contact in (each for each in touching.contacts if each.name == friction.contact):
-            normal = np.where(slide == 2, 0.0, contact.sign * holding[touching.coordinates.index(contact.coordinate)])
+            normal = np.where(
+                slide == 2,
+                0.0,
+                contact.sign * holding[touching.coordinates.index(contact.coordinate)],
+            )
         way = np.where(slide == 2, 0, slide)
         acting = np.where(slide == 0, holding[i], -friction.slipping(velocity[i], way) * normal)
         if ground:
             parts[SUPPLIED, f"ground.{friction.name}"] = course.integral(acting * ground)
-        parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(acting * (ground - velocity[i]))
+        parts[DISSIPATED, f"friction.{friction.name}"] = course.integral(
+            acting * (ground - velocity[i])
+        )
     return parts
 
 
@@ -377,27 +466,46 @@ def _impact_parts(course: SampledPart) -> Parts:
 
 
 def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
-    """The name of each impact's part, and the kinetic energy that it takes; what impacts accumulate to, which are too slow to be
-    followed, is taken by the last one that is, or where a contact is held from then on."""
-    system, impacts = course.system, course.motion.events.impacts(EventKind.HELD)
+    """The name of each impact's part, and the kinetic energy that it takes; what impacts accumulate
+    to, which are too slow to be followed, is taken by the last one that is, or where a contact is
+    held from then on."""
+    system = course.system
+    impacts = course.motion.events.impacts(EventKind.HELD)
     late = (impacts.time > course.begin) & (impacts.time <= course.end)
     if not late.any():
         return
-    times, side = impacts.time[late], impacts.side[late].astype(float)
-    both = (np.reshape(v[late], (times.size, -1)).T for v in (impacts.velocity_before, impacts.velocity_after))
+    times = impacts.time[late]
+    side = impacts.side[late].astype(float)
+    both = (
+        np.reshape(v[late], (times.size, -1)).T
+        for v in (impacts.velocity_before, impacts.velocity_after)
+    )
     before, after = (_moving(course, v) for v in both)
-    names, beyond = ["impact"] * times.size, side
+    names = ["impact"] * times.size
+    beyond = side
     if isinstance(system.model, ContactModel):
         places = course.motion._states(times)[0]
         called = [contact.name for contact in system.contact_model.contacts]
-        names = ["impact." + "+".join(c for i, c in enumerate(called) if int(bits) >> i & 1) for bits in side]
+        names = [
+            "impact." + "+".join(c for i, c in enumerate(called) if int(bits) >> i & 1)
+            for bits in side
+        ]
     else:
         places = np.full((1, times.size), float(system.model.contact))
-        after[:, course.motion._states(0.5 * (times + np.append(times[1:], course.end)))[2] == 0] = 0.0  # rest begins there
-        reset, given = system.one_contact.reset, zip(times, before[0], side, strict=True)
-        beyond = np.array([reset(t, v, s, system.load, system.impact)[0] for t, v, s in given], dtype=float)
+        # rest begins there
+        after[
+            :, course.motion._states(0.5 * (times + np.append(times[1:], course.end)))[2] == 0
+        ] = 0.0
+        reset = system.one_contact.reset
+        given = zip(times, before[0], side, strict=True)
+        beyond = np.array(
+            [reset(t, v, s, system.load, system.impact)[0] for t, v, s in given], dtype=float
+        )
     first, second = (_mass(course, times, places, s) for s in (side, beyond))
-    lost = (np.einsum("in,ijn,jn->n", before, first, before) - np.einsum("in,ijn,jn->n", after, second, after)) / 2
+    lost = (
+        np.einsum("in,ijn,jn->n", before, first, before)
+        - np.einsum("in,ijn,jn->n", after, second, after)
+    ) / 2
     yield from zip(names, lost.tolist(), strict=True)
 
 
@@ -406,40 +514,68 @@ def _kinetic(course: SampledPart, place: int) -> float:
     time = np.array([(course.begin, course.end)[place]])
     q, v, side = course.motion._states(time)
     v = _moving(course, v)
-    return float(np.einsum("in,ijn,jn->n", v, _mass(course, time, q, np.where(side == 0, 1, side)), v)[0]) / 2
+    return (
+        float(
+            np.einsum("in,ijn,jn->n", v, _mass(course, time, q, np.where(side == 0, 1, side)), v)[0]
+        )
+        / 2
+    )
 
 
 def _even_force(course: SampledPart, load: Load, mass: np.ndarray) -> np.ndarray:
-    """The part of the generalised force under a load that is even in the velocity, (coordinates, n)."""
+    """The part of the generalised force under a load that is even in the velocity, (coordinates,
+    n).
+    """
     forth, back = (_force(course, load, mass, v) for v in (course.velocity, -course.velocity))
     return np.asarray((forth + back) / 2)
 
 
 def _force(course: SampledPart, load: Load, mass: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """The generalised force f = M q'' without reactions and frictions at a velocity, (coordinates, n)."""
-    model, state = course.system.model, _state(course.position, velocity)
+    """The generalised force f = M q'' without reactions and frictions at a velocity, (coordinates,
+    n).
+    """
+    model = course.system.model
+    state = _state(course.position, velocity)
     if isinstance(model, ContactModel):
         return _rows(mass_and_force(model, course.time, *state, load)[1], course.time)
-    answer = model.acceleration(course.time, *state, np.where(course.side == 0, 1.0, course.side), load)
-    return np.asarray(np.einsum("ijn,jn->in", mass, _rows(answer if isinstance(answer, tuple) else [answer], course.time)))
+    answer = model.acceleration(
+        course.time, *state, np.where(course.side == 0, 1.0, course.side), load
+    )
+    return np.asarray(
+        np.einsum(
+            "ijn,jn->in",
+            mass,
+            _rows(answer if isinstance(answer, tuple) else [answer], course.time),
+        )
+    )
 
 
 def _state(position: np.ndarray, velocity: np.ndarray) -> tuple[Any, Any]:
-    """Coordinates and velocities as a model takes them: arrays for a single coordinate, tuples of arrays for several."""
+    """Coordinates and velocities as a model takes them: arrays for a single coordinate, tuples of
+    arrays for several.
+    """
     return (tuple(position), tuple(velocity)) if len(position) > 1 else (position[0], velocity[0])
 
 
 def _rows(values: Any, times: np.ndarray) -> np.ndarray:
-    return np.array([np.broadcast_to(np.asarray(value, dtype=float), times.shape) for value in values])
+    return np.array(
+        [np.broadcast_to(np.asarray(value, dtype=float), times.shape) for value in values]
+    )
 
 
 def _mass(course: SampledPart, time: np.ndarray, position: np.ndarray, side: Any) -> np.ndarray:
-    """The mass matrix, (coordinates, coordinates, n): the model's own or, as the kinetic energy T is quadratic in the velocity,
-    T(e_i + e_j) - T(e_i) - T(e_j) + T(0)."""
-    model, load = course.system.model, course.system.load
+    """The mass matrix, (coordinates, coordinates, n): the model's own or, as the kinetic energy T
+    is quadratic in the velocity, T(e_i + e_j) - T(e_i) - T(e_j) + T(0)."""
+    model = course.system.model
+    load = course.system.load
     still = np.zeros_like(position)
     if isinstance(model, ContactModel):
-        return np.array([_rows(row, time) for row in mass_and_force(model, time, *_state(position, still), load)[0]])
+        return np.array(
+            [
+                _rows(row, time)
+                for row in mass_and_force(model, time, *_state(position, still), load)[0]
+            ]
+        )
     one = np.eye(len(position))[:, :, None] + still
     side = np.where(np.asarray(side) == 0, 1.0, side)
 
@@ -447,4 +583,6 @@ def _mass(course: SampledPart, time: np.ndarray, position: np.ndarray, side: Any
         return model.kinetic_energy(time, *_state(position, velocity), side, load)
 
     none = energy(still)
-    return np.array([_rows([energy(a + b) - energy(a) - energy(b) + none for b in one], time) for a in one])
+    return np.array(
+        [_rows([energy(a + b) - energy(a) - energy(b) + none for b in one], time) for a in one]
+    )

@@ -1,4 +1,6 @@
-"""Free periodic motions of systems without loss, from one turning point to the other and back, and their period by amplitude."""
+"""Free periodic motions of systems without loss, from one turning point to the other and back, and
+their period by amplitude.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +28,17 @@ class FreeOrbitSettings:
     """How a free motion is followed until it is back where it began."""
 
     tol: float = 1e-15  # The error of a step: periods are then exact to some 1e-14.
-    first_duration: float = 8.0  # How long the motion is followed first; the time is then doubled until it comes back.
+    # How long the motion is followed first; the time is then doubled until it comes back.
+    first_duration: float = 8.0
     most_duration: float = (
-        1e5  # Near a saddle the period grows as the logarithm of the distance from it: with rounding 1e5 is never reached.
+        # Near a saddle the period grows as the logarithm of the distance from it: with rounding 1e5
+        # is never reached.
+        1e5
     )
-    returned: float = 1e-9  # The distance from the start, relative to the amplitude, at which a motion has come back.
-    # The sign of the velocity is compared at the ends of so many parts of each step, which takes a third of the period at most.
+    # The distance from the start, relative to the amplitude, at which a motion has come back.
+    returned: float = 1e-9
+    # The sign of the velocity is compared at the ends of so many parts of each step, which takes a
+    # third of the period at most.
     parts: int = 16
 
 
@@ -49,7 +56,8 @@ class NoFreeOrbit(Sentence):
 
 @dataclass(frozen=True)
 class FreeOrbit(Result):
-    """A free periodic motion of a system with one coordinate, which begins at rest at one of its two turning points.
+    """A free periodic motion of a system with one coordinate, which begins at rest at one of its
+    two turning points.
 
     If it hits a wall and is thrown back, the wall is the other turning point.
 
@@ -95,18 +103,23 @@ class FreeOrbit(Result):
     def to_xarray(self) -> xarray.Dataset:
         """One period of it over `time`, with its numbers as attributes."""
         data = self.motion().to_xarray()
-        numbers = {name: getattr(self, name) for name in ("amplitude", "turning", "period", "impact_speed", "defect")}
+        numbers = {
+            name: getattr(self, name)
+            for name in ("amplitude", "turning", "period", "impact_speed", "defect")
+        }
         data.attrs |= {"title": "free orbit computed by saltus", "kind": "free_orbit"} | numbers
         return data
 
 
 @answered
 def free_orbit(system: System, amplitude: float) -> FreeOrbit:
-    """The free periodic motion that begins at rest at the coordinate `amplitude`, of a system without loss.
+    """The free periodic motion that begins at rest at the coordinate `amplitude`, of a system
+    without loss.
 
-    It is followed from one turning point, theta' = 0, to the other one and back. Each turning point is a root of the velocity's
-    Taylor series, and every impact between them is exact. The load must be constant. If the motion begins at a distance d from a
-    saddle, its period is exact to about 1e-16 / d^2, because rounding of the energy then moves the turning point.
+    It is followed from one turning point, theta' = 0, to the other one and back. Each turning point
+    is a root of the velocity's Taylor series, and every impact between them is exact. The load must
+    be constant. If the motion begins at a distance d from a saddle, its period is exact to about
+    1e-16 / d^2, because rounding of the energy then moves the turning point.
 
     Parameters
     ----------
@@ -138,8 +151,11 @@ def free_orbit(system: System, amplitude: float) -> FreeOrbit:
 
 
 @answered
-def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress = silent) -> xarray.Dataset:
-    """The free periodic motions of a system without loss for several amplitudes: the backbone curve of its resonances.
+def backbone(
+    system: System, amplitudes: Iterable[float], *, progress: Progress = silent
+) -> xarray.Dataset:
+    """The free periodic motions of a system without loss for several amplitudes: the backbone curve
+    of its resonances.
 
     Parameters
     ----------
@@ -153,13 +169,15 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
     Returns
     -------
     xarray.Dataset
-        A Dataset over (amplitude): `period`, `frequency` = 2 pi / period, `turning` (the other turning point), `impact_speed`
-        (the largest; nan without impacts), `defect`, and `outcome`, periodic or a word of `NoFreeOrbit`; nan where there is none.
+        A Dataset over (amplitude): `period`, `frequency` = 2 pi / period, `turning` (the other
+        turning point), `impact_speed` (the largest; nan without impacts), `defect`, and `outcome`,
+        periodic or a word of `NoFreeOrbit`; nan where there is none.
 
     Raises
     ------
     ParameterError
-        The system has several coordinates, its load varies, or the amplitudes are no finite numbers.
+        The system has several coordinates, its load varies, or the amplitudes are no finite
+        numbers.
 
     Examples
     --------
@@ -186,11 +204,24 @@ def backbone(system: System, amplitudes: Iterable[float], *, progress: Progress 
         "impact_speed": (unit, "largest speed of an impact"),
         "defect": (unit, "distance from itself after the period"),
     }
-    data = xarray.Dataset(coords={"amplitude": ("amplitude", grid, {"units": unit, "long_name": f"{name} at a turning point"})})
+    data = xarray.Dataset(
+        coords={
+            "amplitude": (
+                "amplitude",
+                grid,
+                {"units": unit, "long_name": f"{name} at a turning point"},
+            )
+        }
+    )
     for key, (units, text) in columns.items():
-        values = [getattr(orbit, key) if isinstance(orbit, FreeOrbit) else math.nan for orbit in found]
+        values = [
+            getattr(orbit, key) if isinstance(orbit, FreeOrbit) else math.nan for orbit in found
+        ]
         data[key] = ("amplitude", np.array(values), {"units": units, "long_name": text})
-    words = [str(Ending.PERIODIC) if isinstance(orbit, FreeOrbit) else orbit.name.lower() for orbit in found]
+    words = [
+        str(Ending.PERIODIC) if isinstance(orbit, FreeOrbit) else orbit.name.lower()
+        for orbit in found
+    ]
     data["outcome"] = ("amplitude", np.array(words), {"long_name": "what becomes of the motion"})
     data.attrs = {"title": "free orbits computed by saltus", "kind": "backbone"}
     data.attrs |= provenance(system, tol=SETTINGS.tol, coordinate=name)
@@ -201,13 +232,18 @@ def _check(system: System, asking: str) -> None:
     check_system(system, asking, coordinates=1)
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
-            raise ParameterError(f"load.{name} varies, and free orbits are those under a constant load", f"load.{name}")
+            raise ParameterError(
+                f"load.{name} varies, and free orbits are those under a constant load",
+                f"load.{name}",
+            )
 
 
 def _numbers(amplitudes: Any) -> np.ndarray:
     grid = np.atleast_1d(as_numbers(amplitudes, "amplitudes"))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
-        raise ParameterError(f"amplitudes must be finite numbers, got {shown(amplitudes)}", "amplitudes")
+        raise ParameterError(
+            f"amplitudes must be finite numbers, got {shown(amplitudes)}", "amplitudes"
+        )
     return grid
 
 
@@ -217,7 +253,9 @@ def _followed(system: System, amplitude: float, duration: float) -> Motion:
 
 
 def _found(system: System, amplitude: float) -> FreeOrbit | NoFreeOrbit:
-    """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the motion is not periodic."""
+    """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the
+    motion is not periodic.
+    """
     duration = SETTINGS.first_duration
     while duration <= SETTINGS.most_duration:
         motion = _followed(system, amplitude, duration)
@@ -238,34 +276,54 @@ def _moves(motion: Motion) -> bool:
     return motion.dense is not None and bool(np.any(motion.dense.series[:, :, 1:]))
 
 
-def _closed(motion: Motion, amplitude: float, half: float, period: float) -> FreeOrbit | NoFreeOrbit:
-    """The orbit whose turning points are reached at `half` and `period`, if it is then back at its start."""
+def _closed(
+    motion: Motion, amplitude: float, half: float, period: float
+) -> FreeOrbit | NoFreeOrbit:
+    """The orbit whose turning points are reached at `half` and `period`, if it is then back at its
+    start.
+    """
     turning, back = (float(motion.at(time)[0]) for time in (half, period))
-    defect, size = abs(back - amplitude), max(abs(amplitude), abs(turning))
+    defect = abs(back - amplitude)
+    size = max(abs(amplitude), abs(turning))
     if defect > SETTINGS.returned * size:
         return NoFreeOrbit.LOST
     inside = motion.impacts.time <= period
     speeds = np.abs(motion.impacts.velocity_before[inside])
-    return FreeOrbit(motion.system, amplitude, turning, period, float(speeds.max()) if speeds.size else math.nan, defect)
+    return FreeOrbit(
+        motion.system,
+        amplitude,
+        turning,
+        period,
+        float(speeds.max()) if speeds.size else math.nan,
+        defect,
+    )
 
 
 def _turning_times(motion: Motion) -> list[float]:
-    """The instants at which the velocity changes its sign, at a root of its series or at an impact, after the start."""
+    """The instants at which the velocity changes its sign, at a root of its series or at an impact,
+    after the start.
+    """
     dense = motion.dense
     if dense is None:
         return []
     slopes = dense.series[:, 0, 1:] * np.arange(1, dense.series.shape[2])
     shares = np.linspace(0.0, 1.0, SETTINGS.parts + 1)
-    turns, sign = [], 0.0
-    for start, length, slope in zip(dense.start.tolist(), dense.length.tolist(), slopes[:, ::-1], strict=True):
+    turns = []
+    sign = 0.0
+    for start, length, slope in zip(
+        dense.start.tolist(), dense.length.tolist(), slopes[:, ::-1], strict=True
+    ):
         values = np.polyval(slope, shares * length)
         values[np.abs(values) <= SETTINGS.tol * np.abs(values).max(initial=0.0)] = 0.0
         known = None  # the last of these instants at which the velocity is not 0, in this step
         for share, value in zip(shares.tolist(), np.sign(values).tolist(), strict=True):
             if value * sign < 0.0:
-                turns.append(start if known is None else start + _root(slope, known, share * length))
+                turns.append(
+                    start if known is None else start + _root(slope, known, share * length)
+                )
             if value:
-                sign, known = value, share * length
+                sign = value
+                known = share * length
     return turns
 
 

@@ -1,4 +1,6 @@
-"""A periodic orbit: its impacts, amplitude, multipliers and margins, and its check by direct simulation."""
+"""A periodic orbit: its impacts, amplitude, multipliers and margins, and its check by direct
+simulation.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +24,22 @@ from saltus.systems import System, arguments_of, state_of
 if TYPE_CHECKING:
     import xarray
 
-NEWTON_ITERATIONS = 12  # enough from a guess near the orbit; a motion that has not quite settled needs more
+# enough from a guess near the orbit; a motion that has not quite settled needs more
+NEWTON_ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit(Result):
     """A periodic orbit of the exact system, solved to rounding.
 
-    Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the impacts.
+    Phases and speeds are those of one period of the orbit, q forcing periods, in the order of the
+    impacts.
 
     Attributes
     ----------
     equations
-        The equations that it solves: those of a system, with given parameters and a given sequence of impacts.
+        The equations that it solves: those of a system, with given parameters and a given sequence
+        of impacts.
     solution
         The solution of these equations.
 
@@ -51,9 +56,14 @@ class PeriodicOrbit(Result):
 
     @classmethod
     def near(
-        cls, equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+        cls,
+        equations: OrbitEquations,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        iterations: int = NEWTON_ITERATIONS,
     ) -> PeriodicOrbit | None:
-        """The orbit near a guess at fixed parameters, or None where Newton's method does not converge.
+        """The orbit near a guess at fixed parameters, or None where Newton's method does not
+        converge.
 
         Parameters
         ----------
@@ -70,8 +80,11 @@ class PeriodicOrbit(Result):
         return None if found is None else PeriodicOrbit(equations, found)
 
     @classmethod
-    def known(cls, equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit | None:
-        """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be followed.
+    def known(
+        cls, equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray
+    ) -> PeriodicOrbit | None:
+        """The orbit whose unknowns are known: nothing is solved. None where its motion cannot be
+        followed.
 
         Parameters
         ----------
@@ -83,7 +96,11 @@ class PeriodicOrbit(Result):
             The parameters' values.
         """
         evaluation = equations.evaluate(unknowns, values, with_extremes=True)
-        return None if evaluation is None else PeriodicOrbit(equations, Solution(unknowns, values, evaluation, 0))
+        return (
+            None
+            if evaluation is None
+            else PeriodicOrbit(equations, Solution(unknowns, values, evaluation, 0))
+        )
 
     @cached_property
     def system(self) -> System:
@@ -117,10 +134,15 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _impacts(self) -> tuple[np.ndarray, np.ndarray]:
-        """The phases and speeds of the impacts in one period; those of an orbit with rests follow its first release."""
+        """The phases and speeds of the impacts in one period; those of an orbit with rests follow
+        its first release.
+        """
         phases, speeds = self.equations.impacts(self.solution)
         if self.symmetric:
-            phases, speeds = np.concatenate([phases, phases + self.equations.closing]), np.tile(speeds, 2)
+            phases, speeds = (
+                np.concatenate([phases, phases + self.equations.closing]),
+                np.tile(speeds, 2),
+            )
         if not self.releases.size:
             return phases, speeds
         first = self.releases[0] * self.frequency
@@ -134,7 +156,9 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def impact_times(self) -> np.ndarray:
-        """The times of the impacts, from phase 0 of the load's period in which the first one lies, (n,)."""
+        """The times of the impacts, from phase 0 of the load's period in which the first one lies,
+        (n,).
+        """
         times: np.ndarray = (self._phases - 2.0 * math.pi * self._shift) / self.frequency
         return times
 
@@ -145,7 +169,9 @@ class PeriodicOrbit(Result):
 
     @property
     def counted_impacts(self) -> int:
-        """The number of impacts in one of its periods, without those of accumulations, whose number depends on rounding."""
+        """The number of impacts in one of its periods, without those of accumulations, whose number
+        depends on rounding.
+        """
         return self.equations.counted_impacts(self.solution) * (2 if self.symmetric else 1)
 
     @property
@@ -166,24 +192,33 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _excursions(self) -> np.ndarray:
-        """The releases and the rests after them, (n, 2), from the release on that is earliest in the forcing period."""
-        found, period = self.equations.rests(self.solution), self.duration / self.period
+        """The releases and the rests after them, (n, 2), from the release on that is earliest in
+        the forcing period.
+        """
+        found = self.equations.rests(self.solution)
+        period = self.duration / self.period
         if not found.size:
             return found
         within = found[:, 0] % period
         begin = found[int(np.argmin(within))]
         turned = (found[:, 0] - begin[0]) % self.duration
-        first = within.min() + np.sort(np.where(turned > self.duration - TOLERANCES.release * period, 0.0, turned))
+        first = within.min() + np.sort(
+            np.where(turned > self.duration - TOLERANCES.release * period, 0.0, turned)
+        )
         return np.column_stack([first, first + (found[:, 1] - found[:, 0])[np.argsort(turned)]])
 
     @property
     def releases(self) -> np.ndarray:
-        """The times at which it leaves rest at a contact, from phase 0 of the load's period in which the first one lies, (n,)."""
+        """The times at which it leaves rest at a contact, from phase 0 of the load's period in
+        which the first one lies, (n,).
+        """
         return self._excursions[:, 0]
 
     @property
     def rests(self) -> np.ndarray:
-        """The times at which it comes to rest at a contact, each after the release of the same index, (n,)."""
+        """The times at which it comes to rest at a contact, each after the release of the same
+        index, (n,).
+        """
         return self._excursions[:, 1]
 
     @property
@@ -216,7 +251,8 @@ class PeriodicOrbit(Result):
         """The largest value of the coordinate; with several coordinates, of any of them."""
         if self._in_others:
             return float(self._own_extrema[:, 1].max())
-        top, bottom = self._extremes[:, SegmentColumn.HIGHEST].max(), self._extremes[:, SegmentColumn.LOWEST].min()
+        top = self._extremes[:, SegmentColumn.HIGHEST].max()
+        bottom = self._extremes[:, SegmentColumn.LOWEST].min()
         return float(max(top, -bottom) if self.symmetric else top)
 
     @cached_property
@@ -224,7 +260,11 @@ class PeriodicOrbit(Result):
         """The least value of the coordinate; with several coordinates, of any of them."""
         if self._in_others:
             return float(self._own_extrema[:, 0].min())
-        return -self.highest if self.symmetric else float(self._extremes[:, SegmentColumn.LOWEST].min())
+        return (
+            -self.highest
+            if self.symmetric
+            else float(self._extremes[:, SegmentColumn.LOWEST].min())
+        )
 
     @property
     def amplitude(self) -> float:
@@ -233,48 +273,66 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def clearance(self) -> float:
-        """The gap at its lowest minimum between impacts, inf without a minimum; if it is negative this is no real motion."""
+        """The gap at its lowest minimum between impacts, inf without a minimum; if it is negative
+        this is no real motion.
+        """
         return float(self._extremes[:, SegmentColumn.LOWEST_GAP].min())
 
     @property
     def crossings(self) -> int:
-        """How often it passes through a contact that is no singularity, in one of its periods; 0 for orbits with impacts."""
+        """How often it passes through a contact that is no singularity, in one of its periods; 0
+        for orbits with impacts.
+        """
         return int(self._extremes[:, SegmentColumn.CROSSINGS].sum()) * (2 if self.symmetric else 1)
 
     @property
     def shallowest(self) -> float:
-        """The least depth of its passages beyond a contact that is no singularity, on either side; inf without passages."""
+        """The least depth of its passages beyond a contact that is no singularity, on either side;
+        inf without passages.
+        """
         return float(self._extremes[:, SegmentColumn.SHALLOWEST].min())
 
     @cached_property
     def slowest(self) -> float:
-        """The least speed of an impact, inf without impacts; if it is negative this is no real motion."""
+        """The least speed of an impact, inf without impacts; if it is negative this is no real
+        motion.
+        """
         return float(self.speeds.min(initial=math.inf))
 
     @cached_property
     def pressing(self) -> float:
-        """With several contacts the least of the reactions of closed ones and the times between events; inf with one contact. If
-        it is negative this is no real motion."""
+        """With several contacts the least of the reactions of closed ones and the times between
+        events; inf with one contact. If it is negative this is no real motion."""
         return self.equations.pressing(self.solution)
 
     @property
     def admissible(self) -> bool:
-        """Whether it is a motion of the system: every impact has a positive speed, events are in order, and gaps are open."""
+        """Whether it is a motion of the system: every impact has a positive speed, events are in
+        order, and gaps are open.
+        """
         phases = self._phases
-        in_order = np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
-        return min(self.clearance, self.slowest, self.pressing) > -TOLERANCES.touch and bool(in_order.all())
+        in_order = (
+            np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
+        )
+        return min(self.clearance, self.slowest, self.pressing) > -TOLERANCES.touch and bool(
+            in_order.all()
+        )
 
     @cached_property
     def margins(self) -> dict[str, float]:
-        """The least value of each of the model's margins; a negative one is passed, see `MarginKind` (errata 20, 21)."""
+        """The least value of each of the model's margins; a negative one is passed, see
+        `MarginKind` (errata 20, 21).
+        """
         least = self._extremes[:, SegmentColumn.LEAST_MARGIN :].min(axis=0)
         return dict(zip(self.equations.margins, map(float, least), strict=False))
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a coordinate of first order; and
-        one more, which is 0, for an orbit that is followed from event to event of several contacts."""
-        chain, following = self.solution.evaluation.monodromy(), self.equations.following
+        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a
+        coordinate of first order; and one more, which is 0, for an orbit that is followed from
+        event to event of several contacts."""
+        chain = self.solution.evaluation.monodromy()
+        following = self.equations.following
         chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
         if not np.isfinite(chain).all():
             return np.full(len(chain), complex(np.inf))
@@ -284,37 +342,52 @@ class PeriodicOrbit(Result):
 
     @property
     def grazes(self) -> bool:
-        """Whether it touches the contact without speed, so that the map has no derivative there and multipliers have no meaning.
+        """Whether it touches the contact without speed, so that the map has no derivative there and
+        multipliers have no meaning.
 
-        False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then keep their meaning.
+        False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then
+        keep their meaning.
         """
         speed = self.equations.touching_speed(self.solution)
-        return not self.equations.passes_contact and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
+        return (
+            not self.equations.passes_contact
+            and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
+        )
 
     @property
     def isolated(self) -> bool:
-        """Whether no others lie beside it at the same parameters: there a multiplier is 1 and the equations leave a way free."""
+        """Whether no others lie beside it at the same parameters: there a multiplier is 1 and the
+        equations leave a way free.
+        """
         near = np.abs(self.multipliers - 1.0).min() < TOLERANCES.isolated
         return not near or not _free(self.solution.evaluation.derivatives())[0].size
 
     @property
     def stable(self) -> bool:
-        """Whether it does not graze and all multipliers lie inside the unit circle by more than rounding: not at an LP or PD."""
-        return bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all()) and not self.grazes
+        """Whether it does not graze and all multipliers lie inside the unit circle by more than
+        rounding: not at an LP or PD.
+        """
+        return (
+            bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all()) and not self.grazes
+        )
 
     def start(self) -> dict[str, Any]:
-        """The arguments of `simulate` that start a motion on the orbit: just after its first impact or, without impacts, at phase
-        0; with several contacts or with rests, between two events."""
+        """The arguments of `simulate` that start a motion on the orbit: just after its first impact
+        or, without impacts, at phase 0; with several contacts or with rests, between two events."""
         start = self.equations.start(self.solution)
         if not self._in_others:
             return start
         inner = state_of(self.system.in_gap_coordinates, start)
         own = np.concatenate(self.system.from_gaps(start.get("time", 0.0), *np.split(inner, 2)))
-        return arguments_of(self.system, own) | {name: value for name, value in start.items() if name == "time"}
+        return arguments_of(self.system, own) | {
+            name: value for name, value in start.items() if name == "time"
+        }
 
     @property
     def _in_others(self) -> bool:
-        """Whether the contacts of its system keep sums of coordinates, so that the equations are those of other coordinates."""
+        """Whether the contacts of its system keep sums of coordinates, so that the equations are
+        those of other coordinates.
+        """
         return self.equations.system is not self.equations.given
 
     @property
@@ -333,13 +406,19 @@ class PeriodicOrbit(Result):
         tol
             The error that one step may make.
         """
-        return simulate(self.system, **self.start(), periods=self.period if periods is None else periods, tol=tol)
+        return simulate(
+            self.system,
+            **self.start(),
+            periods=self.period if periods is None else periods,
+            tol=tol,
+        )
 
     @cached_property
     def defect(self) -> float:
-        """The distance between its state and the one a period later, by direct simulation; inf if the motion has another number
-        of impacts, or cannot be followed, as where an event appears or is lost. If the orbit grazes, rounding decides whether
-        the motion has an impact there, and the defect is the square root of rounding.
+        """The distance between its state and the one a period later, by direct simulation; inf if
+        the motion has another number of impacts, or cannot be followed, as where an event appears
+        or is lost. If the orbit grazes, rounding decides whether the motion has an impact there,
+        and the defect is the square root of rounding.
         """
         try:
             motion = self.motion()
@@ -350,11 +429,16 @@ class PeriodicOrbit(Result):
         if self.signature.sides:  # the motion ends at an impact: before or after it
             ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
                     for v in (start["velocity"], self.speeds[0])]  # fmt: skip
-            return min(ends) if self.grazes or abs(len(motion.impacts) - self.signature.impact_count) <= 1 else math.inf
+            return (
+                min(ends)
+                if self.grazes or abs(len(motion.impacts) - self.signature.impact_count) <= 1
+                else math.inf
+            )
         return self.defect_after(1)
 
     def defect_after(self, rounds: int) -> float:
-        """The distance between its state and the one after several of its periods, for orbits that do not start at an impact.
+        """The distance between its state and the one after several of its periods, for orbits that
+        do not start at an impact.
 
         Parameters
         ----------
@@ -362,7 +446,8 @@ class PeriodicOrbit(Result):
             The number of its periods.
         """
         check_count("rounds", rounds, 1, LIMITS.periods // self.period)
-        start, motion = self.start(), self.motion(rounds * self.period)
+        start = self.start()
+        motion = self.motion(rounds * self.period)
         apart = np.subtract(motion.final_state, state_of(self.system, start))
         return float(np.abs(apart[: len(apart) - len(self.system.model.first_order)]).max())
 
@@ -371,8 +456,14 @@ class PeriodicOrbit(Result):
         """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
         start = self.start()
         if not start.get("time", 0.0):
-            position, velocity = np.split(self.system._with_rates(0.0, state_of(self.system, start)), 2)
-            return (float(position[0]), float(velocity[0])) if len(position) == 1 else (position, velocity)
+            position, velocity = np.split(
+                self.system._with_rates(0.0, state_of(self.system, start)), 2
+            )
+            return (
+                (float(position[0]), float(velocity[0]))
+                if len(position) == 1
+                else (position, velocity)
+            )
         period = 2.0 * math.pi / self.frequency
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
@@ -389,29 +480,51 @@ class PeriodicOrbit(Result):
         if name == "velocity" or name in self.system.model.coordinates:
             position, velocity = self.state
             values = np.atleast_1d(position)
-            return velocity if name == "velocity" else float(values[self.system.model.coordinates.index(name)])
+            return (
+                velocity
+                if name == "velocity"
+                else float(values[self.system.model.coordinates.index(name)])
+            )
         raise AttributeError(f"a PeriodicOrbit has no {name!r}")
 
     @cached_property
     def validity(self) -> Validity:
-        """Which margins of the model its motion respects, and for what share of the time (errata 20, 21)."""
+        """Which margins of the model its motion respects, and for what share of the time (errata
+        20, 21).
+        """
         return self.motion().validity
 
     def to_xarray(self) -> xarray.Dataset:
-        """One period of it over `time`, its `multiplier_real` and `multiplier_imag`, and its numbers as attributes."""
+        """One period of it over `time`, its `multiplier_real` and `multiplier_imag`, and its
+        numbers as attributes.
+        """
         data = self.motion().to_xarray()
         for part in ("real", "imag"):
             values = getattr(self.multipliers, part)
-            data[f"multiplier_{part}"] = ("multiplier", values, {"units": "1", "long_name": f"Floquet multipliers, {part}"})
-        numbers = {"period": self.period, "symmetric": int(self.symmetric), "stable": int(self.stable), "residual": self.residual}
-        data.attrs |= {"title": "periodic orbit computed by saltus", "kind": "periodic_orbit"} | numbers
+            data[f"multiplier_{part}"] = (
+                "multiplier",
+                values,
+                {"units": "1", "long_name": f"Floquet multipliers, {part}"},
+            )
+        numbers = {
+            "period": self.period,
+            "symmetric": int(self.symmetric),
+            "stable": int(self.stable),
+            "residual": self.residual,
+        }
+        data.attrs |= {
+            "title": "periodic orbit computed by saltus",
+            "kind": "periodic_orbit",
+        } | numbers
         return data
 
     def _repr_html_(self) -> str:
         names = ("period", "duration", "frequency", "amplitude", "symmetric", "stable", "residual")
         facts = {name: getattr(self, name) for name in names} | {"impacts": self.impact_count}
         multipliers = ", ".join(f"{value:.6g}" for value in self.multipliers)
-        return html_table(f"Orbit of {type(self.system.model).__name__}", facts | {"multipliers": multipliers})
+        return html_table(
+            f"Orbit of {type(self.system.model).__name__}", facts | {"multipliers": multipliers}
+        )
 
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
@@ -423,10 +536,14 @@ class PeriodicOrbit(Result):
 
 
 def solve(
-    equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int = NEWTON_ITERATIONS
+    equations: OrbitEquations,
+    unknowns: np.ndarray,
+    values: np.ndarray,
+    iterations: int = NEWTON_ITERATIONS,
 ) -> Solution | None:
-    """The orbit near a first guess at fixed parameters, or None where Newton's method does not converge. Directions that the
-    equations leave free, as where a mass that nothing holds may stand anywhere, keep what they are."""
+    """The orbit near a first guess at fixed parameters, or None where Newton's method does not
+    converge. Directions that the equations leave free, as where a mass that nothing holds may stand
+    anywhere, keep what they are."""
 
     def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
         return equations.evaluate(place, values, with_extremes=thorough)
@@ -436,11 +553,17 @@ def solve(
         return matrix + left @ right, -found.residual
 
     found = newton(evaluate, linear, unknowns, iterations)
-    return None if found is None else Solution(found.place, values, found.evaluation, found.iterations)
+    return (
+        None if found is None else Solution(found.place, values, found.evaluation, found.iterations)
+    )
 
 
 def _free(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The equations (m, k) that a matrix (m, n) does not decide up to rounding, and the directions (k, n) that it leaves free."""
-    left, lengths, right = np.linalg.svd(np.nan_to_num(matrix, posinf=0.0, neginf=0.0), full_matrices=False)
+    """The equations (m, k) that a matrix (m, n) does not decide up to rounding, and the directions
+    (k, n) that it leaves free.
+    """
+    left, lengths, right = np.linalg.svd(
+        np.nan_to_num(matrix, posinf=0.0, neginf=0.0), full_matrices=False
+    )
     free = lengths <= NEWTON.converged * lengths[0]
     return left[:, free], right[free]

@@ -1,7 +1,9 @@
-"""Orbits, special points and branches as what JSON has, and arrays, and back, bit for bit: for other processes, and for stores.
+"""Orbits, special points and branches as what JSON has, and arrays, and back, bit for bit: for
+other processes, and for stores.
 
-A system is its JSON, equations are their signature, and a point is its place and tangent; the equations are evaluated again at
-this place. The classes that may occur stand in the table `CLASSES`: reading imports nothing and calls nothing else.
+A system is its JSON, equations are their signature, and a point is its place and tangent; the
+equations are evaluated again at this place. The classes that may occur stand in the table
+`CLASSES`: reading imports nothing and calls nothing else.
 """
 
 from __future__ import annotations
@@ -28,13 +30,18 @@ DAMAGED = "this is no record of orbits that this version of saltus knows; comput
 
 
 def as_json(found: Any) -> dict[str, Any]:
-    """Orbits, special points or branches, alone or in lists, as a record: each object once, with its class and its parts."""
+    """Orbits, special points or branches, alone or in lists, as a record: each object once, with
+    its class and its parts.
+    """
     objects: list[Any] = []
-    places: dict[int, tuple[int, Any]] = {}  # by the id of an object: its place, and the object, so that it stays there
+    # by the id of an object: its place, and the object, so that it stays there
+    places: dict[int, tuple[int, Any]] = {}
 
     def written(value: Any) -> Any:
         if isinstance(value, (list, tuple)):
-            return {"list" if isinstance(value, list) else "tuple": [written(each) for each in value]}
+            return {
+                "list" if isinstance(value, list) else "tuple": [written(each) for each in value]
+            }
         if isinstance(value, Enum):
             return {"enum": [type(value).__name__, value.value]}
         if value is None or isinstance(value, (bool, int, float, str, np.ndarray, np.generic)):
@@ -80,14 +87,18 @@ def from_json(record: Any) -> Any:
         raise ParameterError(DAMAGED) from error
 
 
-def _point(curve: OrbitCurve, place: np.ndarray, tangent: np.ndarray, iterations: int) -> OrbitPoint:
+def _point(
+    curve: OrbitCurve, place: np.ndarray, tangent: np.ndarray, iterations: int
+) -> OrbitPoint:
     evaluation = curve.evaluate(place, thorough=True)
     if evaluation is None:
         raise ParameterError(DAMAGED)
     return OrbitPoint(curve, place, tangent, iterations, evaluation)
 
 
-def _orbit(equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int) -> PeriodicOrbit:
+def _orbit(
+    equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, iterations: int
+) -> PeriodicOrbit:
     evaluation = equations.evaluate(unknowns, values, with_extremes=True)
     if evaluation is None:
         raise ParameterError(DAMAGED)
@@ -95,18 +106,28 @@ def _orbit(equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray, 
 
 
 def _orbit_parts(orbit: PeriodicOrbit) -> tuple[Any, ...]:
-    return orbit.equations, orbit.solution.unknowns, orbit.solution.values, orbit.solution.iterations
+    return (
+        orbit.equations,
+        orbit.solution.unknowns,
+        orbit.solution.values,
+        orbit.solution.iterations,
+    )
 
 
 def _fields(found: Any) -> tuple[Any, ...]:
     return tuple(getattr(found, field.name) for field in fields(found))
 
 
-# Each class with the parts of an object, and how it is made of these; properties that were computed and kept are not written.
+# Each class with the parts of an object, and how it is made of these; properties that were computed
+# and kept are not written.
 CLASSES: dict[str, tuple[type, Callable[[Any], tuple[Any, ...]], Callable[..., Any]]] = {
     "System": (System, lambda system: (system.to_json(),), System.from_json),
     "Equations": (OrbitEquations, lambda e: (e.given, e.signature, e.paths, e.tol), equations_of),
-    "OrbitPoint": (OrbitPoint, lambda point: (point.curve, point.place, point.tangent, point.iterations), _point),
+    "OrbitPoint": (
+        OrbitPoint,
+        lambda point: (point.curve, point.place, point.tangent, point.iterations),
+        _point,
+    ),
     "PeriodicOrbit": (PeriodicOrbit, _orbit_parts, _orbit),
 }
 for _class in (

@@ -1,5 +1,5 @@
-"""The signature of a periodic orbit: which impacts it has, in which order, over how many forcing periods; and the
-tolerances with which orbits, impacts and instants are compared."""
+"""The signature of a periodic orbit: which impacts it has, in which order, over how many forcing
+periods; and the tolerances with which orbits, impacts and instants are compared."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class ModeChange:
 class Signature:
     """The signature of a family of periodic orbits: all that stays the same along it.
 
-    A symmetric orbit is its own mirror image half a period later; only the impacts, or events, of its first half are listed, and
-    its equations cover this half.
+    A symmetric orbit is its own mirror image half a period later; only the impacts, or events, of
+    its first half are listed, and its equations cover this half.
 
     Attributes
     ----------
@@ -51,7 +51,8 @@ class Signature:
     closed
         For such an orbit without events: the contacts that are closed all the time, as bits.
     section
-        For an orbit that is followed through its events: the phase at which its state is the unknown. None for all others.
+        For an orbit that is followed through its events: the phase at which its state is the
+        unknown. None for all others.
 
     Examples
     --------
@@ -69,18 +70,27 @@ class Signature:
 
     def _repr_html_(self) -> str:
         events = self.sides or " ".join(map(str, self.events)) or "none"
-        facts = {"period": self.period, "symmetric": self.symmetric, "impacts": self.impact_count, "sides or events": events}
+        facts = {
+            "period": self.period,
+            "symmetric": self.symmetric,
+            "impacts": self.impact_count,
+            "sides or events": events,
+        }
         return html_table("Signature", facts)
 
     @property
     def impact_count(self) -> int:
-        """The number of impacts in one period of the orbit; 0 if it has a section, as its impacts are not part of the
-        signature."""
-        return (len(self.sides) + sum(event.is_impact for event in self.events)) * (2 if self.symmetric else 1)
+        """The number of impacts in one period of the orbit; 0 if it has a section, as its impacts
+        are not part of the signature."""
+        return (len(self.sides) + sum(event.is_impact for event in self.events)) * (
+            2 if self.symmetric else 1
+        )
 
     @property
     def span(self) -> float:
-        """The number of forcing periods that the equations cover: q, or q / 2 for a symmetric orbit."""
+        """The number of forcing periods that the equations cover: q, or q / 2 for a symmetric
+        orbit.
+        """
         return self.period / 2 if self.symmetric else float(self.period)
 
     def along(self) -> tuple[int, ...]:
@@ -91,11 +101,18 @@ class Signature:
         return (*self.sides[1:], closing)
 
     def halved(self) -> Signature:
-        """The signature, over half the period, of an orbit of this one that is its own image: symmetric if the period is odd,
-        else of half the period."""
+        """The signature, over half the period, of an orbit of this one that is its own image:
+        symmetric if the period is odd, else of half the period."""
         odd = bool(self.period % 2)
-        sides, events = self.sides[: len(self.sides) // 2], self.events[: len(self.events) // 2]
-        return replace(self, sides=sides, events=events, period=self.period if odd else self.period // 2, symmetric=odd)
+        sides = self.sides[: len(self.sides) // 2]
+        events = self.events[: len(self.events) // 2]
+        return replace(
+            self,
+            sides=sides,
+            events=events,
+            period=self.period if odd else self.period // 2,
+            symmetric=odd,
+        )
 
     def over_full_period(self, images: Sequence[int]) -> Signature:
         """That of a symmetric orbit over its full period.
@@ -111,10 +128,17 @@ class Signature:
 
     def repeated(self) -> Signature:
         """That of an orbit which goes round twice."""
-        return replace(self, sides=2 * self.sides, events=2 * self.events, period=2 * self.period, symmetric=False)
+        return replace(
+            self,
+            sides=2 * self.sides,
+            events=2 * self.events,
+            period=2 * self.period,
+            symmetric=False,
+        )
 
     def part(self, periods: int) -> Signature | None:
-        """That of an orbit of a shorter period which is gone round several times; None if it cannot be.
+        """That of an orbit of a shorter period which is gone round several times; None if it cannot
+        be.
 
         Parameters
         ----------
@@ -128,26 +152,43 @@ class Signature:
         part = n * periods // self.period
         if changes and (part == 0 or changes[:part] != changes[part : 2 * part]):
             return None
-        return replace(self, sides=self.sides[:part], events=self.events[:part], period=periods, symmetric=False)
+        return replace(
+            self,
+            sides=self.sides[:part],
+            events=self.events[:part],
+            period=periods,
+            symmetric=False,
+        )
 
 
 @dataclass(frozen=True)
 class OrbitTolerances:
     """Differences below which two things are the same."""
 
-    touch: float = 1e-9  # A gap or a speed below this is 0, at a grazing; grazings are located more precisely than that.
-    pair: float = 1e-4  # Phases and speeds of two impacts that vanish together: they fall as a square root of the parameter.
-    touching_state: float = 1e-7  # States a period apart of an orbit that touches: they are known to the root of rounding only.
+    # A gap or a speed below this is 0, at a grazing; grazings are located more precisely than that.
+    touch: float = 1e-9
+    # Phases and speeds of two impacts that vanish together: they fall as a square root of the
+    # parameter.
+    pair: float = 1e-4
+    # States a period apart of an orbit that touches: they are known to the root of rounding only.
+    touching_state: float = 1e-7
     grazing_orbits: float = 1e-5  # The unknowns of two orbits that coincide where both graze.
     same_orbit: float = 1e-6  # Extrema and speeds of impact of one orbit that was found twice.
     image: float = 1e-6  # An orbit and its own image: rounding alone makes a smaller difference.
-    halves: float = 1e-7  # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves more.
-    switching: float = 1e-5  # Phases of two events of one contact that vanish together: speeds fall as the third power of these.
-    release: float = 1e-9  # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
-    # Moduli of multipliers on the unit circle: those without damping, and at a special point that is located to rounding.
+    # The halves of a symmetric orbit: solved to 1e-12, but near a grazing Newton's method leaves
+    # more.
+    halves: float = 1e-7
+    # Phases of two events of one contact that vanish together: speeds fall as the third power of
+    # these.
+    switching: float = 1e-5
+    # Instants of a release, in forcing periods: releases are isolated, and known to rounding.
+    release: float = 1e-9
+    # Moduli of multipliers on the unit circle: those without damping, and at a special point that
+    # is located to rounding.
     on_circle: float = 1e-9
-    # Only with a multiplier this near to 1 may an orbit belong to a continuum of orbits at one value of the parameter, such as
-    # those of a mass that no wall and no spring holds. Near a fold it is as near only within 1e-14 of the fold's parameter.
+    # Only with a multiplier this near to 1 may an orbit belong to a continuum of orbits at one
+    # value of the parameter, such as those of a mass that no wall and no spring holds. Near a fold
+    # it is as near only within 1e-14 of the fold's parameter.
     isolated: float = 1e-7
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 

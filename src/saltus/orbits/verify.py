@@ -15,11 +15,12 @@ from saltus.systems import System
 
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
-    """Whether two orbits of one system are the same, or mirror images: if their periods, impact counts, speeds and extrema
-    agree."""
+    """Whether two orbits of one system are the same, or mirror images: if their periods, impact
+    counts, speeds and extrema agree."""
     if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
-    one, other = np.array([a.highest, a.lowest]), np.array([b.highest, b.lowest])
+    one = np.array([a.highest, a.lowest])
+    other = np.array([b.highest, b.lowest])
     same = np.abs(one - other).max() < TOLERANCES.same_orbit or (
         mirrored and np.abs(one + other[::-1]).max() < TOLERANCES.same_orbit
     )
@@ -27,20 +28,23 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
 
 
 def _same_speeds(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two lists of speeds in falling order agree; one may be longer by very slow impacts, since rounding decides which
-    impact of an accumulation is the last one that is listed."""
+    """Whether two lists of speeds in falling order agree; one may be longer by very slow impacts,
+    since rounding decides which impact of an accumulation is the last one that is listed."""
     n = min(one.size, other.size)
     last = np.append(one[n:], other[n:]).max(initial=0.0)
-    return bool(np.abs(one[:n] - other[:n]).max(initial=0.0) < TOLERANCES.same_orbit and last < 2.0 * DYING)
+    return bool(
+        np.abs(one[:n] - other[:n]).max(initial=0.0) < TOLERANCES.same_orbit and last < 2.0 * DYING
+    )
 
 
 @answered
 def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:
-    """The distance of each orbit's state from itself after `rounds` of its periods, by the event-driven flow, (n,).
+    """The distance of each orbit's state from itself after `rounds` of its periods, by the
+    event-driven flow, (n,).
 
-    All orbits must belong to one system, which may differ in the parameter along their common path, if they have one. An orbit
-    that starts after its first impact ends at this impact, and rounding decides whether before or after it: the smaller distance
-    counts.
+    All orbits must belong to one system, which may differ in the parameter along their common path,
+    if they have one. An orbit that starts after its first impact ends at this impact, and rounding
+    decides whether before or after it: the smaller distance counts.
 
     Parameters
     ----------
@@ -65,42 +69,68 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     if len(orbits) == 0:
         return np.zeros(0)
     equations = orbits[0].equations
-    return closing_distances(equations.given, next(iter(equations.paths), None), closing_rows(orbits, rounds), tol)
+    return closing_distances(
+        equations.given, next(iter(equations.paths), None), closing_rows(orbits, rounds), tol
+    )
 
 
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
-    """One row for each orbit, (n, m), as `closing_distances` takes them: the parameter along the common path, if there is one,
-    coordinates and velocities at the start, its time, the speed before the first impact (-1 without), and the forcing periods."""
+    """One row for each orbit, (n, m), as `closing_distances` takes them: the parameter along the
+    common path, if there is one, coordinates and velocities at the start, its time, the speed
+    before the first impact (-1 without), and the forcing periods."""
     rows = []
     for orbit in orbits:
-        start, names = orbit.start(), orbit.system.model.coordinates
+        start = orbit.start()
+        names = orbit.system.model.coordinates
         velocities = np.atleast_1d(start["velocity"])
         speed = orbit.speeds[0] if orbit.signature.sides else -1.0
         ends = [start.get("time", 0.0), speed, rounds * orbit.period]
-        rows.append([*orbit.solution.values[:1], *(start[name] for name in names), *velocities, *ends])
+        rows.append(
+            [*orbit.solution.values[:1], *(start[name] for name in names), *velocities, *ends]
+        )
     return np.array(rows, dtype=float).reshape(len(orbits), -1)
 
 
-def closing_distances(system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13) -> np.ndarray:
-    """The distance of each orbit's state from itself at the end of its motion, from rows that `closing_rows` gives, (n,)."""
-    names, moving = system.model.coordinates, system.model.moving
+def closing_distances(
+    system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13
+) -> np.ndarray:
+    """The distance of each orbit's state from itself at the end of its motion, from rows that
+    `closing_rows` gives, (n,).
+    """
+    names = system.model.coordinates
+    moving = system.model.moving
     count = len(names)
     result = np.full(len(rows), np.inf)
     for periods in np.unique(rows[:, -1]):
         places = rows[:, -1] == periods
         *columns, times, speeds, _ = rows[places].T
         varied, states = ({path: columns[0]}, columns[1:]) if path is not None else ({}, columns)
-        begin, velocities = dict(zip(names, states, strict=False)), states[count:]
-        velocity: Any = velocities[0] if len(moving) == 1 else tuple(velocities[: len(moving)]) or 0.0
+        begin = dict(zip(names, states, strict=False))
+        velocities = states[count:]
+        velocity: Any = (
+            velocities[0] if len(moving) == 1 else tuple(velocities[: len(moving)]) or 0.0
+        )
         ends = simulate_many(
-            system, **begin, velocity=velocity, time=times, parameters=varied, periods=int(periods), sample=(), tol=tol
+            system,
+            **begin,
+            velocity=velocity,
+            time=times,
+            parameters=varied,
+            periods=int(periods),
+            sample=(),
+            tol=tol,
         )
         apart = np.max([np.abs(ends[name].values - begin[name]) for name in names], axis=0)
         if moving == names and count == 1:
-            after, before = ends["velocity"].values, np.where(speeds < 0.0, np.inf, speeds)
+            after = ends["velocity"].values
+            before = np.where(speeds < 0.0, np.inf, speeds)
             either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
         else:
             speeds_after = [ends[f"{name}_velocity"].values for name in moving]
-            either = np.max([np.abs(a - b) for a, b in zip(speeds_after, velocities, strict=False)] or [0.0 * apart], axis=0)
+            either = np.max(
+                [np.abs(a - b) for a, b in zip(speeds_after, velocities, strict=False)]
+                or [0.0 * apart],
+                axis=0,
+            )
         result[places] = np.maximum(apart, either)
     return result

@@ -1,8 +1,9 @@
-"""Pictures: one module per kind of picture, drawn from datasets only, in the conventions of `style`.
+"""Pictures: one module per kind of picture, drawn from datasets only, in the conventions of
+`style`.
 
-Nothing here computes a motion, and nothing needs a display. A function for a whole result draws into `ax`, or, where it has
-several panels, into `figure`; without one it makes a figure of its own, and it returns the axes. A function for a part of a
-picture marks the axes that it is given first.
+Nothing here computes a motion, and nothing needs a display. A function for a whole result draws
+into `ax`, or, where it has several panels, into `figure`; without one it makes a figure of its own,
+and it returns the axes. A function for a part of a picture marks the axes that it is given first.
 """
 
 from saltus._front_door import front_door

@@ -44,16 +44,19 @@ def animate(
     width: float = LOOK.double_column,
     progress: Progress = silent,
 ) -> Any:
-    """A film of a motion, or of one period of an orbit: the mechanism as it moves, beside its phase portrait.
+    """A film of a motion, or of one period of an orbit: the mechanism as it moves, beside its phase
+    portrait.
 
-    The mechanism is that of `saltus.systems.drawing_of`; a model of your own may say how it is drawn.
+    The mechanism is that of `saltus.systems.drawing_of`; a model of your own may say how it is
+    drawn.
 
     Parameters
     ----------
     result
         A `Motion` that was kept densely, or a `PeriodicOrbit` or a `FreeOrbit`.
     path
-        The file, a GIF (.gif), a page with buttons (.html) or, where ffmpeg is installed, a film (.mp4).
+        The file, a GIF (.gif), a page with buttons (.html) or, where ffmpeg is installed, a film
+        (.mp4).
     seconds
         How long the film is, in seconds.
     fps
@@ -86,16 +89,22 @@ def animate(
     check_number("width", width, at_least=NARROWEST, at_most=WIDEST, unit="mm")
     motion = result.motion() if callable(getattr(result, "motion", None)) else result
     if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:
-        raise ParameterError(f"result must be a motion that was kept densely, or an orbit, got {shown(result)}", "result")
+        raise ParameterError(
+            f"result must be a motion that was kept densely, or an orbit, got {shown(result)}",
+            "result",
+        )
     count = max(2, round(seconds * fps))
     with style():
         film = _Film(motion, np.linspace(motion.start, motion.time, count), width)
-        made = animation.FuncAnimation(film.page, film.show, frames=count, interval=1000.0 / fps, blit=False)
+        made = animation.FuncAnimation(
+            film.page, film.show, frames=count, interval=1000.0 / fps, blit=False
+        )
         if file is None or writer is None:
             return made
         file.parent.mkdir(parents=True, exist_ok=True)
 
-        with writer.saving(film.page, str(file), 110):  # 820 x 330 points, which a page shows without scaling
+        # 820 x 330 points, which a page shows without scaling
+        with writer.saving(film.page, str(file), 110):
             for number in range(count):
                 progress(number / count, f"picture {number + 1} of {count}")
                 film.show(number)
@@ -111,20 +120,29 @@ def _writer(file: Path, fps: Any) -> Any:
     if kind is None:
         raise ParameterError(f"a film is a .gif, .html or .mp4, got {file.name!r}", "path")
     if kind == "ffmpeg" and not animation.FFMpegWriter.isAvailable():
-        raise ParameterError("an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html instead", "path")
+        raise ParameterError(
+            (
+                "an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html "
+                "instead"
+            ),
+            "path",
+        )
     if kind == "html":
         return animation.HTMLWriter(fps=fps, embed_frames=True)
     return animation.PillowWriter(fps=fps) if kind == "pillow" else animation.FFMpegWriter(fps=fps)
 
 
 class _Page(Figure):
-    """A figure in which little moves: what stands still is drawn once for all pictures that writers ask for."""
+    """A figure in which little moves: what stands still is drawn once for all pictures that writers
+    ask for.
+    """
 
     moving: Sequence[Artist] = ()
     still: Any = None
 
     def savefig(self, fname: Any, **options: Any) -> None:
-        """As Matplotlib's; a picture for a writer, which is not a file of its own, is what stands still and what moves on top.
+        """As Matplotlib's; a picture for a writer, which is not a file of its own, is what stands
+        still and what moves on top.
 
         Parameters
         ----------
@@ -156,7 +174,8 @@ class _Film:
     """The figure of a film, and how it shows one of its times."""
 
     def __init__(self, motion: Any, times: np.ndarray, width: float) -> None:
-        self.motion, self.times = motion, times
+        self.motion = motion
+        self.times = times
         self.places = np.atleast_2d(motion.at(times)[0])  # (degrees of freedom, n)
         self.page = _Page(figsize=(width / 25.4, 0.4 * width / 25.4), layout="constrained")
         mechanism, portrait = self.page.subplots(1, 2, width_ratios=(1.2, 1))
@@ -164,9 +183,15 @@ class _Film:
         self.shapes = shapes
         self.artists = [_artist(mechanism, shape) for shape in shapes[0]]
         corners = np.concatenate(
-            [shape.points + reach for each in shapes for shape in each for reach in (shape.radius, -shape.radius)]
+            [
+                shape.points + reach
+                for each in shapes
+                for shape in each
+                for reach in (shape.radius, -shape.radius)
+            ]
         )
-        (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+        (x0, y0) = corners.min(axis=0)
+        (x1, y1) = corners.max(axis=0)
         room = 0.04 * max(x1 - x0, y1 - y0)
         mechanism.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room), aspect="equal")
         mechanism.axis("off")
@@ -178,14 +203,19 @@ class _Film:
             artist.set_animated(True)
 
     def _portrait(self, ax: Axes) -> None:
-        """The whole motion, faint, the part that was shown, and the states at the time that is shown."""
+        """The whole motion, faint, the part that was shown, and the states at the time that is
+        shown.
+        """
         data = self.motion.to_xarray()
         names = coordinates(data)
         looks = [
-            LINES[i] if len(names) <= len(LINES) else {"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", (0, (4, 1.5)))[i % 2]}
+            LINES[i]
+            if len(names) <= len(LINES)
+            else {"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", (0, (4, 1.5)))[i % 2]}
             for i in range(len(names))
         ]
-        self.lines, self.dots = [], []
+        self.lines = []
+        self.dots = []
         for name, look in zip(names, looks, strict=True):
             time, place, velocity = arcs(data, name)
             ax.plot(place, velocity, color=LOOK.faint, lw=0.7, zorder=1)
@@ -195,7 +225,9 @@ class _Film:
             self.dots.append(dot)
         unit = unit_in_brackets(data[names[0]])
         if len(names) == 1:
-            ax.set(xlabel=f"${symbol(names[0])}${unit}", ylabel=rf"$\dot{{{symbol(names[0])}}}${unit}")
+            ax.set(
+                xlabel=f"${symbol(names[0])}${unit}", ylabel=rf"$\dot{{{symbol(names[0])}}}${unit}"
+            )
         else:
             ax.set(xlabel=f"coordinates{unit}", ylabel=f"velocities{unit}")
             if len(names) <= 4:
@@ -215,7 +247,9 @@ class _Film:
         place, velocity = (np.atleast_1d(values) for values in self.motion.at(time))
         for i, (line, times, places, velocities) in enumerate(self.lines):
             seen = int(np.searchsorted(times, time, side="right"))
-            line.set_data(np.append(places[:seen], place[i]), np.append(velocities[:seen], velocity[i]))
+            line.set_data(
+                np.append(places[:seen], place[i]), np.append(velocities[:seen], velocity[i])
+            )
             self.dots[i].set_data([place[i]], [velocity[i]])
         return [*self.artists, *self.dots]
 

@@ -1,5 +1,5 @@
-"""One function that draws any result of saltus, by its kind; and pictures of experiments: an energy balance, the fit of a system
-to a measurement, and which loads overturn a block."""
+"""One function that draws any result of saltus, by its kind; and pictures of experiments: an energy
+balance, the fit of a system to a measurement, and which loads overturn a block."""
 
 from __future__ import annotations
 
@@ -15,68 +15,154 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError, shown
-from saltus.plots.basins import draw_attractors, draw_basins, draw_integrity, draw_uncertainty, draw_wada
-from saltus.plots.chaos import draw_chaotic_bands, draw_exponents, draw_exponents_along, draw_verdict
+from saltus.plots.basins import (
+    draw_attractors,
+    draw_basins,
+    draw_integrity,
+    draw_uncertainty,
+    draw_wada,
+)
+from saltus.plots.chaos import (
+    draw_chaotic_bands,
+    draw_exponents,
+    draw_exponents_along,
+    draw_verdict,
+)
 from saltus.plots.chart import draw_stability_chart
-from saltus.plots.conventions import LOOK, axes_or_new, cell_edges, drawing, figure_of, legend_of, shades, style
-from saltus.plots.curves import draw_attractors_along, draw_backbone, draw_branch, draw_cascade, draw_search, draw_special_curve
+from saltus.plots.conventions import (
+    LOOK,
+    axes_or_new,
+    cell_edges,
+    drawing,
+    figure_of,
+    legend_of,
+    shades,
+    style,
+)
+from saltus.plots.curves import (
+    draw_attractors_along,
+    draw_backbone,
+    draw_branch,
+    draw_cascade,
+    draw_search,
+    draw_special_curve,
+)
 from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
 from saltus.plots.unit_cell import draw_unit_cell
 from saltus.progress import show_below_cell
 
-FILLS = ("white", "#bcd2ea", "#f3c98b", "#c9a0c9")  # stands; overturns at once, after one impact, after more
+# stands; overturns at once, after one impact, after more
+FILLS = ("white", "#bcd2ea", "#f3c98b", "#c9a0c9")
 IMPACTS = ("without an impact", "after 1 impact", "after {} impacts")
 
 
 @drawing
-def draw_overturning(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
+def draw_overturning(
+    dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
     """Draw the map of `overturning_spectrum` in shades, and its borders as lines; returns the axes."""
     own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
-    impacts, fallen = dataset["impacts"].values, dataset["overturned"].values != 0
+    impacts = dataset["impacts"].values
+    fallen = dataset["overturned"].values != 0
     kinds = np.where(fallen, 1 + np.minimum(impacts, len(FILLS) - 2), 0)
     edges = cell_edges(dataset["frequency"].values), cell_edges(dataset["amplitude"].values)
-    ax.pcolormesh(*edges, kinds.T, cmap=ListedColormap(FILLS), vmin=-0.5, vmax=len(FILLS) - 0.5, rasterized=True)
+    ax.pcolormesh(
+        *edges,
+        kinds.T,
+        cmap=ListedColormap(FILLS),
+        vmin=-0.5,
+        vmax=len(FILLS) - 0.5,
+        rasterized=True,
+    )
     shown = sorted(set(np.minimum(impacts[fallen], len(FILLS) - 2).tolist()))
     names = [*IMPACTS[:2], f"after {len(FILLS) - 2} or more impacts"]
-    handles: list[Any] = [Patch(facecolor=FILLS[1 + k], label=f"overturns {names[k]}") for k in shown]
+    handles: list[Any] = [
+        Patch(facecolor=FILLS[1 + k], label=f"overturns {names[k]}") for k in shown
+    ]
     counts = dataset["border_impacts"].values
     for k, count in enumerate(sorted(set(counts.tolist()))):
-        line: dict[str, Any] = {"color": LOOK.ink, "linestyle": LOOK.dashes[min(k, len(LOOK.dashes) - 1)], "linewidth": 1.0}
+        line: dict[str, Any] = {
+            "color": LOOK.ink,
+            "linestyle": LOOK.dashes[min(k, len(LOOK.dashes) - 1)],
+            "linewidth": 1.0,
+        }
         for number in sorted(set(dataset["border_number"].values[counts == count].tolist())):
             part = dataset["border_number"].values == number
             marker = "." if np.count_nonzero(part) == 1 else ""
-            ax.plot(dataset["border_frequency"].values[part], dataset["border_amplitude"].values[part], marker=marker, **line)
-        handles.append(Line2D([], [], label=f"border {IMPACTS[min(count, 2)].format(count)}", **line))
-    signal = json.loads(dataset.attrs.get("system", "{}")).get("load", {}).get(dataset.attrs["channel"], {})
+            ax.plot(
+                dataset["border_frequency"].values[part],
+                dataset["border_amplitude"].values[part],
+                marker=marker,
+                **line,
+            )
+        handles.append(
+            Line2D([], [], label=f"border {IMPACTS[min(count, 2)].format(count)}", **line)
+        )
+    signal = (
+        json.loads(dataset.attrs.get("system", "{}"))
+        .get("load", {})
+        .get(dataset.attrs["channel"], {})
+    )
     pulse = signal.get("type", "record") if isinstance(signal, dict) else "record"
     ax.set_xlim(edges[0][0], edges[0][-1])
     ax.set_ylim(edges[1][0], edges[1][-1])
-    ax.set_xlabel("speed of the record" if pulse == "record" else r"frequency $\omega$ of the pulse")
-    ax.set_ylabel("scale of the record" if pulse == "record" else f"amplitude of the {signal.get('quantity', 'pulse')}")
+    ax.set_xlabel(
+        "speed of the record" if pulse == "record" else r"frequency $\omega$ of the pulse"
+    )
+    ax.set_ylabel(
+        "scale of the record"
+        if pulse == "record"
+        else f"amplitude of the {signal.get('quantity', 'pulse')}"
+    )
     legend_of(ax, own, handles, ncols=2)
     return ax
 
 
 @drawing
-def draw_fragility(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the share of the loads that overturn, with its interval, over the scale of `fragility`; returns the axes."""
+def draw_fragility(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw the share of the loads that overturn, with its interval, over the scale of `fragility`;
+    returns the axes.
+    """
     ax = axes_or_new(ax, width, 0.7 * width)
     scale = dataset["scale"].values
     ax.fill_between(
-        scale, dataset["lower"].values, dataset["upper"].values, color=LOOK.stable, alpha=0.18, lw=0.0, label="95 % interval"
+        scale,
+        dataset["lower"].values,
+        dataset["upper"].values,
+        color=LOOK.stable,
+        alpha=0.18,
+        lw=0.0,
+        label="95 % interval",
     )
-    ax.plot(scale, dataset["share"].values, color=LOOK.stable, lw=1.2, label=f"share of {dataset.sizes['record']} loads")
-    ax.set(xlabel="scale of the loads", ylabel="share that overturns", ylim=(-0.02, 1.02), xlim=(scale[0], scale[-1]))
+    ax.plot(
+        scale,
+        dataset["share"].values,
+        color=LOOK.stable,
+        lw=1.2,
+        label=f"share of {dataset.sizes['record']} loads",
+    )
+    ax.set(
+        xlabel="scale of the loads",
+        ylabel="share that overturns",
+        ylim=(-0.02, 1.02),
+        xlim=(scale[0], scale[-1]),
+    )
     ax.legend(loc="best")
     return ax
 
 
 @drawing
-def draw_energies(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the dataset of `energies`: the mean power of each part as a bar, by its role; returns the axes."""
+def draw_energies(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw the dataset of `energies`: the mean power of each part as a bar, by its role; returns
+    the axes.
+    """
     parts = [str(name) for name in dataset["part"].values]
     ax = axes_or_new(ax, width, 14.0 + 6.0 * len(parts))
     roles = dataset["role"].values
@@ -93,24 +179,45 @@ def draw_energies(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.s
 
 
 @drawing
-def draw_fit(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
-    """Draw the dataset of a `fit`: what was measured as dots, the motion as lines; of impact times alone by how much the motion
-    misses them; returns the axes."""
+def draw_fit(
+    dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
+    """Draw the dataset of a `fit`: what was measured as dots, the motion as lines; of impact times
+    alone by how much the motion misses them; returns the axes."""
     ax = axes_or_new(ax, width, 0.62 * width)
-    kinds = list(dict.fromkeys(zip(dataset["record"].values.tolist(), dataset["quantity"].values.tolist(), strict=True)))
+    kinds = list(
+        dict.fromkeys(
+            zip(dataset["record"].values.tolist(), dataset["quantity"].values.tolist(), strict=True)
+        )
+    )
     sampled = [kind for kind in kinds if kind[1] != "impacts"]
-    for (record, quantity), colour in zip(sampled or kinds, shades(len(sampled or kinds)), strict=True):
+    for (record, quantity), colour in zip(
+        sampled or kinds, shades(len(sampled or kinds)), strict=True
+    ):
         chosen = (dataset["record"].values == record) & (dataset["quantity"].values == quantity)
-        time, measured, model, sigma = (dataset[n].values[chosen] for n in ("time", "measured", "model", "sigma"))
+        time, measured, model, sigma = (
+            dataset[n].values[chosen] for n in ("time", "measured", "model", "sigma")
+        )
         label = quantity if len({r for r, _ in kinds}) == 1 else f"{quantity} of record {record}"
         if sampled:
             ax.plot(time, measured, ".", color=colour, markersize=2.5, alpha=0.5, zorder=1)
             ax.plot(time, model, "-", color=colour, linewidth=0.9, label=label, zorder=2)
         else:
-            ax.errorbar(time, model - measured, sigma, fmt="o", color=colour, markersize=3, capsize=2, label=label)
+            ax.errorbar(
+                time,
+                model - measured,
+                sigma,
+                fmt="o",
+                color=colour,
+                markersize=3,
+                capsize=2,
+                label=label,
+            )
             ax.axhline(0.0, color="k", linewidth=0.6)
     ax.set_xlabel(r"$\tau$")
-    ax.set_ylabel("measured (dots), motion (lines)" if sampled else "time of the motion less that measured")
+    ax.set_ylabel(
+        "measured (dots), motion (lines)" if sampled else "time of the motion less that measured"
+    )
     ax.legend(loc="best")
     return ax
 
@@ -152,15 +259,18 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
 
 
 def plot(result: Any, **options: Any) -> Any:
-    """Draw any result; returns the axes, or an array of them for several panels. In a notebook the picture is below the cell.
+    """Draw any result; returns the axes, or an array of them for several panels. In a notebook the
+    picture is below the cell.
 
     Parameters
     ----------
     result
-        A Dataset or a DataTree that saltus has made, a result with `to_xarray`, such as a motion or a branch, or a tuple of such
-        results, as `switch_branch` and `separatrices` return them, which are drawn into the same axes.
+        A Dataset or a DataTree that saltus has made, a result with `to_xarray`, such as a motion or
+        a branch, or a tuple of such results, as `switch_branch` and `separatrices` return them,
+        which are drawn into the same axes.
     options
-        Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and `width=`, in mm.
+        Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and
+        `width=`, in mm.
 
     Raises
     ------
@@ -176,7 +286,9 @@ def plot(result: Any, **options: Any) -> Any:
     if isinstance(result, (tuple, list)) and result:
         given = options.pop("ax", None)
         with style() if given is None else nullcontext():
-            ax = axes_or_new(given, options.pop("width", LOOK.single_column), 0.8 * LOOK.single_column)
+            ax = axes_or_new(
+                given, options.pop("width", LOOK.single_column), 0.8 * LOOK.single_column
+            )
             for each in result:
                 plot(each, ax=ax, **options)
         if given is None:
@@ -184,10 +296,15 @@ def plot(result: Any, **options: Any) -> Any:
         return ax
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
-        raise ParameterError(f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}", "result")
+        raise ParameterError(
+            f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}",
+            "result",
+        )
     draw = DRAWINGS.get(str(data.attrs.get("kind", ""))) or _by_content(data)
     if draw is None:
-        raise ParameterError(f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result")
+        raise ParameterError(
+            f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result"
+        )
     axes = draw(data, **options)
     if not options.keys() & {"ax", "figure"}:
         show_below_cell(figure_of(axes))
@@ -195,7 +312,9 @@ def plot(result: Any, **options: Any) -> Any:
 
 
 def _by_content(data: Any) -> Callable[..., Any] | None:
-    """The function that draws a dataset without a `kind`, or with one of another meaning, such as a curve of special points."""
+    """The function that draws a dataset without a `kind`, or with one of another meaning, such as a
+    curve of special points.
+    """
     if "chart" in getattr(data, "children", ()):
         return draw_stability_chart
     if "branches" in getattr(data, "children", ()):

@@ -1,7 +1,9 @@
-"""Branches of a diagram's DataTree, and borders of a chart's, as lines that are drawn in pictures and read by measures.
+"""Branches of a diagram's DataTree, and borders of a chart's, as lines that are drawn in pictures
+and read by measures.
 
-A branch (see `branch_tables.py`) has `parameter`, `stable`, `impact_count` and quantities such as `amplitude` over its points,
-the model's margins as `margin_...`, and the `kind` of its special points with their places.
+A branch (see `branch_tables.py`) has `parameter`, `stable`, `impact_count` and quantities such as
+`amplitude` over its points, the model's margins as `margin_...`, and the `kind` of its special
+points with their places.
 """
 
 from __future__ import annotations
@@ -12,14 +14,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-STEPS_BETWEEN = 6  # the number of parts into which a step between two points of a branch is divided to smooth the line
+# the number of parts into which a step between two points of a branch is divided to smooth the line
+STEPS_BETWEEN = 6
 # The kinds of special points at which the stability can change.
 STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS", "SW", "GS", "CS", "SS", "AS")
-MARGIN = "margin_"  # the beginning of the names of a branch's variables with the least value of a margin
+# the beginning of the names of a branch's variables with the least value of a margin
+MARGIN = "margin_"
 
 
 class ModelValidity(StrEnum):
-    """Whether motions of a model are those of its mechanism, by the margins that they pass and the `margin_kind` of each."""
+    """Whether motions of a model are those of its mechanism, by the margins that they pass and the
+    `margin_kind` of each.
+    """
 
     HOLDS = "holds"  # they pass no margins except landmarks
     ASSUMPTION = "assumption"  # an assumption of the model fails: the mechanism does something else
@@ -32,38 +38,62 @@ class BranchLine(NamedTuple):
     stable: bool
     validity: ModelValidity
     points: range  # of the branch
-    places: np.ndarray  # (n, 2), parameter and quantity: those points, and the special points at which the part ends
+    # (n, 2), parameter and quantity: those points, and the special points at which the part ends
+    places: np.ndarray
 
 
 def border_curves(tree: Any) -> list[Any]:
-    """The exact borders of a chart's DataTree, its children `borders/curve_...`, as Datasets in order."""
+    """The exact borders of a chart's DataTree, its children `borders/curve_...`, as Datasets in
+    order.
+    """
     borders = tree["borders"]
-    return [borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")]
+    return [
+        borders[name].to_dataset() for name in sorted(borders.children) if name.startswith("curve_")
+    ]
 
 
 def branch_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
-    """A branch cut where the stability or the validity changes, and at every grazing, where curves have corners."""
+    """A branch cut where the stability or the validity changes, and at every grazing, where curves
+    have corners.
+    """
     places = np.stack([branch["parameter"].values, branch[quantity].values], axis=1)
-    stable, validity = np.asarray(branch["stable"].values, dtype=bool), validity_of(branch)
-    changed = [values[1:] != values[:-1] for values in (stable, validity, branch["impact_count"].values)]
-    first, begin = 0, np.empty((0, 2))
+    stable = np.asarray(branch["stable"].values, dtype=bool)
+    validity = validity_of(branch)
+    changed = [
+        values[1:] != values[:-1] for values in (stable, validity, branch["impact_count"].values)
+    ]
+    first = 0
+    begin = np.empty((0, 2))
     for cut in (int(step) + 1 for step in np.flatnonzero(np.any(changed, axis=0))):
         turns = _turns(branch, quantity, cut, *(bool(change[cut - 1]) for change in changed[:2]))
         ends = np.array([place for place, _ in turns]).reshape(-1, 2)
         yield BranchLine(
-            bool(stable[first]), validity[first], range(first, cut), np.concatenate([begin, places[first:cut], ends[:1]])
+            bool(stable[first]),
+            validity[first],
+            range(first, cut),
+            np.concatenate([begin, places[first:cut], ends[:1]]),
         )
-        if len(turns) > 1:  # stability and validity change at different places between the same two points
-            mixed = (stable[cut], validity[first]) if turns[0][1] else (stable[first], validity[cut])
+        # stability and validity change at different places between the same two points
+        if len(turns) > 1:
+            mixed = (
+                (stable[cut], validity[first]) if turns[0][1] else (stable[first], validity[cut])
+            )
             yield BranchLine(bool(mixed[0]), mixed[1], range(cut, cut), ends)
-        first, begin = cut, ends[-1:] if len(ends) else places[cut - 1 : cut]
-    yield BranchLine(bool(stable[first]), validity[first], range(first, len(places)), np.concatenate([begin, places[first:]]))
+        first = cut
+        begin = ends[-1:] if len(ends) else places[cut - 1 : cut]
+    yield BranchLine(
+        bool(stable[first]),
+        validity[first],
+        range(first, len(places)),
+        np.concatenate([begin, places[first:]]),
+    )
 
 
 def validity_of(branch: Any) -> np.ndarray:
     """The `ModelValidity` of each point of a branch, (n,)."""
     result = np.full(branch.sizes["point"], ModelValidity.HOLDS, dtype=object)
-    for validity in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT):  # the graver one last, so that it counts
+    # the graver one last, so that it counts
+    for validity in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT):
         for name in margins_of(branch, validity):
             result[branch[MARGIN + name].values < 0] = validity
     return result
@@ -72,14 +102,29 @@ def validity_of(branch: Any) -> np.ndarray:
 def margins_of(branch: Any, kind: ModelValidity) -> list[str]:
     """The margins that are of a kind."""
     margins = [str(name) for name in branch.data_vars if str(name).startswith(MARGIN)]
-    return [name.removeprefix(MARGIN) for name in margins if branch[name].attrs.get("margin_kind") == kind]
+    return [
+        name.removeprefix(MARGIN)
+        for name in margins
+        if branch[name].attrs.get("margin_kind") == kind
+    ]
 
 
-def _turns(branch: Any, quantity: str, cut: int, stability: bool, validity: bool) -> list[tuple[np.ndarray, bool]]:
-    """The places at which stability or validity change between the points cut - 1 and cut, in order; True for stability."""
-    margins = tuple(name for kind in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT) for name in margins_of(branch, kind))
+def _turns(
+    branch: Any, quantity: str, cut: int, stability: bool, validity: bool
+) -> list[tuple[np.ndarray, bool]]:
+    """The places at which stability or validity change between the points cut - 1 and cut, in
+    order; True for stability.
+    """
+    margins = tuple(
+        name
+        for kind in (ModelValidity.ASSUMPTION, ModelValidity.LIMIT)
+        for name in margins_of(branch, kind)
+    )
     kinds = [(STABILITY_CHANGES, True)] * stability + [((*margins, "GR"), False)] * validity
-    found = [(_place_of_change(branch, quantity, cut, names), of_stability) for names, of_stability in kinds]
+    found = [
+        (_place_of_change(branch, quantity, cut, names), of_stability)
+        for names, of_stability in kinds
+    ]
     if len(found) == 2:
         if np.array_equal(found[0][0], found[1][0]):
             return found[:1]
@@ -89,7 +134,9 @@ def _turns(branch: Any, quantity: str, cut: int, stability: bool, validity: bool
 
 
 def smooth_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
-    """The lines of `branch_lines`, smoothed: with further places on monotone cubics over the length between their points."""
+    """The lines of `branch_lines`, smoothed: with further places on monotone cubics over the length
+    between their points.
+    """
     for line in branch_lines(branch, quantity):
         yield line._replace(places=_smoothed(line.places))
 
@@ -110,7 +157,9 @@ def _smoothed(line: np.ndarray) -> np.ndarray:
 
 
 def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...]) -> np.ndarray:
-    """The place of a change between the points cut - 1 and cut: the special point of one of these kinds there, or the middle."""
+    """The place of a change between the points cut - 1 and cut: the special point of one of these
+    kinds there, or the middle.
+    """
     names = ("parameter", quantity)
     columns = [branch[name].values for name in names]
     a, b = (np.array([float(column[k]) for column in columns]) for k in (cut - 1, cut))
@@ -120,7 +169,9 @@ def _place_of_change(branch: Any, quantity: str, cut: int, kinds: tuple[str, ...
     places = np.stack([branch[f"special_{name}"].values[known] for name in names], axis=1)
     if not len(places):
         return np.asarray(middle)
-    detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm((places - b) / size, axis=1)
+    detour = np.linalg.norm((places - a) / size, axis=1) + np.linalg.norm(
+        (places - b) / size, axis=1
+    )
     best = int(detour.argmin())
     near = detour[best] < 3 * np.linalg.norm((b - a) / size) + 1e-3
     return np.asarray(places[best]) if near else middle

@@ -35,13 +35,17 @@ HALVES = (("at_half", "<", "first half of the run"), ("later_half", ">", "second
 
 
 @drawing
-def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the exponents of one motion with 95 % intervals, those of both halves of the run, and that of two trajectories.
+def draw_exponents(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw the exponents of one motion with 95 % intervals, those of both halves of the run, and
+    that of two trajectories.
 
     The grey range, 2 ln(t) / t for the time t, cannot be distinguished from 0.
     """
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
-    values, errors = dataset["exponent"].values, dataset["error"].values
+    values = dataset["exponent"].values
+    errors = dataset["error"].values
     index = np.arange(1, len(values) + 1)
     ax.axhline(0.0, **ZERO)
     known = np.isfinite(values)
@@ -61,11 +65,27 @@ def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.
     )
     for (name, marker, label), shift in zip(HALVES, (-0.12, 0.12), strict=True):
         ax.plot(
-            index + shift, dataset[name].values, marker=marker, ms=3.5, mfc="white", mec=LOOK.ink, mew=0.6, ls="none", label=label
+            index + shift,
+            dataset[name].values,
+            marker=marker,
+            ms=3.5,
+            mfc="white",
+            mec=LOOK.ink,
+            mew=0.6,
+            ls="none",
+            label=label,
         )
     stroboscopic = float(dataset["stroboscopic"])
     if np.isfinite(stroboscopic):
-        ax.plot(1.24, stroboscopic, marker="x", ms=4.5, mec=LOOK.ink, ls="none", label="two trajectories")
+        ax.plot(
+            1.24,
+            stroboscopic,
+            marker="x",
+            ms=4.5,
+            mec=LOOK.ink,
+            ls="none",
+            label="two trajectories",
+        )
     for place in index[~known]:
         text = r"$-\infty$" if values[place - 1] == -np.inf else "undefined"
         ax.annotate(text, (place, 0.0), (0, -9), textcoords="offset points", ha="center", va="top")
@@ -79,8 +99,11 @@ def draw_exponents(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.
 
 
 @drawing
-def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
-    """Draw the dataset of `lyapunov_many`: over one dimension all exponents with their errors, over two the largest one.
+def draw_exponents_along(
+    dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
+    """Draw the dataset of `lyapunov_many`: over one dimension all exponents with their errors, over
+    two the largest one.
 
     Where a motion rests its exponents are -inf or do not exist, and lines are interrupted.
 
@@ -91,7 +114,9 @@ def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float =
     """
     dims = [str(dim) for dim in dataset["exponent"].dims if dim != "index"]
     if len(dims) > 2:
-        raise ParameterError(f"exponents over {len(dims)} dimensions have no picture; select two of {dims}", "result")
+        raise ParameterError(
+            f"exponents over {len(dims)} dimensions have no picture; select two of {dims}", "result"
+        )
     ax = axes_or_new(ax, width, 0.62 * width)
     if len(dims) == 2:
         return _draw_map(ax, dataset, dims)
@@ -101,7 +126,14 @@ def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float =
     ax.axhline(0.0, **ZERO)
     marker = "o" if len(x) == 1 else None
     for i, line in enumerate((LOOK.stable_line, LOOK.unstable_line)):
-        ax.fill_between(x, values[:, i] - errors[:, i], values[:, i] + errors[:, i], color=line["color"], alpha=0.2, lw=0.0)
+        ax.fill_between(
+            x,
+            values[:, i] - errors[:, i],
+            values[:, i] + errors[:, i],
+            color=line["color"],
+            alpha=0.2,
+            lw=0.0,
+        )
         ax.plot(x, values[:, i], label=rf"$\lambda_{i + 1}$", marker=marker, ms=4.0, **line)
     ax.set_xlabel(label)
     ax.set_ylabel(NAME)
@@ -110,11 +142,17 @@ def draw_exponents_along(dataset: Any, *, ax: Axes | None = None, width: float =
 
 
 def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
-    """The largest exponent over two dimensions; a line encloses where it is above its error and the resolution."""
+    """The largest exponent over two dimensions; a line encloses where it is above its error and the
+    resolution.
+    """
     largest = dataset["exponent"].isel(index=0).transpose(*dims).values.T
     (first, x), (second, y) = (varied(dataset, dim) for dim in dims)
     mesh = ax.pcolormesh(
-        cell_edges(x), cell_edges(y), np.where(np.isfinite(largest), largest, np.nan), cmap="viridis_r", rasterized=True
+        cell_edges(x),
+        cell_edges(y),
+        np.where(np.isfinite(largest), largest, np.nan),
+        cmap="viridis_r",
+        rasterized=True,
     )
     ax.set_facecolor(LOOK.faint)
     positive = dataset["positive"].transpose(*dims).values.T.astype(float)
@@ -127,14 +165,22 @@ def _draw_map(ax: Axes, dataset: Any, dims: list[str]) -> Axes:
 
 
 @drawing
-def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the verdict's sentence; returns `ax`."""
+def draw_verdict(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw the states at phase 0 on which a motion ends, its orbit if there is one, and the
+    verdict's sentence; returns `ax`.
+    """
     own, ax = ax is None, axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
     states = [dataset[f"section_{name}"].values for name in plane]
     many = len(states[0]) > 64
     if f"curve_{plane[0]}" in dataset:
-        ax.plot(*(dataset[f"curve_{name}"].values for name in plane), label="its orbit", **LOOK.stable_line)
+        ax.plot(
+            *(dataset[f"curve_{name}"].values for name in plane),
+            label="its orbit",
+            **LOOK.stable_line,
+        )
     ax.plot(
         *states,
         ls="none",
@@ -154,12 +200,19 @@ def draw_verdict(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.si
     return ax
 
 
-VERDICTS = {"undecided": "x", "chaotic": "o", "transient": "^", "periodic": "s", "quasi_periodic": "D"}
+VERDICTS = {
+    "undecided": "x",
+    "chaotic": "o",
+    "transient": "^",
+    "periodic": "s",
+    "quasi_periodic": "D",
+}
 
 
 @drawing
 def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
-    """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of unsettled motions below; returns both axes.
+    """Draw the tree of `chaotic_bands`: states at phase 0 above, exponents of unsettled motions
+    below; returns both axes.
 
     Into given axes only the states at phase 0 are drawn.
     """
@@ -168,7 +221,9 @@ def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | No
     figure = new_figure(LOOK.double_column, 120.0) if figure is None else figure
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     _draw_states(above, tree).set_xlabel("")
-    handles: list[Any] = [Patch(color=BANDS["CH"], label=BAND_NAMES["CH"])] if tree["bands"].sizes["band"] else []
+    handles: list[Any] = (
+        [Patch(color=BANDS["CH"], label=BAND_NAMES["CH"])] if tree["bands"].sizes["band"] else []
+    )
     handles += _draw_deciding_exponents(below, tree)
     if handles:
         outside_legend(figure, handles=handles, ncols=4)
@@ -178,19 +233,23 @@ def draw_chaotic_bands(tree: Any, *, ax: Axes | None = None, figure: Figure | No
 def _draw_states(ax: Axes, tree: Any) -> Axes:
     ax.set_xlim(*(float(x) for x in tree.attrs["bounds"]))
     draw_stroboscopic_states(ax, tree)
-    states, name = tree["stroboscopic"], symbol(tree.attrs["coordinate"])
+    states = tree["stroboscopic"]
+    name = symbol(tree.attrs["coordinate"])
     ax.set_ylabel(f"${name}$ at phase 0{unit_in_brackets(states['position'])}")
     ax.set_xlabel(parameter_name(tree.attrs["path"]))
     return ax
 
 
 def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
-    """The exponents of unsettled motions, with a mark for each verdict; returns the handles of the marks for a legend."""
+    """The exponents of unsettled motions, with a mark for each verdict; returns the handles of the
+    marks for a legend.
+    """
     below.axhline(0.0, **ZERO)
     draw_bands(below, tree)
     handles = []
     table = tree["exponents"]
-    verdict, marked = table["verdict"].values, table["verdict"].attrs
+    verdict = table["verdict"].values
+    marked = table["verdict"].attrs
     for number, meaning in zip(marked["flag_values"], marked["flag_meanings"].split(), strict=True):
         here = (verdict == number) & np.isfinite(table["exponent"].values)
         if here.any():
@@ -203,9 +262,18 @@ def _draw_deciding_exponents(below: Axes, tree: Any) -> list[Any]:
                 "lw": 0.6,
                 "mew": 0.6,
             }
-            handles.append(below.errorbar(*columns, capsize=1.5, label=f"exponent, 95 %: {meaning.replace('_', '-')}", **marks))
+            handles.append(
+                below.errorbar(
+                    *columns,
+                    capsize=1.5,
+                    label=f"exponent, 95 %: {meaning.replace('_', '-')}",
+                    **marks,
+                )
+            )
     if not np.isfinite(table["exponent"].values).any():
-        below.text(0.5, 0.5, "all motions settle", transform=below.transAxes, ha="center", va="bottom")
+        below.text(
+            0.5, 0.5, "all motions settle", transform=below.transAxes, ha="center", va="bottom"
+        )
         below.set_yticks([0.0])
     below.set_ylabel(NAME)
     below.set_xlabel(parameter_name(tree.attrs["path"]))

@@ -1,9 +1,11 @@
-"""The look of all pictures: the paper's conventions, colours that are also distinct in grey and for the colour-blind, widths;
-and the names of coordinates and parameters on axes, whose units are those of the variables in a dataset.
+"""The look of all pictures: the paper's conventions, colours that are also distinct in grey and for
+the colour-blind, widths; and the names of coordinates and parameters on axes, whose units are those
+of the variables in a dataset.
 
-Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the mechanism dash-dotted green; no
-two of them share both a line style and a lightness. Along a branch such a line is heavy where the model holds, thin where an
-assumption of the model fails, and thin and pale beyond a limit of the mechanism.
+Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the
+mechanism dash-dotted green; no two of them share both a line style and a lightness. Along a branch
+such a line is heavy where the model holds, thin where an assumption of the model fails, and thin
+and pale beyond a limit of the mechanism.
 """
 
 from __future__ import annotations
@@ -41,7 +43,13 @@ class Look:
     ink: str = "#1a1a1a"
     single_column: float = 90.0  # mm
     double_column: float = 190.0  # mm
-    dashes: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (1, 1.2)))
+    dashes: tuple[Any, ...] = (
+        "-",
+        (0, (6, 1.5)),
+        (0, (3, 1.2)),
+        (0, (5, 1.2, 1, 1.2)),
+        (0, (1, 1.2)),
+    )
 
     @property
     def stable_line(self) -> dict[str, Any]:
@@ -114,7 +122,9 @@ def style() -> Iterator[None]:
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Let a function draw in the conventions if it makes a new figure; a given figure or given axes keep their style."""
+    """Let a function draw in the conventions if it makes a new figure; a given figure or given axes
+    keep their style.
+    """
 
     @wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -142,7 +152,11 @@ def axes_or_new(ax: Axes | None, width: float, height: float) -> Axes:
 
 def shades(n: int, first: float = 0.0, last: float = 0.78) -> list[Any]:
     """`n` colours of an ordered family, from dark to light, which have the same order in grey."""
-    return list(mpl.colormaps["viridis"](np.linspace(first, last, n))) if n > 1 else [mpl.colormaps["viridis"](first)]
+    return (
+        list(mpl.colormaps["viridis"](np.linspace(first, last, n)))
+        if n > 1
+        else [mpl.colormaps["viridis"](first)]
+    )
 
 
 def figure_of(axes: Any) -> Figure:
@@ -152,7 +166,9 @@ def figure_of(axes: Any) -> Figure:
 
 
 def outside_legend(figure: Any, **options: Any) -> None:
-    """A legend below all panels of a figure; the figure is laid out so that the legend covers nothing."""
+    """A legend below all panels of a figure; the figure is laid out so that the legend covers
+    nothing.
+    """
     if figure.get_layout_engine() is None:
         figure.set_layout_engine("constrained")
     figure.legend(loc="outside lower center", **options)
@@ -177,16 +193,20 @@ def panel_label(ax: Any, label: str) -> None:
     ax.set_title(f"$({label})$", loc="left", pad=4)
 
 
-NARROWEST, WIDEST = 10.0, 2000.0  # mm, of a picture: from a stamp to the widest poster
+# mm, of a picture: from a stamp to the widest poster
+NARROWEST = 10.0
+WIDEST = 2000.0
 
 
 def drawing(draw: Callable[P, R]) -> Callable[P, R]:
-    """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind are refused by their names.
+    """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind
+    are refused by their names.
 
-    Users can change datasets: if one lacks something, or its arrays do not fit one another, the error of NumPy or Matplotlib is
-    turned into a sentence.
+    Users can change datasets: if one lacks something, or its arrays do not fit one another, the
+    error of NumPy or Matplotlib is turned into a sentence.
     """
-    name, drawn = next(iter(signature(draw).parameters)), styled(draw)
+    name = next(iter(signature(draw).parameters))
+    drawn = styled(draw)
 
     @answered
     @wraps(draw)
@@ -194,7 +214,9 @@ def drawing(draw: Callable[P, R]) -> Callable[P, R]:
         arguments = bound_arguments(draw, given, named).arguments
         dataset = arguments[name]
         if not hasattr(dataset, "attrs") or not hasattr(dataset, "data_vars"):
-            raise ParameterError(f"{name} must be a Dataset or a DataTree, got {shown(dataset)}", name)
+            raise ParameterError(
+                f"{name} must be a Dataset or a DataTree, got {shown(dataset)}", name
+            )
         if arguments.get("width") is not None:
             check_number("width", arguments["width"], at_least=NARROWEST, at_most=WIDEST, unit="mm")
         try:
@@ -203,7 +225,9 @@ def drawing(draw: Callable[P, R]) -> Callable[P, R]:
             raise
         except Exception as error:
             said = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ParameterError(f"{name} cannot be drawn by {draw.__name__} ({said:.150})", name) from error
+            raise ParameterError(
+                f"{name} cannot be drawn by {draw.__name__} ({said:.150})", name
+            ) from error
 
     return inside
 
@@ -219,23 +243,35 @@ PARAMETERS = {
     "model.damping": r"damping $\mathcal{C}$",
     "model.beta0": r"$\beta_0$ (rad)",
 }
-SAME_AMPLITUDE = 1e-9  # of an amplitude: motions between two walls that reach both have the same one, but for rounding
+# of an amplitude: motions between two walls that reach both have the same one, but for rounding
+SAME_AMPLITUDE = 1e-9
 
 
 def symbol(name: str) -> str:
-    """A state variable's symbol in mathematical text; with several coordinates a velocity's is its coordinate's with a dot."""
+    """A state variable's symbol in mathematical text; with several coordinates a velocity's is its
+    coordinate's with a dot.
+    """
     if name.endswith("_velocity"):
         return rf"\dot{{{symbol(name.removesuffix('_velocity'))}}}"
-    return SYMBOLS.get(name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}")
+    return SYMBOLS.get(
+        name, name if len(name) == 1 else rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+    )
 
 
 def peak(names: str, quantity: str = "amplitude") -> str:
-    """The amplitude, or the highest or lowest value, of a coordinate or of several in one text, in mathematical text."""
-    found, bar = r"\min" if quantity == "lowest" else r"\max", "|" if quantity == "amplitude" else ""
+    """The amplitude, or the highest or lowest value, of a coordinate or of several in one text, in
+    mathematical text.
+    """
+    found = r"\min" if quantity == "lowest" else r"\max"
+    bar = "|" if quantity == "amplitude" else ""
     each = [rf"{bar}{symbol(name)}{bar}" for name in names.split()]
     if len(each) == 1:
         return rf"{found}_\tau{each[0]}"
-    return rf"{found}_\tau({', '.join(each)})" if len(each) < 4 else rf"{found}_\tau\,{found}_i{bar}q_i{bar}"
+    return (
+        rf"{found}_\tau({', '.join(each)})"
+        if len(each) < 4
+        else rf"{found}_\tau\,{found}_i{bar}q_i{bar}"
+    )
 
 
 def unit_in_brackets(variable: Any) -> str:
@@ -245,12 +281,18 @@ def unit_in_brackets(variable: Any) -> str:
 
 
 def parameter_name(path: str) -> str:
-    """The name of a parameter on an axis: what it is and whose, as "frequency of the ground horizontal", if it has no symbol."""
+    """The name of a parameter on an axis: what it is and whose, as "frequency of the ground
+    horizontal", if it has no symbol.
+    """
     if path in PARAMETERS or "." not in path:
         return PARAMETERS.get(path, path)
     owner, _, own = path.rpartition(".")
     whose = owner.removeprefix("load.").replace("_", " ").replace(".", " ")
-    return own.replace("_", " ") if owner in ("model", "impact", "load") else f"{own.replace('_', ' ')} of the {whose}"
+    return (
+        own.replace("_", " ")
+        if owner in ("model", "impact", "load")
+        else f"{own.replace('_', ' ')} of the {whose}"
+    )
 
 
 def quantity_name(dataset: Any, quantity: str) -> str:
@@ -273,24 +315,43 @@ def plane_of(dataset: Any) -> tuple[str, str]:
 
 
 def state_symbol(name: str, plane: tuple[str, str]) -> str:
-    """The symbol of one of the two state variables of a plane, a velocity as its coordinate with a dot."""
+    """The symbol of one of the two state variables of a plane, a velocity as its coordinate with a
+    dot.
+    """
     return rf"\dot{{{symbol(plane[0])}}}" if name == "velocity" else symbol(name)
 
 
 def state_label(dataset: Any, name: str, plane: tuple[str, str], after: str = "") -> str:
-    """The name of an axis with a state variable, and its unit as the variable of a dataset of the same name carries it."""
-    return (
-        f"${state_symbol(name.removeprefix('section_').removeprefix('orbit_'), plane)}${after}{unit_in_brackets(dataset[name])}"
-    )
+    """The name of an axis with a state variable, and its unit as the variable of a dataset of the
+    same name carries it.
+    """
+    return f"${state_symbol(name.removeprefix('section_').removeprefix('orbit_'), plane)}${after}{unit_in_brackets(dataset[name])}"
 
 
 def varied(dataset: Any, dim: str) -> tuple[str, np.ndarray]:
-    """The quantity along a dimension of an ensemble, in words with its unit, and its values: a parameter, a start, or numbers."""
-    given = [name for name in dataset.variables if "." in str(name) or str(name).startswith(("start_", "initial_"))]
+    """The quantity along a dimension of an ensemble, in words with its unit, and its values: a
+    parameter, a start, or numbers.
+    """
+    given = [
+        name
+        for name in dataset.variables
+        if "." in str(name) or str(name).startswith(("start_", "initial_"))
+    ]
     for name in (dim, *given):
-        if name in dataset.variables and dim in dataset[name].dims and dataset[name].dtype.kind in "fi":
-            rows = dataset[name].transpose(dim, ...).values.reshape(dataset.sizes[dim], -1).astype(float)
-            if name == dim or (np.ptp(rows, axis=1).max() == 0.0 and len(np.unique(rows)) == len(rows)):
+        if (
+            name in dataset.variables
+            and dim in dataset[name].dims
+            and dataset[name].dtype.kind in "fi"
+        ):
+            rows = (
+                dataset[name]
+                .transpose(dim, ...)
+                .values.reshape(dataset.sizes[dim], -1)
+                .astype(float)
+            )
+            if name == dim or (
+                np.ptp(rows, axis=1).max() == 0.0 and len(np.unique(rows)) == len(rows)
+            ):
                 return _start_name(dataset, str(name)), rows[:, 0]
     return dim.replace("_", " "), np.arange(dataset.sizes[dim], dtype=float)
 
@@ -303,13 +364,18 @@ def _start_name(dataset: Any, name: str) -> str:
     if state == "time":
         return r"$\tau$ at the start"
     coordinate = next(iter(dataset.data_vars))
-    return f"${state_symbol(state, (str(coordinate), state))}$ at the start{unit_in_brackets(dataset[name])}"
+    return (
+        f"${state_symbol(state, (str(coordinate), state))}$ at the "
+        f"start{unit_in_brackets(dataset[name])}"
+    )
 
 
 def is_flat(amplitudes: np.ndarray) -> bool:
     """Whether most of several motions have the same amplitude."""
     usual = float(np.median(amplitudes)) if amplitudes.size > 1 else np.nan
-    return bool(2 * np.count_nonzero(np.abs(amplitudes - usual) <= SAME_AMPLITUDE * usual) > amplitudes.size)
+    return bool(
+        2 * np.count_nonzero(np.abs(amplitudes - usual) <= SAME_AMPLITUDE * usual) > amplitudes.size
+    )
 
 
 def cell_edges(middles: np.ndarray) -> np.ndarray:

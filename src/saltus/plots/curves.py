@@ -1,4 +1,6 @@
-"""Curves over a parameter: a branch, a curve of special points, a backbone, attractors; the orbits of a search, and a cascade."""
+"""Curves over a parameter: a branch, a curve of special points, a backbone, attractors; the orbits
+of a search, and a cascade.
+"""
 
 from __future__ import annotations
 
@@ -26,26 +28,51 @@ from saltus.plots.conventions import (
 )
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
-RESTS: dict[str, dict[str, Any]] = {"RL": {"marker": "x", "markersize": 3.4}, "CH": {"marker": "+", "markersize": 4.4}}
+RESTS: dict[str, dict[str, Any]] = {
+    "RL": {"marker": "x", "markersize": 3.4},
+    "CH": {"marker": "+", "markersize": 4.4},
+}
 REST_NAMES = {"RL": "lost release (RL)", "CH": "end of a rest (CH)"}
 
 
 @drawing
-def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special points; returns `ax`."""
+def draw_branch(
+    dataset: Any,
+    quantity: str = "amplitude",
+    *,
+    ax: Axes | None = None,
+    width: float = LOOK.single_column,
+) -> Axes:
+    """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special
+    points; returns `ax`.
+    """
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     for line in smooth_lines(dataset, quantity):
         ax.plot(*line.places.T, **line_style(line.stable, line.validity))
     kinds = dataset["kind"].values
     for kind, mark in (MARKS | RESTS).items():
         if (kinds == kind).any():
-            places = (dataset[f"special_{name}"].values[kinds == kind] for name in ("parameter", quantity))
+            places = (
+                dataset[f"special_{name}"].values[kinds == kind] for name in ("parameter", quantity)
+            )
             ax.plot(
-                *places, ls="none", mfc="white", mec=LOOK.ink, mew=0.5, zorder=5, label=(MARK_NAMES | REST_NAMES)[kind], **mark
+                *places,
+                ls="none",
+                mfc="white",
+                mec=LOOK.ink,
+                mew=0.5,
+                zorder=5,
+                label=(MARK_NAMES | REST_NAMES)[kind],
+                **mark,
             )
     handles, labels, handlers = line_handles([dataset])
     named = dict(zip(labels, handles, strict=True)) | marks_of(ax)
-    legend = {"handles": [*named.values()], "labels": [*named], "handler_map": handlers, "handlelength": 3.6}
+    legend = {
+        "handles": [*named.values()],
+        "labels": [*named],
+        "handler_map": handlers,
+        "handlelength": 3.6,
+    }
     if own:
         outside_legend(ax.figure, ncols=2, **legend)
     else:
@@ -56,8 +83,12 @@ def draw_branch(dataset: Any, quantity: str = "amplitude", *, ax: Axes | None = 
 
 
 @drawing
-def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw a curve of special points in the plane of its two parameters, as `SpecialCurve.to_xarray` gives it; returns `ax`."""
+def draw_special_curve(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw a curve of special points in the plane of its two parameters, as
+    `SpecialCurve.to_xarray` gives it; returns `ax`.
+    """
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(
         *dataset["parameter"].values.T,
@@ -72,15 +103,28 @@ def draw_special_curve(dataset: Any, *, ax: Axes | None = None, width: float = L
 
 
 @drawing
-def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
-    """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns `ax`."""
+def draw_attractors_along(
+    dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
+    """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns
+    `ax`.
+    """
     ax = axes_or_new(ax, width, 0.62 * width)
     numbers = [int(number) for number in dataset["attractor"].values]
     for number, colour in attractor_colours(numbers).items():
         sizes = dataset["amplitude"].sel(attractor=number).values
         kinds = {str(kind) for kind in dataset["kind"].sel(attractor=number).values} - {""}
         label = f"{number}: {' or '.join(sorted(kinds))}"
-        ax.plot(dataset["value"].values, sizes, color=colour, marker=".", ms=3.5, mec=LOOK.ink, mew=0.2, label=label)
+        ax.plot(
+            dataset["value"].values,
+            sizes,
+            color=colour,
+            marker=".",
+            ms=3.5,
+            mec=LOOK.ink,
+            mew=0.2,
+            label=label,
+        )
     ax.set_xlim(*np.sort(dataset["value"].values[[0, -1]]))
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"{quantity_name(dataset, 'amplitude')}{unit_in_brackets(dataset['amplitude'])}")
@@ -88,26 +132,52 @@ def draw_attractors_along(dataset: Any, *, ax: Axes | None = None, width: float 
     return ax
 
 
-SETTLED: dict[str, Any] = {"color": LOOK.ink, "linestyle": "none", "marker": "+", "markersize": 5.0, "markeredgewidth": 0.6}
-FACES = {True: ("stable orbit", LOOK.stable, LOOK.stable, "o"), False: ("unstable orbit", "white", LOOK.unstable, "s")}
+SETTLED: dict[str, Any] = {
+    "color": LOOK.ink,
+    "linestyle": "none",
+    "marker": "+",
+    "markersize": 5.0,
+    "markeredgewidth": 0.6,
+}
+FACES = {
+    True: ("stable orbit", LOOK.stable, LOOK.stable, "o"),
+    False: ("unstable orbit", "white", LOOK.unstable, "s"),
+}
 
 
 @drawing
-def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column) -> Axes:
-    """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open; returns `ax`.
+def draw_search(
+    dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
+) -> Axes:
+    """Draw the amplitudes of the orbits of `search_orbits`, stable ones filled, unstable ones open;
+    returns `ax`.
 
-    Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions have settled.
+    Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions
+    have settled.
     """
     ax = axes_or_new(ax, width, 0.62 * width)
-    x, y = dataset["parameter"].values, dataset["amplitude"].values
+    x = dataset["parameter"].values
+    y = dataset["amplitude"].values
     stable = dataset["stable"].values.astype(bool)
     for is_stable, (label, face, edge, marker) in FACES.items():
         here = stable == is_stable
         if here.any():
-            ax.plot(x[here], y[here], ls="none", marker=marker, ms=4.0, mfc=face, mec=edge, mew=0.8, label=label)
+            ax.plot(
+                x[here],
+                y[here],
+                ls="none",
+                marker=marker,
+                ms=4.0,
+                mfc=face,
+                mec=edge,
+                mew=0.8,
+                label=label,
+            )
     for place, height, period in zip(x, y, dataset["period"].values, strict=True):
         if period > 1:
-            ax.annotate(str(period), (place, height), (4, 2), textcoords="offset points", fontsize=7)
+            ax.annotate(
+                str(period), (place, height), (4, 2), textcoords="offset points", fontsize=7
+            )
     settled = dataset["settled_parameter"].values, dataset["settled_amplitude"].values
     if settled[0].size:
         ax.plot(*settled, label="direct simulation", zorder=4, **SETTLED)
@@ -121,7 +191,8 @@ def draw_search(dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LO
 
 @drawing
 def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None = None) -> Any:
-    """Draw a cascade of period doublings: their parameters, the ratios of successive distances and the limit; returns both axes.
+    """Draw a cascade of period doublings: their parameters, the ratios of successive distances and
+    the limit; returns both axes.
 
     Into given axes only the parameters are drawn.
     """
@@ -130,8 +201,10 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
     figure = new_figure(LOOK.double_column, 68.0) if figure is None else figure
     left, right = figure.subplots(1, 2)
     _draw_doublings(left, dataset)
-    periods, ratios = dataset["period"].values, dataset["ratio"].values
-    right.axhline(4.669201609102990, label="limit 4.6692", **LOOK.limit_line)  # Feigenbaum's constant
+    periods = dataset["period"].values
+    ratios = dataset["ratio"].values
+    # Feigenbaum's constant
+    right.axhline(4.669201609102990, label="limit 4.6692", **LOOK.limit_line)
     right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
     right.set_ylabel("ratio of successive distances")
     right.legend(loc="best")
@@ -141,7 +214,9 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
 
 def _draw_doublings(ax: Axes, dataset: Any) -> Axes:
     periods = dataset["period"].values
-    ax.plot(periods, dataset["parameter"].values, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
+    ax.plot(
+        periods, dataset["parameter"].values, marker="s", ms=4.0, mfc="white", **LOOK.stable_line
+    )
     ax.set_ylabel(f"{parameter_name(dataset.attrs['path'])} of the doubling")
     _name_periods(ax, periods)
     return ax
@@ -155,14 +230,25 @@ def _name_periods(ax: Axes, periods: np.ndarray) -> None:
     ax.set_xlabel("forcing periods of the orbit that doubles")
 
 
-BACKBONE_LINE: dict[str, Any] = {"color": LOOK.ink, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.1}
+BACKBONE_LINE: dict[str, Any] = {
+    "color": LOOK.ink,
+    "linestyle": (0, (6, 1.5, 1, 1.5)),
+    "linewidth": 1.1,
+}
 
 
 @drawing
-def draw_backbone(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column) -> Axes:
-    """Draw the dataset of `backbone`: amplitudes over the frequencies of the free orbits; returns the axes."""
+def draw_backbone(
+    dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
+) -> Axes:
+    """Draw the dataset of `backbone`: amplitudes over the frequencies of the free orbits; returns
+    the axes.
+    """
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(dataset["frequency"].values, dataset["amplitude"].values, **BACKBONE_LINE)
     ax.set_xlabel(r"frequency $2\pi/T$ of free motions")
-    ax.set_ylabel(f"${symbol(dataset.attrs['coordinate'])}$ at the turning point{unit_in_brackets(dataset['amplitude'])}")
+    ax.set_ylabel(
+        f"${symbol(dataset.attrs['coordinate'])}$ at the turning "
+        f"point{unit_in_brackets(dataset['amplitude'])}"
+    )
     return ax

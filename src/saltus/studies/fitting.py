@@ -1,4 +1,6 @@
-"""Numbers of a system from measured motions: least squares with exact derivatives through every impact."""
+"""Numbers of a system from measured motions: least squares with exact derivatives through every
+impact.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +35,12 @@ if TYPE_CHECKING:
 class FitSettings:
     """How the fit is looked for."""
 
-    candidates: int = 3  # The starts that fit the first impacts best, which are followed over all of the data until one fits.
+    # The starts that fit the first impacts best, which are followed over all of the data until one
+    # fits.
+    candidates: int = 3
     good: float = 2.0  # chi^2 per degree of freedom below which no further start is tried.
-    named: float = 0.1  # The share of an unknown in a direction from which on a sentence about the direction names it.
+    # The share of an unknown in a direction from which on a sentence about the direction names it.
+    named: float = 0.1
 
 
 FIT = FitSettings()
@@ -50,7 +55,8 @@ class Fit(Result):
     system
         The system with the numbers that were found.
     values
-        The numbers by their paths; those of the start by "start.theta", of record i among several by "start.theta[i]".
+        The numbers by their paths; those of the start by "start.theta", of record i among several
+        by "start.theta[i]".
     errors
         Their standard errors; inf where the data say nothing.
     covariance
@@ -60,13 +66,15 @@ class Fit(Result):
     degrees
         The number of data less that of the unknowns.
     remarks
-        Sentences: what cannot be told from the data, what ended on its bound, where the motion has no derivative.
+        Sentences: what cannot be told from the data, what ended on its bound, where the motion has
+        no derivative.
     comparison
         For each measurement the data beside the motion.
     problem
         The measurements, from which `log_likelihood` is computed.
     noise
-        The factor of the given standard deviations: 1, or where none were given the estimated deviation itself.
+        The factor of the given standard deviations: 1, or where none were given the estimated
+        deviation itself.
     bounds
         The bounds (lowest, highest) of each number.
 
@@ -101,71 +109,133 @@ class Fit(Result):
             return np.asarray(self.covariance / np.outer(deviation, deviation))
 
     def log_likelihood(self, values: Unknowns | Sequence[float]) -> tuple[float, np.ndarray]:
-        """The logarithm of the likelihood of the data under Gaussian noise, and its exact gradient, for samplers such as emcee
-        (which takes the first alone), PyMC and blackjax:
+        """The logarithm of the likelihood of the data under Gaussian noise, and its exact gradient,
+        for samplers such as emcee (which takes the first alone), PyMC and blackjax:
 
             log L = -sum over data of [r^2 / 2 + log(sigma sqrt(2 pi))],    grad log L = -J' r.
 
-        Outside of the bounds, and where the system has no such motion, it is -inf with the gradient 0.
+        Outside of the bounds, and where the system has no such motion, it is -inf with the gradient
+        0.
 
         Parameters
         ----------
         values
             The numbers by their paths, or a list of them in the order of `fit.values`.
         """
-        x = np.array([values[name] for name in self.values] if isinstance(values, Mapping) else values, dtype=float)
+        x = np.array(
+            [values[name] for name in self.values] if isinstance(values, Mapping) else values,
+            dtype=float,
+        )
         if x.shape != (len(self.values),):
-            raise ParameterError(f"values must be {len(self.values)} numbers, for {', '.join(self.values)}", "values")
+            raise ParameterError(
+                f"values must be {len(self.values)} numbers, for {', '.join(self.values)}", "values"
+            )
         low, high = np.array(list(self.bounds.values())).T
         none = -math.inf, np.zeros(x.size)
         if not ((x >= low) & (x <= high)).all():
             return none
         try:
-            parts = [self.problem.beside(i, dict(zip(self.values, x.tolist(), strict=True))) for i in range(len(self.comparison))]
+            parts = [
+                self.problem.beside(i, dict(zip(self.values, x.tolist(), strict=True)))
+                for i in range(len(self.comparison))
+            ]
         except SaltusError:
             return none
         r, jacobian, sigma = _stacked(parts)
-        size = -0.5 * float(r @ r) / self.noise**2 - float(np.sum(np.log(sigma * self.noise * math.sqrt(2 * math.pi))))
+        size = -0.5 * float(r @ r) / self.noise**2 - float(
+            np.sum(np.log(sigma * self.noise * math.sqrt(2 * math.pi)))
+        )
         return size, -(jacobian.T @ r) / self.noise**2
 
     def to_xarray(self) -> xarray.Dataset:
-        """Over `parameter`: value, error, bounds and correlations; over `datum`: what was measured, and the motion beside it."""
-        names, joined = list(self.values), self.comparison
+        """Over `parameter`: value, error, bounds and correlations; over `datum`: what was measured,
+        and the motion beside it.
+        """
+        names = list(self.values)
+        joined = self.comparison
         rows: dict[str, tuple[Any, ...]] = {
             "value": ("parameter", list(self.values.values()), "1", "what was found"),
             "error": ("parameter", list(self.errors.values()), "1", "standard error"),
             "low": ("parameter", [low for low, _ in self.bounds.values()], "1", "lower bound"),
             "high": ("parameter", [high for _, high in self.bounds.values()], "1", "upper bound"),
-            "correlation": (("parameter", "other"), self.correlation, "1", "correlation of the errors"),
-            "record": ("datum", [i for i, part in enumerate(joined) for _ in part.quantity], "1", "number of the measurement"),
-            "quantity": ("datum", [name for part in joined for name in part.quantity], "1", "what was measured"),
+            "correlation": (
+                ("parameter", "other"),
+                self.correlation,
+                "1",
+                "correlation of the errors",
+            ),
+            "record": (
+                "datum",
+                [i for i, part in enumerate(joined) for _ in part.quantity],
+                "1",
+                "number of the measurement",
+            ),
+            "quantity": (
+                "datum",
+                [name for part in joined for name in part.quantity],
+                "1",
+                "what was measured",
+            ),
         }
         for name in ("time", "measured", "model", "sigma"):
-            rows[name] = ("datum", np.concatenate([getattr(part, name) for part in joined]), "1", f"{name} of the datum")
-        rows["sigma"] = (*rows["sigma"][:1], self.noise * rows["sigma"][1], "1", "standard deviation of the noise")
+            rows[name] = (
+                "datum",
+                np.concatenate([getattr(part, name) for part in joined]),
+                "1",
+                f"{name} of the datum",
+            )
+        rows["sigma"] = (
+            *rows["sigma"][:1],
+            self.noise * rows["sigma"][1],
+            "1",
+            "standard deviation of the noise",
+        )
         facts = {"chi2": self.chi2, "degrees": self.degrees, "remarks": list(self.remarks)}
-        return result_dataset("fit", rows, {"parameter": names, "other": names}, self.system, **facts)
+        return result_dataset(
+            "fit", rows, {"parameter": names, "other": names}, self.system, **facts
+        )
 
     def __repr__(self) -> str:
-        return "\n  ".join([f"Fit({self._quality}", *(f"{k} = {v}" for k, v in self._numbers().items()), *self.remarks]) + ")"
+        return (
+            "\n  ".join(
+                [
+                    f"Fit({self._quality}",
+                    *(f"{k} = {v}" for k, v in self._numbers().items()),
+                    *self.remarks,
+                ]
+            )
+            + ")"
+        )
 
     def _repr_html_(self) -> str:
-        return html_table("Fit", {**self._numbers(), "quality": self._quality, "remarks": "; ".join(self.remarks) or "none"})
+        return html_table(
+            "Fit",
+            {
+                **self._numbers(),
+                "quality": self._quality,
+                "remarks": "; ".join(self.remarks) or "none",
+            },
+        )
 
     @property
     def _quality(self) -> str:
         return f"chi^2 = {self.chi2:.6g} for {self.degrees} degrees of freedom"
 
     def _numbers(self) -> dict[str, str]:
-        return {name: f"{value:.9g} +- {self.errors[name]:.2g}" for name, value in self.values.items()}
+        return {
+            name: f"{value:.9g} +- {self.errors[name]:.2g}" for name, value in self.values.items()
+        }
 
 
 class _FoundError(Exception):
-    """Ends SciPy's search where chi^2 cannot fall by more than its rounding, which SciPy tries for half of all its steps."""
+    """Ends SciPy's search where chi^2 cannot fall by more than its rounding, which SciPy tries for
+    half of all its steps.
+    """
 
     def __init__(self, chi2: float, x: np.ndarray) -> None:
         super().__init__()
-        self.chi2, self.x = chi2, x
+        self.chi2 = chi2
+        self.x = x
 
 
 @dataclass(frozen=True)
@@ -180,7 +250,9 @@ class _Search:
     last: dict[Any, list[Compared]] = field(default_factory=dict)
 
     def compared(self, x: np.ndarray, until: Sequence[float]) -> list[Compared]:
-        """The motions with these values beside all measurements, each up to a time; the last answer is remembered."""
+        """The motions with these values beside all measurements, each up to a time; the last answer
+        is remembered.
+        """
         asked = (x.tobytes(), tuple(until))
         if asked not in self.last:
             values = dict(zip(self.names, x.tolist(), strict=True))
@@ -190,7 +262,9 @@ class _Search:
         return self.last[asked]
 
     def solved(self, x: np.ndarray, until: Sequence[float]) -> tuple[float, np.ndarray]:
-        """The least squares from a start: chi^2 and the values; inf where the motion from the start cannot be followed."""
+        """The least squares from a start: chi^2 and the values; inf where the motion from the start
+        cannot be followed.
+        """
         from scipy.optimize import least_squares
 
         def beside(x: np.ndarray) -> list[Compared] | None:
@@ -220,19 +294,32 @@ class _Search:
         x = np.clip(x, np.nextafter(self.low, np.inf), np.nextafter(self.high, -np.inf))
         try:
             found = least_squares(
-                residuals, x, jacobian, bounds=(self.low, self.high), x_scale="jac", xtol=1e-12, ftol=tight, gtol=tight
+                residuals,
+                x,
+                jacobian,
+                bounds=(self.low, self.high),
+                x_scale="jac",
+                xtol=1e-12,
+                ftol=tight,
+                gtol=tight,
             )
         except _FoundError as end:
             return end.chi2, end.x
         return 2.0 * float(found.cost), np.asarray(found.x)
 
     def _gain(self, x: np.ndarray, r: np.ndarray, jacobian: np.ndarray) -> float:
-        """By how much chi^2 falls in a full step of Gauss and Newton; numbers on their bounds stay there."""
-        gradient, near = r @ jacobian, 1e-6 * (self.high - self.low)
+        """By how much chi^2 falls in a full step of Gauss and Newton; numbers on their bounds stay
+        there.
+        """
+        gradient = r @ jacobian
+        near = 1e-6 * (self.high - self.low)
         with np.errstate(invalid="ignore"):  # without bounds
-            held = ((x - self.low < near) & (gradient > 0)) | ((self.high - x < near) & (gradient < 0))
+            held = ((x - self.low < near) & (gradient > 0)) | (
+                (self.high - x < near) & (gradient < 0)
+            )
         sizes = np.where(held, 0.0, np.linalg.norm(jacobian, axis=0))
-        slopes, scaled = jacobian[:, sizes > 0] / sizes[sizes > 0], gradient[sizes > 0] / sizes[sizes > 0]
+        slopes = jacobian[:, sizes > 0] / sizes[sizes > 0]
+        scaled = gradient[sizes > 0] / sizes[sizes > 0]
         return float(scaled @ np.linalg.lstsq(slopes.T @ slopes, scaled, rcond=None)[0])
 
 
@@ -265,27 +352,31 @@ def fit(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Fit:
-    """The numbers of a system, and of its start, with which its motion is nearest to what was measured: least squares
+    """The numbers of a system, and of its start, with which its motion is nearest to what was
+    measured: least squares
 
         sum over data of [(model - measured) / sigma]^2 -> min,
 
     with the exact derivatives of the motion and of the times of its impacts.
 
-    The data are taken in a growing window: first up to the second impact of the motion, then up to the fourth, the eighth, ...,
-    so that a motion with another number of impacts is led there step by step. In the first window the search begins at the
-    system's own numbers and, where all have bounds, at further points between these; those that fit it best are followed.
+    The data are taken in a growing window: first up to the second impact of the motion, then up to
+    the fourth, the eighth, ..., so that a motion with another number of impacts is led there step
+    by step. In the first window the search begins at the system's own numbers and, where all have
+    bounds, at further points between these; those that fit it best are followed.
 
-    The errors are those of the linearised motion. Where no `sigma` was given, the noise is estimated from the residuals.
+    The errors are those of the linearised motion. Where no `sigma` was given, the noise is
+    estimated from the residuals.
 
     Parameters
     ----------
     system
         The system, with a guess of the numbers.
     data
-        One measurement, or several of the same system, each with its own start, load or whatever its `changes` say.
+        One measurement, or several of the same system, each with its own start, load or whatever
+        its `changes` say.
     parameters
-        The dotted paths of the numbers to find, with bounds (lowest, highest) or None; also "start.theta", "start.velocity" of
-        the start, which are of each measurement's own.
+        The dotted paths of the numbers to find, with bounds (lowest, highest) or None; also
+        "start.theta", "start.velocity" of the start, which are of each measurement's own.
     functions
         Further quantities that were measured, f(time, coordinate, velocity) of arrays, by name.
     starts
@@ -314,7 +405,8 @@ def fit(
       impact.e = 0.8 +- 0.0009)
     """
     search = _search(system, data, parameters, functions, tol)
-    windows, begun = _windows(search), []
+    windows = _windows(search)
+    begun = []
     for i, x in enumerate(_first_points(search, starts, seed)):
         progress(0.5 * i / starts, "fitting the first impacts")
         begun.append(search.solved(x, windows[0]))
@@ -331,7 +423,8 @@ def fit(
     if not math.isfinite(size):
         search.compared(search.first, windows[-1])  # raises what is wrong
         raise MotionError(
-            "the motion cannot be followed to the end of the data from any start; give other first numbers or bounds"
+            "the motion cannot be followed to the end of the data from any start; give other "
+            "first numbers or bounds"
         )
     progress(1.0, "done")
     return _result(search, x, size)
@@ -342,31 +435,52 @@ def _search(system: System, data: Any, parameters: Any, functions: Any, tol: flo
     records = (data,) if isinstance(data, Measurement) else tuple(data)
     given = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters)
     if not records or not given:
-        raise ParameterError("data and parameters must not be empty", "parameters" if records else "data")
-    names, first, bounds = [], [], []
+        raise ParameterError(
+            "data and parameters must not be empty", "parameters" if records else "data"
+        )
+    names = []
+    first = []
+    bounds = []
     for path, pair in given.items():
         for name, value in _unknowns_of(system, records, path):
             low, high = (-math.inf, math.inf) if pair is None else (float(x) for x in pair)
             if not low < high:  # nan too
-                raise ParameterError(f"the bounds of {path} must be (lowest, highest), got {shown(pair)}", "parameters")
+                raise ParameterError(
+                    f"the bounds of {path} must be (lowest, highest), got {shown(pair)}",
+                    "parameters",
+                )
             names.append(name)
             first.append(min(max(value, low), high))
             bounds.append((low, high))
     check_measurements(system, records, tuple(names), functions or {})
     low, high = np.array(bounds).T
-    return _Search(MeasuredMotions(system, records, tuple(names), functions or {}, tol), tuple(names), np.array(first), low, high)
+    return _Search(
+        MeasuredMotions(system, records, tuple(names), functions or {}, tol),
+        tuple(names),
+        np.array(first),
+        low,
+        high,
+    )
 
 
-def _unknowns_of(system: System, records: tuple[Measurement, ...], path: str) -> list[tuple[str, float]]:
-    """The unknowns that a path names, with their first values: one number of the system, or that of each start."""
+def _unknowns_of(
+    system: System, records: tuple[Measurement, ...], path: str
+) -> list[tuple[str, float]]:
+    """The unknowns that a path names, with their first values: one number of the system, or that of
+    each start.
+    """
     if not isinstance(path, str) or not path.startswith(START):
         check_path(system, path, "parameters")
         return [(path, float(system.get(path)))]
-    own, names = path.removeprefix(START), state_names(system.model.coordinates)
+    own = path.removeprefix(START)
+    names = state_names(system.model.coordinates)
     if own not in names:
         raise ParameterError(f"there is no {path}; {near(own, names)}", "parameters")
     several = len(records) > 1
-    return [(f"{path}[{i}]" if several else path, float(r.start.get(own, 0.0))) for i, r in enumerate(records)]
+    return [
+        (f"{path}[{i}]" if several else path, float(r.start.get(own, 0.0)))
+        for i, r in enumerate(records)
+    ]
 
 
 def _windows(search: _Search) -> list[list[float]]:
@@ -380,9 +494,9 @@ def _windows(search: _Search) -> list[list[float]]:
         ends = [float(times[k - 1 : k + 1].mean()) for k in 2 ** np.arange(1, 40) if k < times.size]
         columns.append([end for end in ends if end < record.end])
     stages = max(map(len, columns))
-    return [[column[s] if s < len(column) else math.inf for column in columns] for s in range(stages)] + [
-        [math.inf] * len(columns)
-    ]
+    return [
+        [column[s] if s < len(column) else math.inf for column in columns] for s in range(stages)
+    ] + [[math.inf] * len(columns)]
 
 
 def _first_points(search: _Search, starts: int, seed: int) -> list[np.ndarray]:
@@ -402,7 +516,8 @@ def _noise_known(search: _Search) -> bool:
 
 def _degrees(search: _Search) -> int:
     count = sum(
-        sum(int(np.isfinite(column).sum()) for column in record.values.values()) + record.impacts.size
+        sum(int(np.isfinite(column).sum()) for column in record.values.values())
+        + record.impacts.size
         for record in search.problem.measurements
     )
     return int(count) - len(search.names)
@@ -420,7 +535,8 @@ def _stacked(parts: Iterable[Compared]) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
     """The fit with its errors, and the sentences about what it does not know."""
-    problem, names = search.problem, search.names
+    problem = search.problem
+    names = search.names
     comparison = search.compared(x, [math.inf] * len(problem.measurements))
     _, jacobian, _ = _stacked(comparison)
     degrees = _degrees(search)
@@ -440,9 +556,14 @@ def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
     covariance[blind, blind] = np.inf
     remarks = [_blind_sentence(names, row * scale, row) for row in rows[~known]]
     on_bound = np.minimum(x - search.low, search.high - x) <= 1e-9 * scale
-    remarks += [f"{name} ended on its bound: the data ask for more than it allows" for name in np.array(names)[on_bound]]
+    remarks += [
+        f"{name} ended on its bound: the data ask for more than it allows"
+        for name in np.array(names)[on_bound]
+    ]
     if not all(np.isfinite(part.slopes).all() for part in comparison):
-        remarks.append("the motion has no derivative at some of the data, which were taken as fixed there")
+        remarks.append(
+            "the motion has no derivative at some of the data, which were taken as fixed there"
+        )
     own = {name: float(v) for name, v in zip(names, x, strict=True) if not name.startswith(START)}
     return Fit(
         system=problem.system.with_(own),
@@ -455,16 +576,27 @@ def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
         comparison=tuple(comparison),
         problem=problem,
         noise=noise,
-        bounds={name: (float(a), float(b)) for name, a, b in zip(names, search.low, search.high, strict=True)},
+        bounds={
+            name: (float(a), float(b))
+            for name, a, b in zip(names, search.low, search.high, strict=True)
+        },
     )
 
 
 def _blind_sentence(names: tuple[str, ...], direction: np.ndarray, shares: np.ndarray) -> str:
-    """What the data do not tell, for a direction of the unknowns that changes nothing beyond the noise."""
+    """What the data do not tell, for a direction of the unknowns that changes nothing beyond the
+    noise.
+    """
     moved = [i for i in np.argsort(-np.abs(shares)) if abs(shares[i]) > FIT.named]
     if len(moved) == 1:
-        return f"the data say nothing of {names[moved[0]]} beyond its bounds: the motion hardly changes with it"
+        return (
+            f"the data say nothing of {names[moved[0]]} beyond its bounds: the motion hardly "
+            "changes with it"
+        )
     largest = direction[moved[0]]
     steps = ", ".join(f"{names[i]} by {direction[i] / largest:+.3g}" for i in moved)
     together = " and ".join(names[i] for i in moved)
-    return f"the data do not tell {together} apart: changed together, {steps}, they leave the motion as it is"
+    return (
+        f"the data do not tell {together} apart: changed together, {steps}, they leave the "
+        "motion as it is"
+    )

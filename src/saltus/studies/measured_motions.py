@@ -1,4 +1,6 @@
-"""Measured motions, and how far the motions of a system are from them, with exact derivatives through every impact."""
+"""Measured motions, and how far the motions of a system are from them, with exact derivatives
+through every impact.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +28,17 @@ class Measurement:
     Parameters
     ----------
     start
-        The state at the start by the names of the model, {"theta": 0.3, "velocity": 0.0}, and its `time` (0); velocities that
-        are not given are 0.
+        The state at the start by the names of the model, {"theta": 0.3, "velocity": 0.0}, and its
+        `time` (0); velocities that are not given are 0.
     time
         The dimensionless times of the samples, (n,), increasing.
     values
-        The measured values at these times by quantity: a state variable ("theta", "velocity"), an acceleration ("acceleration",
-        or "x_acceleration" with several coordinates), or a name in `functions` of `fit`. nan stands for what is missing.
+        The measured values at these times by quantity: a state variable ("theta", "velocity"), an
+        acceleration ("acceleration", or "x_acceleration" with several coordinates), or a name in
+        `functions` of `fit`. nan stands for what is missing.
     sigma
-        The standard deviation of the noise, a number or one for each quantity; None where it is not known, and estimated.
+        The standard deviation of the noise, a number or one for each quantity; None where it is not
+        known, and estimated.
     impacts
         The times of the first impacts, (m,), increasing.
     impact_sigma
@@ -60,18 +64,32 @@ class Measurement:
 
     def __post_init__(self) -> None:
         for name in ("time", "impacts"):
-            times = np.ravel(as_numbers(getattr(self, name), name)) if np.size(getattr(self, name)) else np.empty(0)
+            times = (
+                np.ravel(as_numbers(getattr(self, name), name))
+                if np.size(getattr(self, name))
+                else np.empty(0)
+            )
             if not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-                raise ParameterError(f"{name} must be numbers that rise, got {shown(getattr(self, name))}", name)
+                raise ParameterError(
+                    f"{name} must be numbers that rise, got {shown(getattr(self, name))}", name
+                )
             object.__setattr__(self, name, times)
         values = {name: np.asarray(column, dtype=float) for name, column in self.values.items()}
         for name, column in values.items():
             if column.shape != self.time.shape:
-                raise ParameterError(f"values[{name!r}] must be one number for each of {self.time.size} times", "values")
+                raise ParameterError(
+                    f"values[{name!r}] must be one number for each of {self.time.size} times",
+                    "values",
+                )
         object.__setattr__(self, "values", values)
         if not self.quantities:
-            raise ParameterError("a Measurement needs values at times, or the times of impacts", "values")
-        for name, sigma in (("impact_sigma", self.impact_sigma), *(("sigma", self.sigma_of(q)) for q in values)):
+            raise ParameterError(
+                "a Measurement needs values at times, or the times of impacts", "values"
+            )
+        for name, sigma in (
+            ("impact_sigma", self.impact_sigma),
+            *(("sigma", self.sigma_of(q)) for q in values),
+        ):
             if sigma is not None:
                 check_number(name, sigma, above=0.0)
 
@@ -106,7 +124,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Compared:
-    """A motion beside a measurement, one entry for each number that was measured: (n,), the derivatives (n, unknowns)."""
+    """A motion beside a measurement, one entry for each number that was measured: (n,), the
+    derivatives (n, unknowns).
+    """
 
     quantity: list[str]
     time: np.ndarray
@@ -123,12 +143,16 @@ class Compared:
     @property
     def jacobian(self) -> np.ndarray:
         """The derivatives of the residuals, 0 where the motion has none."""
-        return np.asarray(np.where(np.isfinite(self.slopes), self.slopes, 0.0) / self.sigma[:, None])
+        return np.asarray(
+            np.where(np.isfinite(self.slopes), self.slopes, 0.0) / self.sigma[:, None]
+        )
 
 
 @dataclass(frozen=True)
 class MeasuredMotions:
-    """Measurements of a system with unknown numbers: its own by dotted path, and of the starts by "start.theta"."""
+    """Measurements of a system with unknown numbers: its own by dotted path, and of the starts by
+    "start.theta".
+    """
 
     system: System
     measurements: tuple[Measurement, ...]
@@ -142,13 +166,22 @@ class MeasuredMotions:
         columns = np.array([place.get(name, -1) for name in self.unknowns])
         parts = list(self._parts(self.measurements[i], result, until))
         slopes = np.concatenate([part[-1] for part in parts])
-        time, measured, model, sigma = (np.concatenate([part[k] for part in parts]) for k in range(1, 5))
+        time, measured, model, sigma = (
+            np.concatenate([part[k] for part in parts]) for k in range(1, 5)
+        )
         quantity = [name for name, times, *_ in parts for _ in range(times.size)]
-        return Compared(quantity, time, measured, model, sigma, np.where(columns < 0, 0.0, slopes[:, columns]))
+        return Compared(
+            quantity, time, measured, model, sigma, np.where(columns < 0, 0.0, slopes[:, columns])
+        )
 
-    def motion(self, i: int, values: Unknowns, until: float = np.inf) -> tuple[Sensitivities, dict[str, int]]:
-        """The motion of measurement `i` with its derivatives, and the column of each unknown on which it depends."""
-        record, names = self.measurements[i], state_names(self.system.model.coordinates)
+    def motion(
+        self, i: int, values: Unknowns, until: float = np.inf
+    ) -> tuple[Sensitivities, dict[str, int]]:
+        """The motion of measurement `i` with its derivatives, and the column of each unknown on
+        which it depends.
+        """
+        record = self.measurements[i]
+        names = state_names(self.system.model.coordinates)
         paths = tuple(name for name in self.unknowns if not name.startswith(START))
         system = self.system.with_({**record.changes, **{path: values[path] for path in paths}})
         start = {name: float(record.start.get(name, 0.0)) for name in names}
@@ -165,26 +198,50 @@ class MeasuredMotions:
                 if not which or int(which[:-1]) == i:
                     yield name, own
 
-    def _parts(self, record: Measurement, result: Sensitivities, until: float) -> Iterator[tuple[Any, ...]]:
-        """For each quantity its name, times, measured values, values of the motion, standard deviations and derivatives."""
+    def _parts(
+        self, record: Measurement, result: Sensitivities, until: float
+    ) -> Iterator[tuple[Any, ...]]:
+        """For each quantity its name, times, measured values, values of the motion, standard
+        deviations and derivatives.
+        """
         for name, column in record.values.items():
             chosen = np.isfinite(column) & (record.time <= until)
             times = record.time[chosen]
             model, slopes = self._quantity(name, result, np.minimum(times, result.motion.time))
-            yield name, times, column[chosen], model, np.full(times.size, record.sigma_of(name) or 1.0), slopes
+            yield (
+                name,
+                times,
+                column[chosen],
+                model,
+                np.full(times.size, record.sigma_of(name) or 1.0),
+                slopes,
+            )
         if record.impacts.size:
-            times, own = record.impacts[record.impacts <= until], result.motion.impacts.time
+            times = record.impacts[record.impacts <= until]
+            own = result.motion.impacts.time
             count = min(times.size, own.size)
-            model = np.append(own[:count], np.full(times.size - count, result.motion.time))  # at least as late as that
+            # at least as late as that
+            model = np.append(own[:count], np.full(times.size - count, result.motion.time))
             kinds = np.array([event.kind == "impact" for event in result.motion.events], dtype=bool)
             slopes = np.zeros((times.size, result.event_times.shape[1]))
             slopes[:count] = result.event_times[kinds][:count]
-            yield IMPACTS, times, times, model, np.full(times.size, record.impact_sigma or 1.0), slopes
+            yield (
+                IMPACTS,
+                times,
+                times,
+                model,
+                np.full(times.size, record.impact_sigma or 1.0),
+                slopes,
+            )
 
-    def _quantity(self, name: str, result: Sensitivities, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _quantity(
+        self, name: str, result: Sensitivities, times: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The values (n,) and derivatives (n, columns) of a quantity at times."""
-        coordinates, motion = self.system.model.coordinates, result.motion
-        names, along = state_names(coordinates), result.at(times)
+        coordinates = self.system.model.coordinates
+        motion = result.motion
+        names = state_names(coordinates)
+        along = result.at(times)
         q, v = (np.reshape(x, (len(coordinates), times.size)) for x in motion.at(times))
         state = np.concatenate([q, v])
         if name in names:
@@ -202,7 +259,9 @@ class MeasuredMotions:
     def _function(
         self, function: Function, times: np.ndarray, state: np.ndarray, along: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """A function of the user, which is differentiated to the state by central differences, exact where it is quadratic."""
+        """A function of the user, which is differentiated to the state by central differences,
+        exact where it is quadratic.
+        """
         half = len(state) // 2
 
         def asked(x: np.ndarray) -> np.ndarray:
@@ -211,21 +270,36 @@ class MeasuredMotions:
 
         slopes = np.zeros((times.size, along.shape[2]))
         for row, one in enumerate(np.eye(len(state))):
-            step = np.finfo(float).eps ** (1 / 3) * (1.0 + np.abs(state).max(initial=0.0)) * one[:, None]
-            slopes += ((asked(state + step) - asked(state - step)) / (2 * step[row]))[:, None] * along[:, row]
+            step = (
+                np.finfo(float).eps ** (1 / 3)
+                * (1.0 + np.abs(state).max(initial=0.0))
+                * one[:, None]
+            )
+            slopes += ((asked(state + step) - asked(state - step)) / (2 * step[row]))[
+                :, None
+            ] * along[:, row]
         return asked(state), slopes
 
 
 def accelerations(coordinates: tuple[str, ...]) -> tuple[str, ...]:
     """The names of the accelerations."""
-    return ("acceleration",) if len(coordinates) == 1 else tuple(f"{name}_acceleration" for name in coordinates)
+    return (
+        ("acceleration",)
+        if len(coordinates) == 1
+        else tuple(f"{name}_acceleration" for name in coordinates)
+    )
 
 
 def _followed(
-    system: System, start: Mapping[str, float], paths: tuple[str, ...], record: Measurement, end: float, tol: float
+    system: System,
+    start: Mapping[str, float],
+    paths: tuple[str, ...],
+    record: Measurement,
+    end: float,
+    tol: float,
 ) -> Sensitivities:
-    """The motion up to a time with its derivatives; where impacts were measured it goes on until it has as many, up to half as
-    long again."""
+    """The motion up to a time with its derivatives; where impacts were measured it goes on until it
+    has as many, up to half as long again."""
     coordinates = system.model.coordinates
     speeds = tuple(start[name] for name in state_names(coordinates)[len(coordinates) :])
     wanted = int(np.sum(record.impacts <= end))
@@ -252,23 +326,41 @@ def _followed(
 
 
 def check_measurements(
-    system: System, measurements: tuple[Measurement, ...], unknowns: tuple[str, ...], functions: Mapping[str, Function]
+    system: System,
+    measurements: tuple[Measurement, ...],
+    unknowns: tuple[str, ...],
+    functions: Mapping[str, Function],
 ) -> None:
-    """Refuse quantities that nothing gives, starts of other coordinates, and numbers that are both unknown and given."""
+    """Refuse quantities that nothing gives, starts of other coordinates, and numbers that are both
+    unknown and given.
+    """
     names = state_names(system.model.coordinates)
     known = (*names, *accelerations(system.model.coordinates), *functions)
     for record in measurements:
         if not isinstance(record, Measurement):
-            raise ParameterError(f"data must be a Measurement or a list of them, got {shown(record)}", "data")
+            raise ParameterError(
+                f"data must be a Measurement or a list of them, got {shown(record)}", "data"
+            )
         for name in record.values:
             if name not in known:
-                raise ParameterError(f"no quantity {name!r}: {near(name, known)}; others are given by functions=...", "data")
+                raise ParameterError(
+                    f"no quantity {name!r}: {near(name, known)}; others are given by functions=...",
+                    "data",
+                )
         for name in record.start:
             if name not in (*names, "time"):
                 raise ParameterError(f"start has {name!r}; {near(name, (*names, 'time'))}", "data")
         if both := set(record.changes) & set(unknowns):
-            raise ParameterError(f"{min(both)} is to be found, and a measurement gives it in changes", "parameters")
+            raise ParameterError(
+                f"{min(both)} is to be found, and a measurement gives it in changes", "parameters"
+            )
         system.with_(dict(record.changes))
-    given = [sigma is None for record in measurements for sigma in map(record.sigma_of, record.quantities)]
+    given = [
+        sigma is None
+        for record in measurements
+        for sigma in map(record.sigma_of, record.quantities)
+    ]
     if any(given) and not all(given):
-        raise ParameterError("sigma must be given of all quantities that were measured, or of none", "data")
+        raise ParameterError(
+            "sigma must be given of all quantities that were measured, or of none", "data"
+        )

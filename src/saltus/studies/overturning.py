@@ -1,8 +1,9 @@
-"""Overturning by pulses and records: which of them overturn a system that rests at its contact, and the borders.
+"""Overturning by pulses and records: which of them overturn a system that rests at its contact, and
+the borders.
 
-A border is a curve of amplitude over frequency on which the motion, once the load is over, ends on an unstable equilibrium:
-on the one side it overturns, on the other one it comes back. Its equation is that the state lies on the stable manifold of this
-saddle.
+A border is a curve of amplitude over frequency on which the motion, once the load is over, ends on
+an unstable equilibrium: on the one side it overturns, on the other one it comes back. Its equation
+is that the state lies on the stable manifold of this saddle.
 """
 
 from __future__ import annotations
@@ -41,17 +42,21 @@ class Distance:
 
 @dataclass(frozen=True, eq=False)
 class Border(EquationCurve[Point]):
-    """The amplitudes and frequencies of motions that end on an unstable equilibrium: both are parameters of the curve.
+    """The amplitudes and frequencies of motions that end on an unstable equilibrium: both are
+    parameters of the curve.
 
-    At a time T after the load, the deviation (x, v) of a state from a saddle with the eigenvalues l > 0 > m has the part
-    u = v - m x along the unstable direction, but for terms of second order in the deviation. The distance from the border in the
-    amplitude A is u / (du/dA), with the derivative of the exact motion; T is where the motion is nearest to the saddle, so that
-    the distance has an error of third order in the deviation there, and the deviation is 0 on the border.
+    At a time T after the load, the deviation (x, v) of a state from a saddle with the eigenvalues l
+    > 0 > m has the part u = v - m x along the unstable direction, but for terms of second order in
+    the deviation. The distance from the border in the amplitude A is u / (du/dA), with the
+    derivative of the exact motion; T is where the motion is nearest to the saddle, so that the
+    distance has an error of third order in the deviation there, and the deviation is 0 on the
+    border.
     """
 
     shaken: Shaken
     scale: np.ndarray  # the ranges of amplitude and frequency
-    saddle: Equilibrium | None = None  # which the border belongs to, and the impacts before; None if that is to be found
+    # which the border belongs to, and the impacts before; None if that is to be found
+    saddle: Equilibrium | None = None
     impacts: int | None = None
     count: int = 2
 
@@ -61,10 +66,16 @@ class Border(EquationCurve[Point]):
         return 30.0 * STEPS.longest / self.scale
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Distance | None:
-        """The distance from the border at (amplitude, frequency); None where the motion does not come near to a saddle."""
+        """The distance from the border at (amplitude, frequency); None where the motion does not
+        come near to a saddle.
+        """
         amplitude, frequency = (float(number) for number in place)
         found = self.distance(amplitude, frequency)
-        if found is None or self.impacts not in (None, found[1]) or self.saddle not in (None, found[2]):
+        if (
+            found is None
+            or self.impacts not in (None, found[1])
+            or self.saddle not in (None, found[2])
+        ):
             return None
 
         def slope() -> float:
@@ -80,14 +91,17 @@ class Border(EquationCurve[Point]):
         if not (frequency > 0.0 and np.isfinite(amplitude)):
             return None
         system = shaken.under(frequency, amplitude)
-        over, free = end_of(system.load.channels[shaken.channel]), OVERTURNING.free / shaken.rate
+        over = end_of(system.load.channels[shaken.channel])
+        free = OVERTURNING.free / shaken.rate
         try:
             motion = simulate(system, duration=over + free, tol=OVERTURNING.tol, **shaken.start)
             nearest = self._nearest(motion, over)
             if nearest is None:
                 return None
             time, saddle = nearest
-            result = sensitivities(system, duration=time, parameters=[shaken.path], tol=OVERTURNING.tol, **shaken.start)
+            result = sensitivities(
+                system, duration=time, parameters=[shaken.path], tol=OVERTURNING.tol, **shaken.start
+            )
         except MotionError:
             return None
         assert saddle.eigenvalues is not None
@@ -99,15 +113,20 @@ class Border(EquationCurve[Point]):
         return away / rate, len(result.motion.impacts), saddle
 
     def _nearest(self, motion: Motion, over: float) -> tuple[float, Equilibrium] | None:
-        """When the motion is nearest to a saddle after the load, and which; None where it does not come near to one."""
+        """When the motion is nearest to a saddle after the load, and which; None where it does not
+        come near to one.
+        """
         if motion.time <= over:
             return None
         times = np.linspace(over, motion.time, OVERTURNING.samples)
         place, velocity = motion.at(times)
-        contact, found = float(self.shaken.system.model.contact), []
+        contact = float(self.shaken.system.model.contact)
+        found = []
         for saddle in self.shaken.saddles:
             assert saddle.eigenvalues is not None
-            away = np.hypot(place - saddle.place, velocity / saddle.eigenvalues[0].real) / abs(saddle.place - contact)
+            away = np.hypot(place - saddle.place, velocity / saddle.eigenvalues[0].real) / abs(
+                saddle.place - contact
+            )
             found.append((float(away.min()), float(times[int(away.argmin())]), saddle))
         away, time, saddle = min(found, key=lambda one: one[0])
         return (time, saddle) if away < OVERTURNING.near else None
@@ -116,7 +135,9 @@ class Border(EquationCurve[Point]):
         return Point(self, found.place, tangent, found.iterations)
 
     def through(self, amplitude: float, frequency: float) -> Point | None:
-        """The point of a border at a frequency near to an amplitude; the border is that of the motion there."""
+        """The point of a border at a frequency near to an amplitude; the border is that of the
+        motion there.
+        """
         found = self.distance(amplitude, frequency)
         for _ in range(OVERTURNING.iterations):
             if found is None:
@@ -152,7 +173,10 @@ class OverturningRequest:
         for name in ("amplitude", "frequency"):
             values = check_axis(name, getattr(self, name))
             if values.size < 2 or not values[0] > 0.0:
-                raise ParameterError(f"{name} must be two or more numbers above 0, got {shown(getattr(self, name))}", name)
+                raise ParameterError(
+                    f"{name} must be two or more numbers above 0, got {shown(getattr(self, name))}",
+                    name,
+                )
             object.__setattr__(self, name, values)
         object.__setattr__(self, "shaken", Shaken.of(self.system, self.window))
 
@@ -167,17 +191,20 @@ def overturning_spectrum(
     window: Box = WINDOW,
     progress: Progress = silent,
 ) -> xarray.Dataset:
-    """Which pulses of every amplitude and frequency overturn a system that rests at its contact, and the borders between them.
+    """Which pulses of every amplitude and frequency overturn a system that rests at its contact,
+    and the borders between them.
 
-    The map is computed by an ensemble. Its borders are curves on which the motion ends on an unstable equilibrium after the load,
-    each with the number of impacts before; they are followed through their folds, and exact to rounding (see `Border`). Under a
-    record, whose frequency says how many times faster than written it is played, the borders are computed at each frequency of
+    The map is computed by an ensemble. Its borders are curves on which the motion ends on an
+    unstable equilibrium after the load, each with the number of impacts before; they are followed
+    through their folds, and exact to rounding (see `Border`). Under a record, whose frequency says
+    how many times faster than written it is played, the borders are computed at each frequency of
     the map, by halving the interval between two amplitudes down to rounding.
 
     Parameters
     ----------
     system
-        A model with one coordinate that margins can stop, such as a `RockingBlock`, under a pulse or a record.
+        A model with one coordinate that margins can stop, such as a `RockingBlock`, under a pulse
+        or a record.
     amplitude
         The amplitudes of the pulse, or the scales of the record, that increase.
     frequency
@@ -185,21 +212,24 @@ def overturning_spectrum(
     curves
         Whether to compute the borders.
     window
-        A pair (low, high) for the coordinate and one for the velocity: where unstable equilibria are looked for.
+        A pair (low, high) for the coordinate and one for the velocity: where unstable equilibria
+        are looked for.
     progress
         Called from time to time with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        `overturned`, the side to which the system overturns or 0, `impacts` before the end, and `stop`, why each motion
-        ended, over `frequency` and `amplitude`; and over `point` the borders: `border_frequency`, `border_amplitude`, its
-        `border_impacts` and `border_side`, and the number of the `border`.
+        `overturned`, the side to which the system overturns or 0, `impacts` before the end, and
+        `stop`, why each motion ended, over `frequency` and `amplitude`; and over `point` the
+        borders: `border_frequency`, `border_amplitude`, its `border_impacts` and `border_side`, and
+        the number of the `border`.
 
     Raises
     ------
     ParameterError
-        A system without unstable equilibria, or whose load is not one pulse with a frequency, or one record.
+        A system without unstable equilibria, or whose load is not one pulse with a frequency, or
+        one record.
 
     Examples
     --------
@@ -209,14 +239,19 @@ def overturning_spectrum(
     >>> sorted(set(found.border_impacts.values.tolist())), bool(found.border_amplitude.min() > np.tan(0.2))
     ([0, 1], True)
     """
-    request = OverturningRequest(system=system, amplitude=amplitude, frequency=frequency, curves=curves, window=window)
-    sizes, rates, shaken = request.amplitude, request.frequency, request.shaken
+    request = OverturningRequest(
+        system=system, amplitude=amplitude, frequency=frequency, curves=curves, window=window
+    )
+    sizes = request.amplitude
+    rates = request.frequency
+    shaken = request.shaken
     progress(0.0, "map")
     grid = np.meshgrid(rates, sizes, indexing="ij")
     cells = shaken.outcomes(grid[0].ravel(), grid[1].ravel())
     found = _borders(shaken, sizes, rates, cells, part_of(progress, 0.3, 1.0)) if curves else []
     progress(1.0, "map")
-    over, table = ("frequency", "amplitude"), np.concatenate([_no_points(), *found])
+    over = ("frequency", "amplitude")
+    table = np.concatenate([_no_points(), *found])
     words = [stop.value for stop in Stop]
     stops = {"flag_values": np.arange(len(words)), "flag_meanings": " ".join(words)}
     columns: dict[str, tuple[Any, ...]] = {
@@ -224,15 +259,36 @@ def overturning_spectrum(
         for name, values, text in (
             ("overturned", cells.overturned, "the side to which it overturns, 0 where it stands"),
             ("impacts", cells.impacts, "impacts until the end of the motion"),
-            ("stop", np.array([words.index(word) for word in cells.stop], dtype=np.int8), "why the motion ended"),
+            (
+                "stop",
+                np.array([words.index(word) for word in cells.stop], dtype=np.int8),
+                "why the motion ended",
+            ),
         )
     }
     names = ("frequency", "amplitude", "impacts", "side", "number")
-    texts = ("of the border", "of the border", "before the saddle", "of the saddle", "of the border that the point belongs to")
+    texts = (
+        "of the border",
+        "of the border",
+        "before the saddle",
+        "of the saddle",
+        "of the border that the point belongs to",
+    )
     for name, values, text in zip(names, table.T, texts, strict=True):
-        columns[f"border_{name}"] = ("point", values if name in names[:2] else values.astype(int), "1", f"{name} {text}")
-    facts = {"channel": shaken.channel, "path": shaken.path, "coordinate": system.model.coordinates[0]}
-    data = result_dataset("overturning_spectrum", columns, {"frequency": rates, "amplitude": sizes}, system, **facts)
+        columns[f"border_{name}"] = (
+            "point",
+            values if name in names[:2] else values.astype(int),
+            "1",
+            f"{name} {text}",
+        )
+    facts = {
+        "channel": shaken.channel,
+        "path": shaken.path,
+        "coordinate": system.model.coordinates[0],
+    }
+    data = result_dataset(
+        "overturning_spectrum", columns, {"frequency": rates, "amplitude": sizes}, system, **facts
+    )
     data["stop"].attrs |= stops
     return data
 
@@ -242,13 +298,20 @@ def _no_points() -> np.ndarray:
     return np.empty((0, 5))
 
 
-def _borders(shaken: Shaken, sizes: np.ndarray, rates: np.ndarray, cells: Outcomes, progress: Progress) -> list[np.ndarray]:
+def _borders(
+    shaken: Shaken, sizes: np.ndarray, rates: np.ndarray, cells: Outcomes, progress: Progress
+) -> list[np.ndarray]:
     """The borders between the cells of the map, each as a table like `_no_points`."""
     kinds = cells.kinds.reshape(rates.size, sizes.size)
     row, column = np.nonzero(kinds[:, 1:] != kinds[:, :-1])
-    low, high, frequency, before = sizes[column], sizes[column + 1], rates[row], kinds[row, column]
+    low = sizes[column]
+    high = sizes[column + 1]
+    frequency = rates[row]
+    before = kinds[row, column]
     record = isinstance(shaken.signal, Record)
-    for _ in range((np.finfo(float).nmant + 2 if record else OVERTURNING.halvings) if row.size else 0):
+    for _ in range(
+        (np.finfo(float).nmant + 2 if record else OVERTURNING.halvings) if row.size else 0
+    ):
         middle = 0.5 * (low + high)
         same = shaken.outcomes(frequency, middle).kinds == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)
@@ -258,22 +321,40 @@ def _borders(shaken: Shaken, sizes: np.ndarray, rates: np.ndarray, cells: Outcom
     return _curves(shaken, (sizes, rates), frequency, middle, progress)
 
 
-def _rows(shaken: Shaken, frequency: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """Points of borders that are not followed: of the two motions beside each, one overturns after the fewer impacts."""
+def _rows(
+    shaken: Shaken, frequency: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> list[np.ndarray]:
+    """Points of borders that are not followed: of the two motions beside each, one overturns after
+    the fewer impacts.
+    """
     if not frequency.size:
         return []
     ends = [shaken.outcomes(frequency, amplitude) for amplitude in (low, high)]
     fewer = [np.where(end.overturned != 0, end.impacts, np.iinfo(np.int64).max) for end in ends]
     first = fewer[0] <= fewer[1]
     side = np.where(first, ends[0].overturned, ends[1].overturned)
-    return [np.stack([frequency, 0.5 * (low + high), np.minimum(*fewer), side, np.arange(frequency.size)], axis=1)]
+    return [
+        np.stack(
+            [frequency, 0.5 * (low + high), np.minimum(*fewer), side, np.arange(frequency.size)],
+            axis=1,
+        )
+    ]
 
 
 def _curves(
-    shaken: Shaken, axes: tuple[np.ndarray, np.ndarray], frequency: np.ndarray, amplitude: np.ndarray, progress: Progress
+    shaken: Shaken,
+    axes: tuple[np.ndarray, np.ndarray],
+    frequency: np.ndarray,
+    amplitude: np.ndarray,
+    progress: Progress,
 ) -> list[np.ndarray]:
-    """The borders through points that are nearly on them, followed within the range of the axes, amplitude and frequency."""
-    bounds = {name: (float(axis[0]), float(axis[-1])) for name, axis in zip(("amplitude", "frequency"), axes, strict=True)}
+    """The borders through points that are nearly on them, followed within the range of the axes,
+    amplitude and frequency.
+    """
+    bounds = {
+        name: (float(axis[0]), float(axis[-1]))
+        for name, axis in zip(("amplitude", "frequency"), axes, strict=True)
+    }
     border = Border(shaken, np.array([high - low for low, high in bounds.values()]))
     courses: list[Course[Point, Any]] = []
     for number, (rate, size) in enumerate(zip(frequency.tolist(), amplitude.tolist(), strict=True)):
@@ -286,7 +367,9 @@ def _curves(
     for number, course in enumerate(courses):
         own: Any = course.points[0].curve
         places = np.array([point.place for point in course.points])
-        said = np.tile([float(own.impacts), float(own.saddle.side), float(number)], (len(places), 1))
+        said = np.tile(
+            [float(own.impacts), float(own.saddle.side), float(number)], (len(places), 1)
+        )
         tables.append(np.column_stack([places[:, ::-1], said]))
     return tables
 
@@ -297,7 +380,8 @@ def _lies_on(point: Point, course: Course[Point, Any], border: Border) -> bool:
     if (own.saddle, own.impacts) != (point.curve.saddle, point.curve.impacts):
         return False
     places = np.array([other.place for other in course.points])
-    (a, b), (low, high) = places.T[:, :-1], places.T[:, 1:]
+    (a, b) = places.T[:, :-1]
+    (low, high) = places.T[:, 1:]
     size, rate = point.place
     share = np.divide(rate - b, high - b, out=np.full(b.shape, 0.5), where=high != b)
     there = (a + share * (low - a))[(share >= 0.0) & (share <= 1.0)]
@@ -305,17 +389,23 @@ def _lies_on(point: Point, course: Course[Point, Any], border: Border) -> bool:
 
 
 def fragility(
-    systems: Iterable[System], scales: Iterable[float], *, window: Box = WINDOW, progress: Progress = silent
+    systems: Iterable[System],
+    scales: Iterable[float],
+    *,
+    window: Box = WINDOW,
+    progress: Progress = silent,
 ) -> xarray.Dataset:
-    """The share of loads that overturn a system at rest, over a scale by which each pulse or record is multiplied.
+    """The share of loads that overturn a system at rest, over a scale by which each pulse or record
+    is multiplied.
 
-    The share at a scale is that of a sample of loads; its interval is Wilson's, which holds the share of all such loads with a
-    probability of 95 %.
+    The share at a scale is that of a sample of loads; its interval is Wilson's, which holds the
+    share of all such loads with a probability of 95 %.
 
     Parameters
     ----------
     systems
-        The system under each of the loads, such as `[block.system(Load(ground_horizontal=record)) for record in records]`.
+        The system under each of the loads, such as `[block.system(Load(ground_horizontal=record))
+        for record in records]`.
     scales
         The factors, above 0, that increase.
     window
@@ -326,7 +416,8 @@ def fragility(
     Returns
     -------
     xarray.Dataset
-        `share`, `lower` and `upper` over `scale`, and `overturned` over `record` and `scale`: the side, or 0.
+        `share`, `lower` and `upper` over `scale`, and `overturned` over `record` and `scale`: the
+        side, or 0.
 
     Raises
     ------
@@ -344,7 +435,10 @@ def fragility(
     """
     given = list(systems) if isinstance(systems, Iterable) else []
     if not given:
-        raise ParameterError(f"systems must be a list of systems, one under each load, got {shown(systems)}", "systems")
+        raise ParameterError(
+            f"systems must be a list of systems, one under each load, got {shown(systems)}",
+            "systems",
+        )
     factors = check_axis("scales", scales)
     if not factors[0] > 0.0:
         raise ParameterError(f"scales must be above 0, got {factors[0]:g}", "scales")
@@ -360,6 +454,13 @@ def fragility(
         "share": ("scale", counts / len(given), "1", "share of the loads that overturn the system"),
         "lower": ("scale", lower, "1", "lower end of the 95 % interval of the share"),
         "upper": ("scale", upper, "1", "upper end of the 95 % interval of the share"),
-        "overturned": (("record", "scale"), overturned, "1", "the side to which it overturns, 0 where it stands"),
+        "overturned": (
+            ("record", "scale"),
+            overturned,
+            "1",
+            "the side to which it overturns, 0 where it stands",
+        ),
     }
-    return result_dataset("fragility", columns, {"scale": factors, "record": np.arange(len(given))}, given[0])
+    return result_dataset(
+        "fragility", columns, {"scale": factors, "record": np.arange(len(given))}, given[0]
+    )

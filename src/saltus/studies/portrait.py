@@ -27,14 +27,24 @@ class StartSettings:
     """Where motions begin unless their states are given."""
 
     spread: int = 24  # Number of states, spread evenly over the window.
-    tried: int = 100  # Places tried for each state that is wanted, as a wall may take up a part of the window.
-    beside: tuple[float, ...] = (0.35, 0.75)  # Beside each stable equilibrium, at these shares of the way to the next one.
+    # Places tried for each state that is wanted, as a wall may take up a part of the window.
+    tried: int = 100
+    # Beside each stable equilibrium, at these shares of the way to the next one.
+    beside: tuple[float, ...] = (0.35, 0.75)
 
 
 PORTRAIT_STARTS = StartSettings()
 
 
-def _check(system: System, window: Box, starts: Any, duration: float, samples: int, seed: int, progress: object = None) -> None:
+def _check(
+    system: System,
+    window: Box,
+    starts: Any,
+    duration: float,
+    samples: int,
+    seed: int,
+    progress: object = None,
+) -> None:
     check_number("duration", duration, above=0.0)
     check_count("samples", samples, 2)
     check_count("seed", seed, 0)
@@ -53,7 +63,8 @@ def phase_portrait(
     seed: int = 0,
     progress: Progress = silent,
 ) -> xarray.Dataset:
-    """The phase plane of a system with one coordinate under a constant load (the paper's Figs. 4 and 5).
+    """The phase plane of a system with one coordinate under a constant load (the paper's Figs. 4
+    and 5).
 
     Parameters
     ----------
@@ -62,8 +73,8 @@ def phase_portrait(
     window
         ((least, largest coordinate), (least, largest velocity)).
     starts
-        States (coordinate, velocity) from which motions are followed; by default two beside each stable equilibrium, and
-        24 spread over the window.
+        States (coordinate, velocity) from which motions are followed; by default two beside each
+        stable equilibrium, and 24 spread over the window.
     duration
         How long, in dimensionless time.
     samples
@@ -71,16 +82,19 @@ def phase_portrait(
     seed
         The seed of the spread states.
     progress
-        Called with the fraction done and what is being done, first when all arguments have been checked.
+        Called with the fraction done and what is being done, first when all arguments have been
+        checked.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset. Over (motion, sample): `time`, the coordinate and `velocity`, with the velocities before and after each impact,
-        and nan between them where they differ. Over `equilibrium`, the coordinates of all equilibria in the window: `stable`.
-        Over (equilibrium, root): the parts `eigenvalue_real` and `eigenvalue_imaginary`, nan at the contact. Over (separatrix,
-        point): `separatrix_<coordinate>` and `separatrix_velocity` of the stable manifolds of the saddles; there are none where
-        the impact law has no inverse, and the attribute `no_separatrices` then says why.
+        A Dataset. Over (motion, sample): `time`, the coordinate and `velocity`, with the velocities
+        before and after each impact, and nan between them where they differ. Over `equilibrium`,
+        the coordinates of all equilibria in the window: `stable`. Over (equilibrium, root): the
+        parts `eigenvalue_real` and `eigenvalue_imaginary`, nan at the contact. Over (separatrix,
+        point): `separatrix_<coordinate>` and `separatrix_velocity` of the stable manifolds of the
+        saddles; there are none where the impact law has no inverse, and the attribute
+        `no_separatrices` then says why.
 
     Raises
     ------
@@ -107,26 +121,52 @@ def phase_portrait(
     progress(1.0, "done")
     facts = {"window": np.ravel(window).astype(float).tolist(), "duration": float(duration)}
     begun = "spread" if starts is None else "given"
-    return _dataset(system, rows, points, curves, starts=begun, **facts, **({"no_separatrices": why} if why else {}))
+    return _dataset(
+        system,
+        rows,
+        points,
+        curves,
+        starts=begun,
+        **facts,
+        **({"no_separatrices": why} if why else {}),
+    )
 
 
 def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
-    """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in which the system can be."""
-    area, tried = check_window(window, system), PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread
+    """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in
+    which the system can be.
+    """
+    area = check_window(window, system)
+    tried = PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread
     shifts = np.arange(1, tried + 1)[:, None] * even_steps(2)
-    states = area.centre + area.half * (2.0 * ((np.random.default_rng(int(seed)).random(2) + shifts) % 1.0) - 1.0)
-    states = states[system.model.reaches(system.model.coordinates[0], states[:, 0])][: PORTRAIT_STARTS.spread]
+    states = area.centre + area.half * (
+        2.0 * ((np.random.default_rng(int(seed)).random(2) + shifts) % 1.0) - 1.0
+    )
+    states = states[system.model.reaches(system.model.coordinates[0], states[:, 0])][
+        : PORTRAIT_STARTS.spread
+    ]
     if not len(states):
         raise ParameterError(
-            f"window must reach to where the system can be, got {window!r}: all of it is beyond the contact", "window"
+            (
+                f"window must reach to where the system can be, got {window!r}: all of it is beyond "
+                "the contact"
+            ),
+            "window",
         )
     ends = [*(point.place for point in points), *area[0]]
-    near = [(_beside(point.place, ends, share), 0.0) for point in points if point.stable for share in PORTRAIT_STARTS.beside]
+    near = [
+        (_beside(point.place, ends, share), 0.0)
+        for point in points
+        if point.stable
+        for share in PORTRAIT_STARTS.beside
+    ]
     return np.concatenate([np.array(near).reshape(-1, 2), states])
 
 
 def _beside(place: float, ends: list[float], share: float) -> float:
-    """A coordinate at a share of the way from an equilibrium to the nearest other one, or the end of the window."""
+    """A coordinate at a share of the way from an equilibrium to the nearest other one, or the end
+    of the window.
+    """
     nearest = min((end for end in ends if end != place), key=lambda end: abs(end - place))
     return place + share * (nearest - place)
 
@@ -135,10 +175,19 @@ def _states(system: System, starts: Any) -> np.ndarray:
     """The given states (n, 2), checked."""
     states = check_states("starts", starts)
     if not len(states):
-        raise ParameterError("starts must be states (coordinate, velocity), such as [[0.3, 0.0]], and there is none", "starts")
+        raise ParameterError(
+            "starts must be states (coordinate, velocity), such as [[0.3, 0.0]], and there is none",
+            "starts",
+        )
     beyond = states[~system.model.reaches(system.model.coordinates[0], states[:, 0])]
     if len(beyond):
-        raise ParameterError(f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the contact", "starts")
+        raise ParameterError(
+            (
+                f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the "
+                "contact"
+            ),
+            "starts",
+        )
     return states
 
 
@@ -154,43 +203,75 @@ def _sampled(system: System, state: np.ndarray, duration: float, samples: int) -
     begin: dict[str, Any] = {system.model.coordinates[0]: float(state[0])}
     motion = simulate(system, **begin, velocity=float(state[1]), duration=duration)
     times = np.linspace(0.0, motion.time, samples)
-    position, velocity = (np.asarray(x, dtype=float).reshape(samples, -1)[:, 0] for x in motion.at(times))
+    position, velocity = (
+        np.asarray(x, dtype=float).reshape(samples, -1)[:, 0] for x in motion.at(times)
+    )
     impacts = motion.impacts
-    before, after = impacts.velocity_before, impacts.velocity_after
-    at, gap = np.full(len(impacts), float(system.model.contact)), np.full(len(impacts), np.nan)
+    before = impacts.velocity_before
+    after = impacts.velocity_after
+    at = np.full(len(impacts), float(system.model.contact))
+    gap = np.full(len(impacts), np.nan)
     parts = [(times, position, velocity), (impacts.time, at, before)]
-    parts += [(impacts.time, gap, gap), (impacts.time, at, after)] if (before != after).any() else []
+    parts += (
+        [(impacts.time, gap, gap), (impacts.time, at, after)] if (before != after).any() else []
+    )
     row = np.concatenate([np.stack(part) for part in parts], axis=1)
     return np.asarray(row[:, np.argsort(row[0], kind="stable")])
 
 
 def _dataset(
-    system: System, rows: list[np.ndarray], points: tuple[Equilibrium, ...], curves: tuple[Separatrix, ...], **facts: Any
+    system: System,
+    rows: list[np.ndarray],
+    points: tuple[Equilibrium, ...],
+    curves: tuple[Separatrix, ...],
+    **facts: Any,
 ) -> xarray.Dataset:
     """The motions, equilibria and separatrices as a Dataset; `facts` are further attributes."""
     import xarray
 
     name = system.model.coordinates[0]
-    unit, motions = system.model.unit_of(name), _padded(rows)
-    lines = _padded([np.stack([curve.theta, curve.velocity]) for curve in curves]) if curves else np.empty((0, 2, 0))
-    roots = np.array([point.eigenvalues or (complex(np.nan, np.nan),) * 2 for point in points], dtype=complex).reshape(-1, 2)
-    stable, places = np.array([point.stable for point in points], dtype=bool), np.array([point.place for point in points])
-    over, curve, each = ("motion", "sample"), ("separatrix", "point"), ("equilibrium", "root")
+    unit = system.model.unit_of(name)
+    motions = _padded(rows)
+    lines = (
+        _padded([np.stack([curve.theta, curve.velocity]) for curve in curves])
+        if curves
+        else np.empty((0, 2, 0))
+    )
+    roots = np.array(
+        [point.eigenvalues or (complex(np.nan, np.nan),) * 2 for point in points], dtype=complex
+    ).reshape(-1, 2)
+    stable = np.array([point.stable for point in points], dtype=bool)
+    places = np.array([point.place for point in points])
+    over = ("motion", "sample")
+    curve = ("separatrix", "point")
+    each = ("equilibrium", "root")
     columns = {
         "time": (over, motions[:, 0], "1", "dimensionless time"),
         name: (over, motions[:, 1], unit, name),
         "velocity": (over, motions[:, 2], unit, f"d {name} / d tau"),
         "stable": (("equilibrium",), stable, "1", "no disturbance grows"),
-        "eigenvalue_real": (each, roots.real, "1", "real part of the eigenvalues, nan at the contact"),
+        "eigenvalue_real": (
+            each,
+            roots.real,
+            "1",
+            "real part of the eigenvalues, nan at the contact",
+        ),
         "eigenvalue_imaginary": (each, roots.imag, "1", "their imaginary part"),
         f"separatrix_{name}": (curve, lines[:, 0], unit, "stable manifolds of the saddles"),
         "separatrix_velocity": (curve, lines[:, 1], unit, "velocity on them"),
         "equilibrium": (("equilibrium",), places.astype(float), unit, f"{name} of the equilibria"),
     }
-    contact: dict[str, Any] = {"contact": float(system.model.contact)} if system.model.has_one_contact else {}
+    contact: dict[str, Any] = (
+        {"contact": float(system.model.contact)} if system.model.has_one_contact else {}
+    )
     title = "phase portrait computed by saltus"
-    attributes = provenance(system, title=title, kind="phase_portrait", coordinate=name, **contact, **facts)
-    data = {key: (dims, values, {"units": units, "long_name": text}) for key, (dims, values, units, text) in columns.items()}
+    attributes = provenance(
+        system, title=title, kind="phase_portrait", coordinate=name, **contact, **facts
+    )
+    data = {
+        key: (dims, values, {"units": units, "long_name": text})
+        for key, (dims, values, units, text) in columns.items()
+    }
     return xarray.Dataset(data, attrs=attributes)
 
 

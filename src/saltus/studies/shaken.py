@@ -1,4 +1,6 @@
-"""A system that rests at its contact and is shaken: what becomes of it under a pulse or a record of any size and frequency."""
+"""A system that rests at its contact and is shaken: what becomes of it under a pulse or a record of
+any size and frequency.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +24,20 @@ WINDOW: Box = ((-3.0, 3.0), (-3.0, 3.0))  # in which the unstable equilibria are
 class OverturningSettings:
     """How long motions are followed, and how borders are found."""
 
-    free: float = 40.0  # motions go on for so many times 1 / lambda after the load, with the rate lambda of the saddle
-    halvings: int = 24  # of the interval between two cells of the map that differ: then Newton's method converges
+    # motions go on for so many times 1 / lambda after the load, with the rate lambda of the saddle
+    free: float = 40.0
+    # of the interval between two cells of the map that differ: then Newton's method converges
+    halvings: int = 24
     samples: int = 500  # at which a motion is compared with the saddle after the load
-    near: float = 0.3  # a motion comes near to the saddle within this share of its distance from the contact
+    # a motion comes near to the saddle within this share of its distance from the contact
+    near: float = 0.3
     iterations: int = 12  # of Newton's method from the halved interval
     converged: float = 1e-13  # of the amplitude: the last step of Newton's method
-    difference: float = 1e-6  # share of the frequency over which the slope of a border is taken, for its tangent alone
-    same: float = 2e-3  # share of the range of amplitudes within which a start lies on the lines through the points of a border
+    # share of the frequency over which the slope of a border is taken, for its tangent alone
+    difference: float = 1e-6
+    # share of the range of amplitudes within which a start lies on the lines through the points of
+    # a border
+    same: float = 2e-3
     tol: float = 1e-14  # the error of one step of the motions on a border
 
 
@@ -38,7 +46,9 @@ OVERTURNING = OverturningSettings()
 
 @dataclass(frozen=True)
 class Shaken:
-    """A system that rests at its contact and is shaken by one pulse or record, whose amplitude and frequency are varied."""
+    """A system that rests at its contact and is shaken by one pulse or record, whose amplitude and
+    frequency are varied.
+    """
 
     system: System
     channel: str
@@ -48,7 +58,11 @@ class Shaken:
     def of(cls, system: System, window: Box = WINDOW) -> Shaken:
         """The system with its one load that varies, and its saddles once this is over."""
         check_system(system, "overturning", coordinates=1)
-        varied = [name for name, signal in system.load.channels.items() if not isinstance(signal, Constant)]
+        varied = [
+            name
+            for name, signal in system.load.channels.items()
+            if not isinstance(signal, Constant)
+        ]
         if len(varied) != 1 or not isinstance(system.load.channels[varied[0]], (Pulse, Record)):
             raise ParameterError(
                 "overturning needs a load with one pulse or record, such as ground_horizontal=HalfSine(...), besides constants; "
@@ -57,7 +71,10 @@ class Shaken:
             )
         signal = system.load.channels[varied[0]]
         if not isinstance(signal, Record) and not hasattr(signal, "frequency"):
-            raise ParameterError(f"a {type(signal).__name__} has no frequency; take a pulse that has one", f"load.{varied[0]}")
+            raise ParameterError(
+                f"a {type(signal).__name__} has no frequency; take a pulse that has one",
+                f"load.{varied[0]}",
+            )
         rest = system.with_({f"load.{varied[0]}": 0.0})
         saddles = tuple(place for place in equilibria(rest, window) if place.saddle)
         if not saddles or not system.model.stops:
@@ -89,12 +106,22 @@ class Shaken:
         return min(place.eigenvalues[0].real for place in self.saddles if place.eigenvalues)
 
     def under(self, frequency: float, amplitude: float | None = None) -> System:
-        """The system under the pulse of this frequency and amplitude, or under the record, scaled, so many times faster."""
+        """The system under the pulse of this frequency and amplitude, or under the record, scaled,
+        so many times faster.
+        """
         signal: Any = self.signal
         if isinstance(signal, Record):
-            signal = replace(signal, time=signal.time / frequency, scale=signal.scale if amplitude is None else amplitude)
+            signal = replace(
+                signal,
+                time=signal.time / frequency,
+                scale=signal.scale if amplitude is None else amplitude,
+            )
         else:
-            signal = replace(signal, frequency=frequency, amplitude=signal.amplitude if amplitude is None else amplitude)
+            signal = replace(
+                signal,
+                frequency=frequency,
+                amplitude=signal.amplitude if amplitude is None else amplitude,
+            )
         return self.system.with_({f"load.{self.channel}": signal})
 
     def end(self, frequency: float) -> float:
@@ -107,15 +134,25 @@ class Shaken:
 
     def scaled(self, factors: np.ndarray) -> Outcomes:
         """What becomes of motions under the load as it is, made larger by these factors, (n,)."""
-        value, duration = float(self.system.get(self.path)), end_of(self.signal) + OVERTURNING.free / self.rate
-        return Outcomes.of(simulate_many(self.system, duration=duration, parameters={self.path: factors * value}, **self.start))
+        value = float(self.system.get(self.path))
+        duration = end_of(self.signal) + OVERTURNING.free / self.rate
+        return Outcomes.of(
+            simulate_many(
+                self.system,
+                duration=duration,
+                parameters={self.path: factors * value},
+                **self.start,
+            )
+        )
 
     def outcomes(self, frequency: np.ndarray, amplitude: np.ndarray) -> Outcomes:
         """What becomes of motions with these frequencies and amplitudes, (n,) each."""
         if not isinstance(self.signal, Record):
             columns = {f"load.{self.channel}.frequency": frequency, self.path: amplitude}
             duration = self.duration(np.unique(frequency))
-            return Outcomes.of(simulate_many(self.system, duration=duration, parameters=columns, **self.start))
+            return Outcomes.of(
+                simulate_many(self.system, duration=duration, parameters=columns, **self.start)
+            )
         found = [np.empty(frequency.shape, dtype) for dtype in (np.int8, int, "U10")]
         for value in np.unique(frequency):
             own = frequency == value
@@ -151,5 +188,7 @@ class Outcomes(NamedTuple):
 
     @property
     def kinds(self) -> np.ndarray:
-        """A number for each way to overturn, by the side and the impacts before, and 0 for all that stands, (n,)."""
+        """A number for each way to overturn, by the side and the impacts before, and 0 for all that
+        stands, (n,).
+        """
         return np.asarray(self.overturned * (1 + self.impacts))

@@ -1,4 +1,6 @@
-"""Sweeps as in an experiment: a parameter is changed step by step, up and down again, while the motion goes on."""
+"""Sweeps as in an experiment: a parameter is changed step by step, up and down again, while the
+motion goes on.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,15 @@ import numpy as np
 
 from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow import Ending, Motion, Recurrence, captured_between, find_recurrence, simulate, state_names
+from saltus.flow import (
+    Ending,
+    Motion,
+    Recurrence,
+    captured_between,
+    find_recurrence,
+    simulate,
+    state_names,
+)
 from saltus.progress import Progress, part_of, silent
 from saltus.result import provenance
 from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
@@ -29,17 +39,24 @@ class SweepSettings:
     """The numbers by which it is decided whether a step of the amplitude is a jump."""
 
     step_factor: float = (
-        5.0  # A step is examined if it is this many times the median of the steps around it: a smooth response has few such.
+        # A step is examined if it is this many times the median of the steps around it: a smooth
+        # response has few such.
+        5.0
     )
     neighbours: int = 10  # Number of steps around it of which the median is taken.
-    least_step: float = 0.002  # Steps below this share of the largest amplitude are invisible in a plot, and are not examined.
-    # A large step is swept again in 10 parts, and from the part that contains the change on in parts of 1/100 and then of 1/1024
-    # of the step: transients become shorter with the parts, so that the jump of a slow sweep is left.
+    # Steps below this share of the largest amplitude are invisible in a plot, and are not examined.
+    least_step: float = 0.002
+    # A large step is swept again in 10 parts, and from the part that contains the change on in
+    # parts of 1/100 and then of 1/1024 of the step: transients become shorter with the parts, so
+    # that the jump of a slow sweep is left.
     parts: tuple[int, ...] = (10, 100, 1024)
     kept: float = (
-        0.1  # The share of the step that must be left in one part, if it is a jump; a root, as near a fold, leaves 0.03.
+        # The share of the step that must be left in one part, if it is a jump; a root, as near a
+        # fold, leaves 0.03.
+        0.1
     )
-    hysteresis: float = 0.01  # Amplitudes up and down are different if they differ by this share of the largest one.
+    # Amplitudes up and down are different if they differ by this share of the largest one.
+    hysteresis: float = 0.01
 
 
 SETTINGS = SweepSettings()
@@ -66,31 +83,53 @@ class SweepRequest:
     def __post_init__(self) -> None:
         check_system(self.system, "frequency_sweep", several_contacts=True)
         if self.system.load.frequency is None:
-            raise ParameterError("a sweep needs a load with a frequency; give the Load one", "load.frequency")
+            raise ParameterError(
+                "a sweep needs a load with a frequency; give the Load one", "load.frequency"
+            )
         check_path(self.system, self.path)
         given = check_axis("values", self.values, either_way=True)
         falling = bool(given[0] > given[-1])
         grid = given[::-1] if falling else given
         if grid.size < 2:
-            raise ParameterError(f"values must be two or more that increase or that fall, got {shown(self.values)}", "values")
+            raise ParameterError(
+                f"values must be two or more that increase or that fall, got {shown(self.values)}",
+                "values",
+            )
         for name, function in (self.functions or {}).items():
             if not callable(function):
-                raise ParameterError(f"functions must be functions of a motion, and {name!r} is {shown(function)}", "functions")
+                raise ParameterError(
+                    f"functions must be functions of a motion, and {name!r} is {shown(function)}",
+                    "functions",
+                )
         check_along(self.system, self.path, grid, "values")
         check_count("periods", self.periods, 1)
         check_count("max_period", self.max_period, 1)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         object.__setattr__(self, "grid", grid)
         object.__setattr__(self, "falling", falling)
-        object.__setattr__(self, "start", read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__))
+        object.__setattr__(
+            self,
+            "start",
+            read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__),
+        )
 
     def proved_speeds(self, values: np.ndarray) -> np.ndarray:
-        """The speeds of capture at these values, (n,), proved together: a single proof takes as long as that of a hundred."""
+        """The speeds of capture at these values, (n,), proved together: a single proof takes as
+        long as that of a hundred.
+        """
         columns = {self.path: values}
-        return captured_between(self.system, columns, columns) if self.stop_early else np.full(len(values), np.nan)
+        return (
+            captured_between(self.system, columns, columns)
+            if self.stop_early
+            else np.full(len(values), np.nan)
+        )
 
-    def ends(self, system: System, states: np.ndarray, captured: np.ndarray, parameters: Any = None) -> Recurrence:
-        """What becomes of states at phase 0, (n, d), with the speeds of capture, (n,), and parameters of their own."""
+    def ends(
+        self, system: System, states: np.ndarray, captured: np.ndarray, parameters: Any = None
+    ) -> Recurrence:
+        """What becomes of states at phase 0, (n, d), with the speeds of capture, (n,), and
+        parameters of their own.
+        """
         return find_recurrence(
             system,
             states,
@@ -108,20 +147,28 @@ class SweepRequest:
         )
 
     def numbers_of(self, value: float, row: Recurrence) -> dict[str, float]:
-        """The extrema of each coordinate, and the functions, of the motion on which one value was left: of one period of it or,
-        if it has none, of `max_period` forcing periods, but of no more than each value is kept for."""
-        names, extrema, given = self.system.model.coordinates, [[row.lowest[0], row.highest[0]]], dict(self.functions or {})
+        """The extrema of each coordinate, and the functions, of the motion on which one value was
+        left: of one period of it or, if it has none, of `max_period` forcing periods, but of no
+        more than each value is kept for."""
+        names = self.system.model.coordinates
+        extrema = [[row.lowest[0], row.highest[0]]]
+        given = dict(self.functions or {})
         if given or len(names) > 1:
             system = self.system.with_({self.path: float(value)})
             periods = int(row.period[0]) or min(self.max_period, self.periods)
-            motion = simulate(system, **arguments_of(system, row.last[0]), periods=periods, tol=self.tol)
+            motion = simulate(
+                system, **arguments_of(system, row.last[0]), periods=periods, tol=self.tol
+            )
             extrema = motion.extrema.tolist() if len(names) > 1 else extrema
         found = {f"largest_{name}": high for name, (_, high) in zip(names, extrema, strict=True)}
         found |= {f"smallest_{name}": low for name, (low, _) in zip(names, extrema, strict=True)}
         for name, function in given.items():
             number = np.asarray(function(motion))
             if number.ndim or number.dtype.kind not in "biuf":
-                raise ParameterError(f"functions must return a number, and {name!r} returned {shown(number)}", "functions")
+                raise ParameterError(
+                    f"functions must return a number, and {name!r} returned {shown(number)}",
+                    "functions",
+                )
             found[str(name)] = float(number)
         return found
 
@@ -151,16 +198,19 @@ def frequency_sweep(
     progress: Progress = silent,
     **coordinates: float,
 ) -> xarray.Dataset:
-    """The response while a parameter goes up and down again, as in an experiment: at each value the motion starts from the last
-    state at the value before. If the values fall, the sweep goes down and then up.
+    """The response while a parameter goes up and down again, as in an experiment: at each value the
+    motion starts from the last state at the value before. If the values fall, the sweep goes down
+    and then up.
 
-    With `stop_early`, each value is kept until the motion repeats itself. Without, it is kept for exactly `periods` forcing
-    periods: with periods=1 and many values the parameter changes slowly and steadily. Values change at phase 0 of the load, so
-    that the phase of a harmonic does not jump.
+    With `stop_early`, each value is kept until the motion repeats itself. Without, it is kept for
+    exactly `periods` forcing periods: with periods=1 and many values the parameter changes slowly
+    and steadily. Values change at phase 0 of the load, so that the phase of a harmonic does not
+    jump.
 
-    A step of the amplitude that is large compared with its neighbours, or at which the number of impacts or the period changes,
-    is swept again in parts, down to a thousandth of it; the part that is then left is a jump (without `stop_early` the step
-    itself is reported). Where up and down differ there is hysteresis.
+    A step of the amplitude that is large compared with its neighbours, or at which the number of
+    impacts or the period changes, is swept again in parts, down to a thousandth of it; the part
+    that is then left is a jump (without `stop_early` the step itself is reported). Where up and
+    down differ there is hysteresis.
 
     Parameters
     ----------
@@ -181,19 +231,21 @@ def frequency_sweep(
     tol
         The error that one step of the integration may make.
     functions
-        Quantities of one's own by name: numbers of the motion on which each value was left, which begins at phase 0 and takes one
-        period or, where it does not repeat itself, `max_period` forcing periods, but no more than `periods`.
+        Quantities of one's own by name: numbers of the motion on which each value was left, which
+        begins at phase 0 and takes one period or, where it does not repeat itself, `max_period`
+        forcing periods, but no more than `periods`.
     progress
         Called with the fraction done and what is being done.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute value of all coordinates),
-        `largest_...` and `smallest_...` of each coordinate in the motion's period; `impact_count`, `period` (0: it does not
-        repeat itself), `outcome`, the state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its
-        direction, the values that enclose it and the amplitudes there. At values that were not reached, as a margin ended the
-        motion before, there is nan.
+        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute
+        value of all coordinates), `largest_...` and `smallest_...` of each coordinate in the
+        motion's period; `impact_count`, `period` (0: it does not repeat itself), `outcome`, the
+        state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its
+        direction, the values that enclose it and the amplitudes there. At values that were not
+        reached, as a margin ended the motion before, there is nan.
 
     Raises
     ------
@@ -217,7 +269,9 @@ def frequency_sweep(
     if not reached:
         _refuse_start(asked, order[0])
     state = first.rows[-1].last[0] if reached else asked.start
-    second = _swept(asked, order[:reached][::-1], state, part_of(progress, 0.4, 0.8, f"{path} {back}"))
+    second = _swept(
+        asked, order[:reached][::-1], state, part_of(progress, 0.4, 0.8, f"{path} {back}")
+    )
     runs = {there: first, back: second}
     jumps = _jumps(asked, runs, part_of(progress, 0.8, 1.0))
     progress(1.0, "done")
@@ -225,7 +279,9 @@ def frequency_sweep(
 
 
 def _refuse_start(asked: SweepRequest, value: float) -> None:
-    """Refuse a start from which there is no motion at the first value, as `simulate` does: one beyond a contact, for instance."""
+    """Refuse a start from which there is no motion at the first value, as `simulate` does: one
+    beyond a contact, for instance.
+    """
     system = asked.system.with_({asked.path: float(value)})
     with contextlib.suppress(MotionError):  # the motion begins, and cannot go on
         simulate(system, **arguments_of(system, asked.start), periods=1, tol=asked.tol, dense=False)
@@ -233,7 +289,9 @@ def _refuse_start(asked: SweepRequest, value: float) -> None:
 
 @dataclass(frozen=True)
 class _OneWay:
-    """A sweep in one direction: the values that were reached, in their order, and the motion at each."""
+    """A sweep in one direction: the values that were reached, in their order, and the motion at
+    each.
+    """
 
     values: np.ndarray
     start: np.ndarray
@@ -251,12 +309,16 @@ def amplitude_of(rows: Recurrence, i: int = 0) -> float:
     return float(max(abs(rows.highest[i]), abs(rows.lowest[i])))
 
 
-def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Progress) -> _OneWay:
+def _swept(
+    asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Progress
+) -> _OneWay:
     """Follow the motion from value to value, until a margin ends it."""
     run = _OneWay(values, state, [], [])
     for i, (value, captured) in enumerate(zip(values, asked.proved_speeds(values), strict=True)):
         progress(i / len(values), "")
-        row = asked.ends(asked.system.with_({asked.path: float(value)}), state[None], np.array([captured]))
+        row = asked.ends(
+            asked.system.with_({asked.path: float(value)}), state[None], np.array([captured])
+        )
         if row.ended[0]:
             break
         run.rows.append(row)
@@ -267,14 +329,17 @@ def _swept(asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress:
 
 @dataclass
 class _Step:
-    """A step of one direction, of which the part is looked for in which a slower sweep makes the change of amplitude."""
+    """A step of one direction, of which the part is looked for in which a slower sweep makes the
+    change of amplitude.
+    """
 
     direction: str
     first: float
     last: float  # the values at its ends
     before: float
     after: float  # the amplitudes there
-    low: float  # the value to which the slower sweep has come, with the amplitude and the state there
+    # the value to which the slower sweep has come, with the amplitude and the state there
+    low: float
     size: float
     state: np.ndarray
     found: tuple[float, ...]  # the values before and after the change, and the amplitudes there
@@ -298,28 +363,44 @@ class _Step:
         if abs(size - self.after) < abs(size - self.size):
             self.found = (self.low, value, self.size, size)
             return False
-        self.low, self.size, self.state = value, size, rows.last[i]
+        self.low = value
+        self.size = size
+        self.state = rows.last[i]
         return True
 
 
-def _jumps(asked: SweepRequest, runs: Mapping[str, _OneWay], progress: Progress) -> list[tuple[Any, ...]]:
+def _jumps(
+    asked: SweepRequest, runs: Mapping[str, _OneWay], progress: Progress
+) -> list[tuple[Any, ...]]:
     """The direction of each jump, the values before and after it, and the amplitudes there."""
-    steps, least = list[_Step](), dict[str, float]()
+    steps = list[_Step]()
+    least = dict[str, float]()
     for name, run in runs.items():
         least[name] = SETTINGS.least_step * run.amplitude.max(initial=0.0)
         for i in _candidates(run):
-            (first, last), (a, b) = run.values[i : i + 2].tolist(), run.amplitude[i : i + 2].tolist()
-            steps.append(_Step(name, first, last, a, b, first, a, run.rows[i].last[0], (first, last, a, b)))
+            (first, last) = run.values[i : i + 2].tolist()
+            (a, b) = run.amplitude[i : i + 2].tolist()
+            steps.append(
+                _Step(name, first, last, a, b, first, a, run.rows[i].last[0], (first, last, a, b))
+            )
     levels = SETTINGS.parts if asked.stop_early else ()
     for k, parts in enumerate(levels):
         _sweep_parts(asked, steps, parts, part_of(progress, k / len(levels), (k + 1) / len(levels)))
         steps = [step for step in steps if step.is_left]  # a smooth change is spread over its parts
-    return [(step.direction, *step.found) for step in steps if step.is_left and step.change >= least[step.direction]]
+    return [
+        (step.direction, *step.found)
+        for step in steps
+        if step.is_left and step.change >= least[step.direction]
+    ]
 
 
 def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: Progress) -> None:
     """Sweep steps again in so many parts, all of them at once, each up to its change of amplitude."""
-    ways = [(step, _parts(step.low, step.last, (step.last - step.first) / parts)) for step in steps if not step.ended]
+    ways = [
+        (step, _parts(step.low, step.last, (step.last - step.first) / parts))
+        for step in steps
+        if not step.ended
+    ]
     ways = [(step, inner) for step, inner in ways if inner]
     if not ways:
         return
@@ -328,9 +409,18 @@ def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: 
     for k in range(max(len(inner) for _, inner in going)):
         progress(k / parts, f"{asked.path} in smaller steps, {len(going)} at once")
         values, captured = np.array([inner[k] for _, inner in going]).T
-        rows = asked.ends(asked.system, np.array([step.state for step, _ in going]), captured, {asked.path: values})
+        rows = asked.ends(
+            asked.system,
+            np.array([step.state for step, _ in going]),
+            captured,
+            {asked.path: values},
+        )
         here = zip(going, values.tolist(), range(len(going)), strict=True)
-        going = [(step, inner) for (step, inner), value, i in here if step.goes_on(value, rows, i) and k + 1 < len(inner)]
+        going = [
+            (step, inner)
+            for (step, inner), value, i in here
+            if step.goes_on(value, rows, i) and k + 1 < len(inner)
+        ]
         if not going:
             return
 
@@ -346,9 +436,13 @@ def _parts(low: float, last: float, step: float) -> list[float]:
 
 
 def _candidates(run: _OneWay) -> list[int]:
-    """The steps of the amplitude that are large compared with those around them, or at which impacts or the period change."""
-    sizes, reach = run.amplitude, SETTINGS.neighbours // 2
-    steps, kinds = np.abs(np.diff(sizes)), [(row.impact_count[0], row.period[0]) for row in run.rows]
+    """The steps of the amplitude that are large compared with those around them, or at which
+    impacts or the period change.
+    """
+    sizes = run.amplitude
+    reach = SETTINGS.neighbours // 2
+    steps = np.abs(np.diff(sizes))
+    kinds = [(row.impact_count[0], row.period[0]) for row in run.rows]
     other = np.array([one != following for one, following in pairwise(kinds)], dtype=bool)
     around = [np.delete(steps, i)[max(0, i - reach) : i + reach] for i in range(steps.size)]
     usual = np.array([np.median(near) if near.size else 0.0 for near in around])
@@ -360,21 +454,33 @@ def _state_of(i: int, row: Recurrence) -> float:
     return float(row.last[0, i])
 
 
-def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tuple[Any, ...]]) -> xarray.Dataset:
+def _dataset(
+    asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tuple[Any, ...]]
+) -> xarray.Dataset:
     import xarray
 
-    model, count = asked.system.model, asked.grid.size
-    name, names = model.coordinates[0], model.coordinates
+    model = asked.system.model
+    count = asked.grid.size
+    name = model.coordinates[0]
+    names = model.coordinates
     unit = model.unit_of(name)
     of = f"abs({name})" if len(names) == 1 else "abs of all coordinates"
     columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
         "amplitude": (amplitude_of, unit, f"max {of} in a period"),
         "impact_count": (lambda row: row.impact_count[0], "1", "impacts in a period"),
-        "period": (lambda row: row.period[0], "1", "forcing periods after which it repeats itself; 0 where it does not"),
+        "period": (
+            lambda row: row.period[0],
+            "1",
+            "forcing periods after which it repeats itself; 0 where it does not",
+        ),
         "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
     }
     for i, state in enumerate(state_names(names)):
-        columns[state] = (partial(_state_of, i), model.unit_of(names[i % len(names)]), f"{state} at phase 0")
+        columns[state] = (
+            partial(_state_of, i),
+            model.unit_of(names[i % len(names)]),
+            f"{state} at phase 0",
+        )
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype=f"<U{max(len(each.name) for each in Ending)}")
     texts = {
@@ -385,7 +491,9 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
     own = {key: np.full((2, count), np.nan) for key in (*texts, *map(str, asked.functions or {}))}
     for way, run in enumerate(runs):
         for key, values in own.items():
-            values[way, np.searchsorted(asked.grid, run.values)] = [numbers[key] for numbers in run.numbers]
+            values[way, np.searchsorted(asked.grid, run.values)] = [
+                numbers[key] for numbers in run.numbers
+            ]
     for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
         places = np.searchsorted(asked.grid, run.values)
         words[places] = [Ending(int(row.outcome[0])).name.lower() for row in run.rows]
@@ -393,18 +501,43 @@ def _dataset(asked: SweepRequest, runs: tuple[_OneWay, _OneWay], jumps: list[tup
             column[places] = [read(row) for row in run.rows]
     over = ("direction", "value")
     data = xarray.Dataset(
-        {key: (over, table[key], {"units": units, "long_name": text}) for key, (_, units, text) in columns.items()},
-        {"direction": list(DIRECTIONS), "value": ("value", asked.grid, {"units": "1", "long_name": asked.path})},
+        {
+            key: (over, table[key], {"units": units, "long_name": text})
+            for key, (_, units, text) in columns.items()
+        },
+        {
+            "direction": list(DIRECTIONS),
+            "value": ("value", asked.grid, {"units": "1", "long_name": asked.path}),
+        },
     )
-    data = data.assign({key: (over, found, texts.get(key, {"units": "1", "long_name": key})) for key, found in own.items()})
-    data["outcome"] = (over, outcome, {"long_name": "rest, periodic, or moving without repeating itself"})
+    data = data.assign(
+        {
+            key: (over, found, texts.get(key, {"units": "1", "long_name": key}))
+            for key, found in own.items()
+        }
+    )
+    data["outcome"] = (
+        over,
+        outcome,
+        {"long_name": "rest, periodic, or moving without repeating itself"},
+    )
     up, down = table["amplitude"]
     apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(table["amplitude"], initial=0.0)
-    data["hysteresis"] = ("value", apart.astype(np.int8), {"units": "1", "long_name": "whether up and down differ"})
+    data["hysteresis"] = (
+        "value",
+        apart.astype(np.int8),
+        {"units": "1", "long_name": "whether up and down differ"},
+    )
     labels = ("direction", "before", "after", "amplitude_before", "amplitude_after")
     for i, label in enumerate(labels):
-        found = np.array([jump[i] for jump in jumps], dtype="<U4" if label == "direction" else float)
-        data[f"jump_{label}"] = ("jump", found, {"units": unit if label.startswith("amplitude") else "1"})
+        found = np.array(
+            [jump[i] for jump in jumps], dtype="<U4" if label == "direction" else float
+        )
+        data[f"jump_{label}"] = (
+            "jump",
+            found,
+            {"units": unit if label.startswith("amplitude") else "1"},
+        )
     start = {f"start_{each}": float(x) for each, x in zip(names, asked.start, strict=False)}
     numbers: dict[str, Any] = {
         "path": asked.path,

@@ -1,7 +1,9 @@
-"""Many computations at once: a plan of independent chunks, computed on this machine or on a cluster, each written once.
+"""Many computations at once: a plan of independent chunks, computed on this machine or on a
+cluster, each written once.
 
-A `Plan` is a function, its arguments and a grid cut into chunks. `run` computes it, in memory or into a Zarr store, and continues
-where an earlier run was stopped or killed. `status` says how far a store is, `open_store` reads it. There is no physics here.
+A `Plan` is a function, its arguments and a grid cut into chunks. `run` computes it, in memory or
+into a Zarr store, and continues where an earlier run was stopped or killed. `status` says how far a
+store is, `open_store` reads it. There is no physics here.
 """
 
 from saltus._front_door import front_door

@@ -1,4 +1,6 @@
-"""The chunks of a computation: how a grid is cut into them, what computes one, its errors, and the check of its result."""
+"""The chunks of a computation: how a grid is cut into them, what computes one, its errors, and the
+check of its result.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +22,18 @@ if TYPE_CHECKING:
     from saltus.sweep.plan import Plan
 
 Index = tuple[int, ...]  # the place of a chunk along each axis
-NAME = re.compile(r"[A-Za-z][\w.\-]*")  # the name of an axis, a dimension or a variable, which is a folder's name in a store
+# the name of an axis, a dimension or a variable, which is a folder's name in a store
+NAME = re.compile(r"[A-Za-z][\w.\-]*")
 Arrays = dict[str, np.ndarray]
-MOST_CHUNKS = 1_000_000  # the most chunks of a grid: each is a file, and all of them are looked for when a sweep begins
+# the most chunks of a grid: each is a file, and all of them are looked for when a sweep begins
+MOST_CHUNKS = 1_000_000
 
 
 @dataclass(frozen=True)
 class ChunkGrid:
-    """A grid of `sizes` points along its axes, cut into chunks of `chunk` points along each; those at the ends may be smaller."""
+    """A grid of `sizes` points along its axes, cut into chunks of `chunk` points along each; those
+    at the ends may be smaller.
+    """
 
     sizes: Mapping[str, int]
     chunk: Mapping[str, int]
@@ -49,11 +55,16 @@ class ChunkGrid:
     def slices(self, index: Index) -> tuple[slice, ...]:
         """The points of a chunk along each axis."""
         cuts = zip(index, self.sizes.items(), strict=True)
-        return tuple(slice(i * self.chunk[axis], min((i + 1) * self.chunk[axis], size)) for i, (axis, size) in cuts)
+        return tuple(
+            slice(i * self.chunk[axis], min((i + 1) * self.chunk[axis], size))
+            for i, (axis, size) in cuts
+        )
 
 
 class Computation(Protocol):
-    """What processes and clusters compute: a function, its arguments, and chunks of what it is called with."""
+    """What processes and clusters compute: a function, its arguments, and chunks of what it is
+    called with.
+    """
 
     @property
     def function(self) -> str:
@@ -100,7 +111,9 @@ class Failure:
 
 @dataclass(frozen=True)
 class Raised:
-    """The error that a function raised, as strings, because not every error can be sent between processes."""
+    """The error that a function raised, as strings, because not every error can be sent between
+    processes.
+    """
 
     error: str
     traceback: str = ""
@@ -116,37 +129,55 @@ def resolve(function: str) -> Callable[[Any, Any], Mapping[str, Any]]:
     """
     module, colon, name = function.partition(":") if isinstance(function, str) else ("", "", "")
     if not (module and colon and name):
-        raise ParameterError(f"function must be 'package.module:name', got {function!r}", "function")
+        raise ParameterError(
+            f"function must be 'package.module:name', got {function!r}", "function"
+        )
     if module == "__main__":
-        raise ParameterError(f"function {function!r} is in a script; other processes need it in a module that they can import")
+        raise ParameterError(
+            f"function {function!r} is in a script; other processes need it in a module that "
+            "they can import"
+        )
     try:
         found = importlib.import_module(module)
     except ImportError as error:
-        raise ParameterError(f"function {function!r}: the module {module!r} cannot be imported ({error})") from error
+        raise ParameterError(
+            f"function {function!r}: the module {module!r} cannot be imported ({error})"
+        ) from error
     if not hasattr(found, name):
-        raise ParameterError(f"function {function!r}: {module!r} has no {name!r}; {near(name, vars(found))}")
+        raise ParameterError(
+            f"function {function!r}: {module!r} has no {name!r}; {near(name, vars(found))}"
+        )
     computes: Callable[[Any, Any], Mapping[str, Any]] = getattr(found, name)
     if not callable(computes):
-        raise ParameterError(f"function {function!r} is of type {type(computes).__name__}, not a function")
+        raise ParameterError(
+            f"function {function!r} is of type {type(computes).__name__}, not a function"
+        )
     return computes
 
 
 def attempt(function: str, arguments: Mapping[str, Any], block: Any) -> Any:
-    """The result of the function for a chunk, or the error that it raised. Called in the process that computes."""
+    """The result of the function for a chunk, or the error that it raised.
+
+    Called in the process that computes.
+    """
     try:
         # A function that changes its arguments must not change those of the next chunk.
         return resolve(function)(copy.deepcopy(arguments), block)
     except Exception as error:
-        return Raised(f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc())
+        return Raised(
+            f"{type(error).__name__}: {' '.join(str(error).split())}", traceback.format_exc()
+        )
 
 
 def checked(plan: Plan, index: Index, result: Any) -> Arrays:
-    """The arrays that a function returned for a chunk, of the types of the plan's variables; NaN is a value as any other.
+    """The arrays that a function returned for a chunk, of the types of the plan's variables; NaN is
+    a value as any other.
 
     Raises
     ------
     ParameterError
-        The result is no mapping, has a variable too few or too many, a wrong shape, or values that a variable's type cannot hold.
+        The result is no mapping, has a variable too few or too many, a wrong shape, or values that
+        a variable's type cannot hold.
     """
     where = f"{plan.function} returned for chunk {'/'.join(map(str, index))} ({plan.place(index)})"
     if not isinstance(result, Mapping):
@@ -156,19 +187,30 @@ def checked(plan: Plan, index: Index, result: Any) -> Arrays:
             raise ParameterError(f"{where} no {name!r}; {near(name, map(str, result))}")
     for name in result:
         if name not in plan.variables:
-            raise ParameterError(f"{where} {name!r}, which is no variable of the plan; {near(str(name), plan.variables)}")
+            raise ParameterError(
+                f"{where} {name!r}, which is no variable of the plan; "
+                f"{near(str(name), plan.variables)}"
+            )
     return {name: _array(plan, index, name, result[name], where) for name in plan.variables}
 
 
 def _array(plan: Plan, index: Index, name: str, values: Any, where: str) -> np.ndarray:
-    array, expected = np.asarray(values), plan.shape(name, index)
+    array = np.asarray(values)
+    expected = plan.shape(name, index)
     if array.shape != expected:
         axes = ", ".join(plan.dimensions(name))
-        raise ParameterError(f"{where} {name!r} of shape {array.shape}; expected is {expected}, along {axes}")
+        raise ParameterError(
+            f"{where} {name!r} of shape {array.shape}; expected is {expected}, along {axes}"
+        )
     dtype = np.dtype(plan.variables[name].dtype)
     if not np.can_cast(array.dtype, dtype, "same_kind"):
-        raise ParameterError(f"{where} {name!r} of type {array.dtype}; the plan says {dtype}, which does not hold it")
+        raise ParameterError(
+            f"{where} {name!r} of type {array.dtype}; the plan says {dtype}, which does not hold it"
+        )
     cast = array.astype(dtype)
     if dtype.kind in "iu" and not np.array_equal(cast, array):
-        raise ParameterError(f"{where} {name!r} with values from {array.min()} to {array.max()}, too large for {dtype}")
+        raise ParameterError(
+            f"{where} {name!r} with values from {array.min()} to {array.max()}, too large for "
+            f"{dtype}"
+        )
     return cast

@@ -1,4 +1,6 @@
-"""The execution of a plan: missing chunks are computed here, in other processes or on a cluster, and written by this process."""
+"""The execution of a plan: missing chunks are computed here, in other processes or on a cluster,
+and written by this process.
+"""
 
 from __future__ import annotations
 
@@ -53,39 +55,44 @@ def run(
 ) -> xarray.Dataset:
     r"""Compute what is missing of a sweep.
 
-    A chunk whose function raises is reported through `logging` and tried again after the others. Results are written by this
-    process alone, wherever they are computed: a cluster's machines need not share its disk.
+    A chunk whose function raises is reported through `logging` and tried again after the others.
+    Results are written by this process alone, wherever they are computed: a cluster's machines need
+    not share its disk.
 
     Parameters
     ----------
     plan
         What is computed.
     store
-        A folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None keeps all in memory.
+        A folder for a Zarr v3 store; it is made, or gone on with if it is of the same plan. None
+        keeps all in memory.
     workers
-        How many processes compute chunks at once; None computes one chunk after the other in this one, which is right
-        for functions that use all cores themselves. `Workers` are kept from one run to the next. Scripts need
-        `if __name__ == "__main__":` around a run with workers.
+        How many processes compute chunks at once; None computes one chunk after the other in this
+        one, which is right for functions that use all cores themselves. `Workers` are kept from one
+        run to the next. Scripts need `if __name__ == "__main__":` around a run with workers.
     scheduler
-        The address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the chunks.
+        The address of a Dask scheduler, such as "tcp://host:8786", whose workers compute the
+        chunks.
     progress
-        Called before the first chunk and after each with the share of the chunks that are done, and in words with their
-        number and about how many seconds are left.
+        Called before the first chunk and after each with the share of the chunks that are done, and
+        in words with their number and about how many seconds are left.
     retries
         How often a failed chunk is tried again.
 
     Returns
     -------
     xarray.Dataset
-        The complete dataset, with the plan's variables, coordinates and attributes: in memory, or read from the store when it
-        is needed.
+        The complete dataset, with the plan's variables, coordinates and attributes: in memory, or
+        read from the store when it is needed.
 
     Raises
     ------
     ParameterError
-        Bad arguments, the store of another plan, or a function that returns something else than planned.
+        Bad arguments, the store of another plan, or a function that returns something else than
+        planned.
     SweepError
-        Chunks failed for good, the store cannot be written, another run writes to it, or the cluster does not answer.
+        Chunks failed for good, the store cannot be written, another run writes to it, or the
+        cluster does not answer.
     SweepInterrupted
         Ctrl-C. In all these cases the chunks written before are kept.
 
@@ -111,8 +118,14 @@ def run(
                 results.note(sweep.failures.values())
             if not isinstance(error, KeyboardInterrupt):
                 raise
-            kept = "nothing is kept without a store" if path is None else f"{path} keeps them: run the same again to go on"
-            raise SweepInterrupted(f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}") from None
+            kept = (
+                "nothing is kept without a store"
+                if path is None
+                else f"{path} keeps them: run the same again to go on"
+            )
+            raise SweepInterrupted(
+                f"interrupted after {sweep.done} of {sweep.total} chunks; {kept}"
+            ) from None
         sweep.conclude()
         return results.dataset()
 
@@ -124,7 +137,10 @@ class MemoryResults:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.arrays = {name: np.full(plan.shape(name), v.fill, dtype=v.dtype) for name, v in plan.variables.items()}
+        self.arrays = {
+            name: np.full(plan.shape(name), v.fill, dtype=v.dtype)
+            for name, v in plan.variables.items()
+        }
 
     def missing(self) -> list[Index]:
         """All chunks."""
@@ -144,7 +160,8 @@ class MemoryResults:
         import xarray
 
         variables = {
-            name: (self.plan.dimensions(name), array, self.plan.variables[name].attrs) for name, array in self.arrays.items()
+            name: (self.plan.dimensions(name), array, self.plan.variables[name].attrs)
+            for name, array in self.arrays.items()
         }
         axes = {name: (name, values.copy()) for name, values in self.plan.axes.items()}
         return xarray.Dataset(variables, coords=axes, attrs=self.plan.attributes)
@@ -153,8 +170,13 @@ class MemoryResults:
 class _SweepRun:
     """One run of a plan: the queue of missing chunks, the failures, and the progress."""
 
-    def __init__(self, plan: Plan, results: Store | MemoryResults, progress: Progress, retries: int) -> None:
-        self.plan, self.results, self.progress, self.retries = plan, results, progress, retries
+    def __init__(
+        self, plan: Plan, results: Store | MemoryResults, progress: Progress, retries: int
+    ) -> None:
+        self.plan = plan
+        self.results = results
+        self.progress = progress
+        self.retries = retries
         self.queue = deque(results.missing())
         self.total = plan.chunks.total
         self.done = self.before = self.total - len(self.queue)
@@ -186,15 +208,22 @@ class _SweepRun:
         first, *others = sorted(self.failures.values(), key=lambda failure: failure.index)
         more = f", and {len(others)} more" if others else ""
         if self.results.path is None:
-            dataset, kept = self.results.dataset(), "the others are in the error's `dataset`"
+            dataset = self.results.dataset()
+            kept = "the others are in the error's `dataset`"
         else:
-            dataset, kept = None, f"{self.results.path} keeps the others, and the same run again computes only what is missing"
+            dataset = None
+            kept = (
+                f"{self.results.path} keeps the others, and the same run again computes only "
+                "what is missing"
+            )
         sentence = f"{len(self.failures)} of {self.total} chunks failed: {first}{more}; {kept}"
         raise SweepError(sentence, (first, *others), dataset)
 
     def _fail(self, index: Index, raised: Raised) -> None:
         attempts = self.failures[index].attempts + 1 if index in self.failures else 1
-        failure = self.failures[index] = Failure(index, self.plan.place(index), raised.error, attempts)
+        failure = self.failures[index] = Failure(
+            index, self.plan.place(index), raised.error, attempts
+        )
         again = attempts <= self.retries
         if again:
             self.queue.append(index)
@@ -210,13 +239,19 @@ class _SweepRun:
             self.noted = time.monotonic()
 
     def _report_progress(self) -> None:
-        computed, elapsed = self.done - self.before, time.monotonic() - self.start
+        computed = self.done - self.before
+        elapsed = time.monotonic() - self.start
         left = elapsed / computed * (self.total - self.done) if computed else 0.0
         estimate = f", about {left:.0f} s left" if left else ""
-        self.progress(self.done / self.total, f"{self.done} of {self.total} chunks{estimate}" if self.total > 1 else "computing")
+        self.progress(
+            self.done / self.total,
+            f"{self.done} of {self.total} chunks{estimate}" if self.total > 1 else "computing",
+        )
 
 
-def outcomes(plan: Computation, queue: deque[Index], workers: int | Workers | None, scheduler: str | None) -> Any:
+def outcomes(
+    plan: Computation, queue: deque[Index], workers: int | Workers | None, scheduler: str | None
+) -> Any:
     """Take chunks from the queue until it is empty, and yield the outcome of each, in any order."""
     if scheduler is not None:
         from saltus.sweep.workers import on_cluster
@@ -241,7 +276,8 @@ def _here(plan: Computation, queue: deque[Index]) -> Outcomes:
 
 
 def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path | None:
-    """Check the arguments that say where chunks are kept and who computes them; returns the path of the store.
+    """Check the arguments that say where chunks are kept and who computes them; returns the path of
+    the store.
 
     Raises
     ------
@@ -251,15 +287,28 @@ def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path |
     if workers is not None:
         check_count("workers", getattr(workers, "count", workers), 1)
     if scheduler is not None and (not isinstance(scheduler, str) or "://" not in scheduler):
-        raise ParameterError(f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}", "scheduler")
+        raise ParameterError(
+            f"scheduler must be an address such as 'tcp://host:8786', got {scheduler!r}",
+            "scheduler",
+        )
     if scheduler is not None and workers is not None:
-        raise ParameterError("workers and scheduler are given both; a cluster has workers of its own")
+        raise ParameterError(
+            "workers and scheduler are given both; a cluster has workers of its own"
+        )
     if not callable(progress):
         raise ParameterError(
-            f"progress must be a function of the fraction done and of what is being done, got {progress!r}", "progress"
+            (
+                "progress must be a function of the fraction done and of what is being done, got "
+                f"{progress!r}"
+            ),
+            "progress",
         )
     if store is not None and not isinstance(store, str | Path):
-        raise ParameterError(f"store must be the path of a folder, or None, got {store!r:.80}", "store")
+        raise ParameterError(
+            f"store must be the path of a folder, or None, got {store!r:.80}", "store"
+        )
     if isinstance(store, str) and "://" in store:
-        raise ParameterError(f"store must be a folder on this machine, got the address {store!r}", "store")
+        raise ParameterError(
+            f"store must be a folder on this machine, got the address {store!r}", "store"
+        )
     return None if store is None else Path(store)

@@ -31,7 +31,10 @@ VALUE = "value"  # the variable of a function that returns no names
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FunctionPlan(Plan):
-    """A plan of single calls. Its store knows the function by its name and its text; processes get it itself, or pickled."""
+    """A plan of single calls.
+
+    Its store knows the function by its name and its text; processes get it itself, or pickled.
+    """
 
     call: Any
 
@@ -42,7 +45,10 @@ class FunctionPlan(Plan):
     def describe(self) -> dict[str, Any]:
         """The plan as JSON, without the function itself."""
         described = super().describe()
-        return {**described, "arguments": {k: v for k, v in described["arguments"].items() if k != "call"}}
+        return {
+            **described,
+            "arguments": {k: v for k, v in described["arguments"].items() if k != "call"},
+        }
 
 
 @answered
@@ -57,45 +63,50 @@ def map_over(
     progress: Progress = silent,
     retries: int = 1,
 ) -> xarray.Dataset:
-    """A quantity of one's own at every point of a grid (a parameter study): `function(**point)` for all combinations of values.
+    """A quantity of one's own at every point of a grid (a parameter study): `function(**point)` for
+    all combinations of values.
 
-    With a `store` it can be stopped, or killed, at any moment, and the same call goes on where it was; a store that was made by
-    another text of the function is refused. The function may be defined anywhere, in a notebook too: with `workers` or a
-    `scheduler` it is sent to the processes by cloudpickle then (`pip install "saltus[cluster]"` has it).
+    With a `store` it can be stopped, or killed, at any moment, and the same call goes on where it
+    was; a store that was made by another text of the function is refused. The function may be
+    defined anywhere, in a notebook too: with `workers` or a `scheduler` it is sent to the processes
+    by cloudpickle then (`pip install "saltus[cluster]"` has it).
 
     Parameters
     ----------
     function
-        Called with one number for each name of the grid, it returns a number or an array, or a dict of them by name. Their
-        shapes are the same at all points. It must depend on nothing else that changes.
+        Called with one number for each name of the grid, it returns a number or an array, or a dict
+        of them by name. Their shapes are the same at all points. It must depend on nothing else
+        that changes.
     grid
         The values by name, each a list of numbers.
     store
         A folder in which each chunk is kept as soon as it is computed; see `saltus.sweep.run`.
     workers
-        How many processes compute at once, such as os.cpu_count(); None computes in this one, which is right for functions that
-        use all cores themselves, as `simulate_many` does. Scripts need `if __name__ == "__main__":` around a call with workers.
+        How many processes compute at once, such as os.cpu_count(); None computes in this one, which
+        is right for functions that use all cores themselves, as `simulate_many` does. Scripts need
+        `if __name__ == "__main__":` around a call with workers.
     scheduler
         The address of a Dask scheduler, such as "tcp://host:8786", whose workers compute.
     chunk
-        How many points of a name make one chunk, 1 where nothing is said. A chunk is what a process computes at once, and a file
-        of the store.
+        How many points of a name make one chunk, 1 where nothing is said. A chunk is what a process
+        computes at once, and a file of the store.
     progress
-        Called with the share of the chunks that are done, and in words with their number and the time that is left.
+        Called with the share of the chunks that are done, and in words with their number and the
+        time that is left.
     retries
         How often a chunk whose function raises is tried again, after all others.
 
     Returns
     -------
     xarray.Dataset
-        Over the names of the grid a variable for each name that the function returns, or `value`; entries of arrays are along
-        dimensions of their own.
+        Over the names of the grid a variable for each name that the function returns, or `value`;
+        entries of arrays are along dimensions of their own.
 
     Raises
     ------
     ParameterError
-        The function returns no numbers, or other shapes than before; the store is of another function or another grid; the
-        function cannot be sent to processes.
+        The function returns no numbers, or other shapes than before; the store is of another
+        function or another grid; the function cannot be sent to processes.
     SweepError, SweepInterrupted
         As for `saltus.sweep.run`; what was computed is kept. Or the function raises at every point.
 
@@ -109,21 +120,31 @@ def map_over(
     (('frequency', 'damping'), 0.03326)
     """
     if not callable(function):
-        raise ParameterError(f"function must be a function of the names of the grid, got {shown(function)}", "function")
+        raise ParameterError(
+            f"function must be a function of the names of the grid, got {shown(function)}",
+            "function",
+        )
     if not isinstance(grid, Mapping) or not grid:
-        raise ParameterError(f"grid must be a dict of lists of numbers, by their names, got {shown(grid)}", "grid")
+        raise ParameterError(
+            f"grid must be a dict of lists of numbers, by their names, got {shown(grid)}", "grid"
+        )
     check_count("retries", retries, 0, 100)
     path = check_run(store, workers, scheduler, progress)
     axes = {name: axis_values(name, values) for name, values in grid.items()}
     name = getattr(function, "__qualname__", type(function).__name__)
     text = _text_digest(function)
     _refuse_other_text(path, name, text)
-    call = function if workers is None and scheduler is None else _sent(function, scheduler is not None)
+    call = (
+        function
+        if workers is None and scheduler is None
+        else _sent(function, scheduler is not None)
+    )
     plan = FunctionPlan(
         function=f"{__name__}:values_at",
         arguments={"function": name, "text": text},
         variables=_known_variables(path) or _variables(_first_answer(function, axes)),
-        attrs={"title": f"{name} over a grid, computed by saltus", "kind": MAPPED} | provenance(None),
+        attrs={"title": f"{name} over a grid, computed by saltus", "kind": MAPPED}
+        | provenance(None),
         axes=axes,
         chunk=dict.fromkeys(axes, 1) | dict(chunk or {}),
         call=call,
@@ -131,27 +152,42 @@ def map_over(
     return run(plan, path, workers=workers, scheduler=scheduler, progress=progress, retries=retries)
 
 
-def values_at(arguments: Mapping[str, Any], block: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def values_at(
+    arguments: Mapping[str, Any], block: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """The answers of the function at all points of a chunk, as `run` asks for them."""
     call = arguments["call"]
     function = pickle.loads(call) if isinstance(call, bytes) else call
     shape = tuple(len(values) for values in block.values())
-    points = [dict(zip(block, point, strict=True)) for point in itertools.product(*(v.tolist() for v in block.values()))]
+    points = [
+        dict(zip(block, point, strict=True))
+        for point in itertools.product(*(v.tolist() for v in block.values()))
+    ]
     answers = [_answer(function, point) for point in points]
     for answer, point in zip(answers, points, strict=True):
         if {n: v.shape for n, v in answer.items()} != {n: v.shape for n, v in answers[0].items()}:
-            raise ParameterError(f"function returned at {point} other names or shapes than at {points[0]}", "function")
-    return {name: np.stack([a[name] for a in answers]).reshape(shape + first.shape) for name, first in answers[0].items()}
+            raise ParameterError(
+                f"function returned at {point} other names or shapes than at {points[0]}",
+                "function",
+            )
+    return {
+        name: np.stack([a[name] for a in answers]).reshape(shape + first.shape)
+        for name, first in answers[0].items()
+    }
 
 
-def _first_answer(function: Callable[..., Any], axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _first_answer(
+    function: Callable[..., Any], axes: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """What the function returns at the first point at which it does not raise."""
     raised: list[tuple[dict[str, float], Exception]] = []
     for values in itertools.product(*(axis.tolist() for axis in axes.values())):
         point = dict(zip(axes, values, strict=True))
         try:
             answer = function(**point)
-        except Exception as error:  # of whatever kind: the plan reports it as it does that of any other point
+        except (
+            Exception
+        ) as error:  # of whatever kind: the plan reports it as it does that of any other point
             raised.append((point, error))
         else:
             return _arrays(answer, point)
@@ -168,29 +204,47 @@ def _answer(function: Callable[..., Any], point: Mapping[str, float]) -> dict[st
 
 def _arrays(answer: Any, point: Mapping[str, float]) -> dict[str, np.ndarray]:
     """What the function returned at a point, as arrays by name."""
-    named = dict(answer) if isinstance(answer, Mapping) and not hasattr(answer, "data_vars") else {VALUE: answer}
+    named = (
+        dict(answer)
+        if isinstance(answer, Mapping) and not hasattr(answer, "data_vars")
+        else {VALUE: answer}
+    )
     arrays = {str(name): np.asarray(value) for name, value in named.items()}
     for name, array in arrays.items():
         if array.dtype.kind not in "biufc":
             what = f"as {name!r} " if isinstance(answer, Mapping) else ""
-            raise ParameterError(f"function must return numbers, got {what}{shown(named[name])} at {dict(point)}", "function")
-    return {name: array.astype(complex if array.dtype.kind == "c" else float) for name, array in arrays.items()}
+            raise ParameterError(
+                f"function must return numbers, got {what}{shown(named[name])} at {dict(point)}",
+                "function",
+            )
+    return {
+        name: array.astype(complex if array.dtype.kind == "c" else float)
+        for name, array in arrays.items()
+    }
 
 
 def _variables(answer: Mapping[str, np.ndarray]) -> dict[str, Variable]:
     """The variables of a plan whose function gives such answers."""
     return {
-        name: Variable(dtype=array.dtype.name, extra=tuple((f"{name}_{i}", size) for i, size in enumerate(array.shape)))
+        name: Variable(
+            dtype=array.dtype.name,
+            extra=tuple((f"{name}_{i}", size) for i, size in enumerate(array.shape)),
+        )
         for name, array in answer.items()
     }
 
 
 def _known_variables(path: Path | None) -> dict[str, Variable]:
-    """The variables of a store that is there, so that to go on asks the function for nothing that is known."""
+    """The variables of a store that is there, so that to go on asks the function for nothing that
+    is known.
+    """
     if path is None or not (path / METADATA).is_file():
         return {}
     known = read_plan(path)["variables"].items()
-    return {name: Variable(dtype=each["dtype"], extra=tuple(map(tuple, each["extra"]))) for name, each in known}
+    return {
+        name: Variable(dtype=each["dtype"], extra=tuple(map(tuple, each["extra"])))
+        for name, each in known
+    }
 
 
 def _refuse_other_text(path: Path | None, name: str, text: str) -> None:
@@ -215,13 +269,19 @@ def _text_digest(function: Callable[..., Any]) -> str:
 
 
 def _sent(function: Callable[..., Any], far: bool) -> Any:
-    """The function as processes take it: itself if they can import it, else its bytes by cloudpickle."""
+    """The function as processes take it: itself if they can import it, else its bytes by
+    cloudpickle.
+    """
     module = getattr(function, "__module__", None)
     script = module == "__main__" and not far and getattr(sys.modules["__main__"], "__file__", None)
     if module != "__main__" or script:
         try:
             pickle.dumps(function)
-        except (pickle.PicklingError, AttributeError, TypeError):  # a lambda, or one that is defined inside of another
+        except (
+            pickle.PicklingError,
+            AttributeError,
+            TypeError,
+        ):  # a lambda, or one that is defined inside of another
             pass
         else:
             return function

@@ -1,10 +1,12 @@
-"""What a search computes, each result once: in memory, or remembered in files that are named by a digest of what is computed.
+"""What a search computes, each result once: in memory, or remembered in files that are named by a
+digest of what is computed.
 
-What a search computes next depends on what it has found, so it has no plan; but its long computations are pure functions of
-values that JSON has, and of arrays. A search that was stopped runs again from its beginning and finds what it had; another search
-in the same store finds what both have in common. A file holds one chunk of results, as JSON and the bytes of arrays: reading it
-makes numbers and texts, and runs nothing. It is written beside its place and moved there, and ends with a checksum; one that is
-damaged, or was made by other equations, is computed again.
+What a search computes next depends on what it has found, so it has no plan; but its long
+computations are pure functions of values that JSON has, and of arrays. A search that was stopped
+runs again from its beginning and finds what it had; another search in the same store finds what
+both have in common. A file holds one chunk of results, as JSON and the bytes of arrays: reading it
+makes numbers and texts, and runs nothing. It is written beside its place and moved there, and ends
+with a checksum; one that is damaged, or was made by other equations, is computed again.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ from saltus.sweep.store_files import FOLDER, SUFFIX, files_of, packed, unpacked
 if TYPE_CHECKING:
     from saltus.sweep.workers import Workers
 
-# Seconds for which this process computes alone before others are started, each of which needs some time to load its code.
+# Seconds for which this process computes alone before others are started, each of which needs some
+# time to load its code.
 PATIENCE = 4.0
 
 Column = np.ndarray | list[Any]  # an entry for each input
@@ -38,16 +41,18 @@ Column = np.ndarray | list[Any]  # an entry for each input
 
 @dataclass(frozen=True)
 class MemoKind:
-    """A kind of results: its name, the function, "package.module:name", and how many inputs are computed together.
+    """A kind of results: its name, the function, "package.module:name", and how many inputs are
+    computed together.
 
-    The function is called as `function(arguments, inputs)`, and returns a dict of columns: arrays, or lists of what JSON has and
-    of arrays, with an entry for each input.
+    The function is called as `function(arguments, inputs)`, and returns a dict of columns: arrays,
+    or lists of what JSON has and of arrays, with an entry for each input.
     """
 
     name: str
     function: str
     chunk: int
-    threaded: bool = True  # whether it uses all cores itself; then no further processes are started for it
+    # whether it uses all cores itself; then no further processes are started for it
+    threaded: bool = True
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,8 @@ class Batches:
 class Memo:
     """The results of one search, in memory, or remembered in the folder `parts` of a store.
 
-    `common` are the arguments of all functions; results that were computed with others are not taken.
+    `common` are the arguments of all functions; results that were computed with others are not
+    taken.
     """
 
     def __init__(
@@ -77,11 +83,16 @@ class Memo:
         scheduler: str | None = None,
         patience: float | None = None,
     ) -> None:
-        self.common, self.store = dict(common), store
-        self.workers, self.scheduler, self.patience = workers, scheduler, PATIENCE if patience is None else patience
+        self.common = dict(common)
+        self.store = store
+        self.workers = workers
+        self.scheduler = scheduler
+        self.patience = PATIENCE if patience is None else patience
         self.spent = 0.0  # seconds spent on what other processes could compute
-        self.known: dict[str, tuple[Any, dict[str, Any]]] = {}  # each input with its result, by the kind and the input's digest
-        self.asked: set[str] = set()  # the keys of what was asked for in this run, whatever the store had
+        # each input with its result, by the kind and the input's digest
+        self.known: dict[str, tuple[Any, dict[str, Any]]] = {}
+        # the keys of what was asked for in this run, whatever the store had
+        self.asked: set[str] = set()
         for file in files_of(store) if store is not None else ():
             try:
                 found = unpacked(checked_content(file))
@@ -90,7 +101,9 @@ class Memo:
             except (ParameterError, KeyError, TypeError, ValueError):
                 continue
 
-    def results(self, kind: MemoKind, inputs: Sequence[Any], progress: Progress = silent) -> list[dict[str, Any]]:
+    def results(
+        self, kind: MemoKind, inputs: Sequence[Any], progress: Progress = silent
+    ) -> list[dict[str, Any]]:
         """For each input the entry of each column; only what is not known is computed.
 
         Raises
@@ -101,9 +114,12 @@ class Memo:
             Ctrl-C; the chunks that were computed are kept.
         """
         keys = [_key(kind.name, given) for given in inputs]
-        fresh = {key: given for key, given in zip(keys, inputs, strict=True) if key not in self.asked}
+        fresh = {
+            key: given for key, given in zip(keys, inputs, strict=True) if key not in self.asked
+        }
         self.asked.update(keys)
-        # Chunks are cut from what this run has not asked for before, so that they are the same after a kill.
+        # Chunks are cut from what this run has not asked for before, so that they are the same
+        # after a kill.
         rows = list(fresh.items())
         cut = [rows[i : i + kind.chunk] for i in range(0, len(rows), kind.chunk)]
         missing = [[given for key, given in chunk if key not in self.known] for chunk in cut]
@@ -118,29 +134,47 @@ class Memo:
         if not chunks:
             return
         alone = kind.threaded or sum(map(len, chunks)) == 1 or self.spent < self.patience
-        batches, queue = Batches(kind.function, self.common, chunks), deque[Index]((i,) for i in range(len(chunks)))
-        begun, failed, done = time.monotonic(), set[Index](), 0
+        batches = Batches(kind.function, self.common, chunks)
+        queue = deque[Index]((i,) for i in range(len(chunks)))
+        begun = time.monotonic()
+        failed = set[Index]()
+        done = 0
         try:
-            with closing(outcomes(batches, queue, None if alone else self.workers, self.scheduler)) as found:
+            with closing(
+                outcomes(batches, queue, None if alone else self.workers, self.scheduler)
+            ) as found:
                 for index, outcome in found:
                     if not isinstance(outcome, Raised):
                         self._write(kind.name, chunks[index[0]], outcome)
                         done += 1
-                        progress(done / len(chunks), f"{done} of {len(chunks)} chunks" if len(chunks) > 1 else "computing")
+                        progress(
+                            done / len(chunks),
+                            f"{done} of {len(chunks)} chunks" if len(chunks) > 1 else "computing",
+                        )
                     elif index in failed:
                         raise SweepError(f"{kind.name} cannot be computed: {outcome.error}")
                     else:
                         failed.add(index)
                         queue.append(index)
         except KeyboardInterrupt:
-            kept = f"{self.store} keeps what was computed: run the same again to go on" if self.store else "nothing is kept"
-            raise SweepInterrupted(f"interrupted; {kept}{'' if self.store else ' without a store'}") from None
+            kept = (
+                f"{self.store} keeps what was computed: run the same again to go on"
+                if self.store
+                else "nothing is kept"
+            )
+            raise SweepInterrupted(
+                f"interrupted; {kept}{'' if self.store else ' without a store'}"
+            ) from None
         self.spent += 0.0 if kind.threaded else time.monotonic() - begun
 
     def _write(self, name: str, inputs: list[Any], columns: dict[str, Column]) -> None:
         if self.store is not None:
-            content = sealed(packed({"kind": name, "common": self.common, "inputs": inputs, "columns": columns}))
-            file = self.store / FOLDER / f"{name}_{_key(name, [self.common, inputs])[-64:-48]}{SUFFIX}"
+            content = sealed(
+                packed({"kind": name, "common": self.common, "inputs": inputs, "columns": columns})
+            )
+            file = (
+                self.store / FOLDER / f"{name}_{_key(name, [self.common, inputs])[-64:-48]}{SUFFIX}"
+            )
             try:
                 write_durably(file, content, flush=False)
             except OSError as error:
@@ -152,7 +186,10 @@ class Memo:
 
     def _keep(self, name: str, inputs: Sequence[Any], columns: Mapping[str, Column]) -> None:
         for i, given in enumerate(inputs):
-            self.known[_key(name, given)] = given, {column: entries[i] for column, entries in columns.items()}
+            self.known[_key(name, given)] = (
+                given,
+                {column: entries[i] for column, entries in columns.items()},
+            )
 
 
 def _key(name: str, given: Any) -> str:

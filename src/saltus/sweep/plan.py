@@ -18,13 +18,15 @@ from saltus.sweep.chunks import MOST_CHUNKS, NAME, ChunkGrid, Index, resolve
 
 DIGEST = re.compile(r"[0-9a-f]{20,}")  # messages say that a digest has changed, but do not show it
 RESERVED = ("zarr.json", "plan")
-WRITER = "saltus_version"  # names the version that wrote a store; whether results are the same is told by `result_version`
+# names the version that wrote a store; whether results are the same is told by `result_version`
+WRITER = "saltus_version"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size) of its dimensions in addition
-    to the grid's axes, its attributes, and the fill value of chunks that are not computed yet.
+    """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size)
+    of its dimensions in addition to the grid's axes, its attributes, and the fill value of chunks
+    that are not computed yet.
 
     Parameters
     ----------
@@ -35,7 +37,8 @@ class Variable:
     attrs
         Its attributes, such as units and a long name.
     fill
-        The value in chunks that are not computed; by default nan, or 0 or False for types that have no nan.
+        The value in chunks that are not computed; by default nan, or 0 or False for types that have
+        no nan.
 
     Examples
     --------
@@ -52,26 +55,47 @@ class Variable:
         try:
             dtype = np.dtype(self.dtype)
         except TypeError:
-            raise ParameterError(f"dtype must be a NumPy type such as 'f8' or 'i2', got {self.dtype!r}", "dtype") from None
+            raise ParameterError(
+                f"dtype must be a NumPy type such as 'f8' or 'i2', got {self.dtype!r}", "dtype"
+            ) from None
         if dtype.kind not in "biufc" or dtype.itemsize > (16 if dtype.kind == "c" else 8):
             raise ParameterError(
-                f"dtype must be boolean, integer, real or complex, of up to 64 bits a part, got {self.dtype!r}", "dtype"
+                (
+                    "dtype must be boolean, integer, real or complex, of up to 64 bits a part, got "
+                    f"{self.dtype!r}"
+                ),
+                "dtype",
             )
         try:
             extra = tuple((str(name), int(size)) for name, size in self.extra)
         except (TypeError, ValueError):
             wanted = "pairs of a name and a size, such as (('mode', 3),)"
-            raise ParameterError(f"extra must be {wanted}, got {shown(self.extra)}", "extra") from None
+            raise ParameterError(
+                f"extra must be {wanted}, got {shown(self.extra)}", "extra"
+            ) from None
         for name, size in extra:
             _check_name(name, "a dimension")
             if size < 1:
-                raise ParameterError(f"dimension {name!r} must have a size of at least 1, got {size}")
-        fill = self.fill if self.fill is not None else {"f": np.nan, "c": complex(np.nan, np.nan)}.get(dtype.kind, 0)
+                raise ParameterError(
+                    f"dimension {name!r} must have a size of at least 1, got {size}"
+                )
+        fill = (
+            self.fill
+            if self.fill is not None
+            else {"f": np.nan, "c": complex(np.nan, np.nan)}.get(dtype.kind, 0)
+        )
         try:
             fill = dtype.type(fill).item()
         except (TypeError, ValueError, OverflowError):
-            raise ParameterError(f"fill must be a value of type {dtype}, got {fill!r}", "fill") from None
-        for name, value in (("dtype", dtype.name), ("extra", extra), ("attrs", as_json(self.attrs, "attrs")), ("fill", fill)):
+            raise ParameterError(
+                f"fill must be a value of type {dtype}, got {fill!r}", "fill"
+            ) from None
+        for name, value in (
+            ("dtype", dtype.name),
+            ("extra", extra),
+            ("attrs", as_json(self.attrs, "attrs")),
+            ("fill", fill),
+        ):
             object.__setattr__(self, name, value)
 
 
@@ -79,17 +103,19 @@ class Variable:
 class Plan:
     """Independent computations on a grid, in chunks.
 
-    The function is called as `function(arguments, block)`, where `block` holds the chunk's values of each axis, and returns a
-    dict with an array for each variable: along the axes in their order, then along the variable's extra dimensions. It must
-    depend on nothing else: a random generator takes its seed from the arguments and the block, so that a chunk is the same
-    whichever process computes it, and when.
+    The function is called as `function(arguments, block)`, where `block` holds the chunk's values
+    of each axis, and returns a dict with an array for each variable: along the axes in their order,
+    then along the variable's extra dimensions. It must depend on nothing else: a random generator
+    takes its seed from the arguments and the block, so that a chunk is the same whichever process
+    computes it, and when.
 
     Parameters
     ----------
     function
         "package.module:name", importable wherever it runs.
     arguments
-        The arguments that are the same for all chunks: values that JSON has, given to the function as JSON gives them back.
+        The arguments that are the same for all chunks: values that JSON has, given to the function
+        as JSON gives them back.
     axes
         1-D arrays of numbers by name, the grid's coordinates.
     chunk
@@ -102,8 +128,8 @@ class Plan:
     Raises
     ------
     ParameterError
-        The function is unknown; a name, an axis or a chunk is wrong; a value is none that JSON has; or the grid has too many
-        chunks.
+        The function is unknown; a name, an axis or a chunk is wrong; a value is none that JSON has;
+        or the grid has too many chunks.
 
     Examples
     --------
@@ -125,7 +151,9 @@ class Plan:
         resolve(self.function)
         for name in ("axes", "variables", "arguments", "chunk", "attrs"):
             if not isinstance(getattr(self, name), Mapping):
-                raise ParameterError(f"{name} must be a dict, got {shown(getattr(self, name))}", name)
+                raise ParameterError(
+                    f"{name} must be a dict, got {shown(getattr(self, name))}", name
+                )
         axes = {name: axis_values(name, values) for name, values in self.axes.items()}
         if not axes:
             raise ParameterError("axes is empty; a plan needs at least one axis")
@@ -138,11 +166,19 @@ class Plan:
             "attrs": as_json(self.attrs, "attrs"),
         }
         if "plan" in values["attrs"]:
-            raise ParameterError("attrs must not have the key 'plan'; the plan itself is kept there", "attrs")
+            raise ParameterError(
+                "attrs must not have the key 'plan'; the plan itself is kept there", "attrs"
+            )
         for name, value in values.items():
             object.__setattr__(self, name, value)
         if self.chunks.total > MOST_CHUNKS:
-            raise ParameterError(f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the most", "chunk")
+            raise ParameterError(
+                (
+                    f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the "
+                    "most"
+                ),
+                "chunk",
+            )
 
     @cached_property
     def chunks(self) -> ChunkGrid:
@@ -190,7 +226,11 @@ class Plan:
         index
             The chunk's place among the chunks; None for the whole grid.
         """
-        sizes = self.chunks.sizes.values() if index is None else (s.stop - s.start for s in self.chunks.slices(index))
+        sizes = (
+            self.chunks.sizes.values()
+            if index is None
+            else (s.stop - s.start for s in self.chunks.slices(index))
+        )
         return (*sizes, *(size for _, size in self.variables[name].extra))
 
     @property
@@ -199,9 +239,17 @@ class Plan:
         return {**self.attrs, "plan": one_line(self.describe())}
 
     def describe(self) -> dict[str, Any]:
-        """The plan as JSON: plans that are equal as JSON compute the same. Axes are identified by a digest of their values."""
+        """The plan as JSON: plans that are equal as JSON compute the same.
+
+        Axes are identified by a digest of their values.
+        """
         variables = {
-            name: {"dtype": v.dtype, "extra": [list(e) for e in v.extra], "attrs": v.attrs, "fill": repr(v.fill)}
+            name: {
+                "dtype": v.dtype,
+                "extra": [list(e) for e in v.extra],
+                "attrs": v.attrs,
+                "fill": repr(v.fill),
+            }
             for name, v in self.variables.items()
         }
         return {
@@ -218,7 +266,8 @@ class Plan:
 def _check_name(name: Any, what: str) -> None:
     if not isinstance(name, str) or not NAME.fullmatch(name) or name in RESERVED:
         raise ParameterError(
-            f"{name!r} cannot be the name of {what}; a name is a letter, then letters, digits, '_', '-' and '.', not 'plan'"
+            f"{name!r} cannot be the name of {what}; a name is a letter, then letters, digits, "
+            "'_', '-' and '.', not 'plan'"
         )
 
 
@@ -226,8 +275,15 @@ def axis_values(name: Any, values: Any) -> np.ndarray:
     """The values of an axis of a plan, which are refused unless they are finite numbers in a list."""
     _check_name(name, "an axis")
     array = np.array(values)
-    if array.ndim != 1 or not array.size or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ParameterError(f"axis {name!r} must be a 1-D array of finite numbers, not empty, got {shown(values)}")
+    if (
+        array.ndim != 1
+        or not array.size
+        or array.dtype.kind not in "iuf"
+        or not np.isfinite(array).all()
+    ):
+        raise ParameterError(
+            f"axis {name!r} must be a 1-D array of finite numbers, not empty, got {shown(values)}"
+        )
     array.setflags(write=False)
     return array
 
@@ -235,13 +291,21 @@ def axis_values(name: Any, values: Any) -> np.ndarray:
 def _chunk(chunk: Mapping[str, int], axes: Mapping[str, np.ndarray]) -> dict[str, int]:
     for name, size in chunk.items():
         if name not in axes:
-            raise ParameterError(f"chunk names the axis {name!r}, which the plan does not have; {near(name, axes)}")
+            raise ParameterError(
+                f"chunk names the axis {name!r}, which the plan does not have; {near(name, axes)}"
+            )
         if isinstance(size, bool) or not isinstance(size, int | np.integer) or size < 1:
-            raise ParameterError(f"chunk[{name!r}] must be a whole number of points of at least 1, got {size!r}")
-    return {name: min(int(chunk.get(name, len(values))), len(values)) for name, values in axes.items()}
+            raise ParameterError(
+                f"chunk[{name!r}] must be a whole number of points of at least 1, got {size!r}"
+            )
+    return {
+        name: min(int(chunk.get(name, len(values))), len(values)) for name, values in axes.items()
+    }
 
 
-def _variables(variables: Mapping[str, Variable], axes: Mapping[str, np.ndarray]) -> dict[str, Variable]:
+def _variables(
+    variables: Mapping[str, Variable], axes: Mapping[str, np.ndarray]
+) -> dict[str, Variable]:
     if not variables:
         raise ParameterError("variables is empty; a plan needs at least one variable")
     sizes: dict[str, int] = {}
@@ -251,14 +315,21 @@ def _variables(variables: Mapping[str, Variable], axes: Mapping[str, np.ndarray]
             raise ParameterError(f"variables[{name!r}] must be a Variable, got {variable!r}")
         for dimension, size in variable.extra:
             if sizes.setdefault(dimension, size) != size:
-                raise ParameterError(f"dimension {dimension!r} has the sizes {sizes[dimension]} and {size}; give it one")
+                raise ParameterError(
+                    f"dimension {dimension!r} has the sizes {sizes[dimension]} and {size}; give "
+                    "it one"
+                )
     for name in (*variables, *sizes):
         if name in axes or (name in variables and name in sizes):
-            raise ParameterError(f"{name!r} names two things; an axis, a dimension and a variable need names of their own")
+            raise ParameterError(
+                f"{name!r} names two things; an axis, a dimension and a variable need names of "
+                "their own"
+            )
     folders = [name.casefold() for name in (*axes, *variables)]
     if len(set(folders)) < len(folders):
         raise ParameterError(
-            "two axes or variables have names that differ in their capitals alone; not all disks tell these apart"
+            "two axes or variables have names that differ in their capitals alone; not all disks "
+            "tell these apart"
         )
     repeated = [name for name, v in variables.items() if len(dict(v.extra)) < len(v.extra)]
     if repeated:
@@ -269,18 +340,24 @@ def _variables(variables: Mapping[str, Variable], axes: Mapping[str, np.ndarray]
 def _digest(values: np.ndarray) -> dict[str, Any]:
     kept = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<")))
     ends = {"first": values[0].item(), "last": values[-1].item()}
-    return {"size": len(values), "dtype": values.dtype.name, **ends, "sha256": hashlib.sha256(kept.tobytes()).hexdigest()}
+    return {
+        "size": len(values),
+        "dtype": values.dtype.name,
+        **ends,
+        "sha256": hashlib.sha256(kept.tobytes()).hexdigest(),
+    }
 
 
 def _range(values: np.ndarray) -> str:
     return f"{values[0]:.6g}" if len(values) == 1 else f"{values[0]:.6g} to {values[-1]:.6g}"
 
 
-# --- values that are kept as JSON -------------------------------------------------------------------------------------------
+# --- values that are kept as JSON --------------------------------------------
 
 
 def as_json(value: Any, place: str) -> Any:
-    """`value` as JSON gives it back: mappings to dicts, tuples to lists, NumPy's numbers to Python's.
+    """`value` as JSON gives it back: mappings to dicts, tuples to lists, NumPy's numbers to
+    Python's.
 
     Raises
     ------
@@ -295,13 +372,18 @@ def as_json(value: Any, place: str) -> Any:
         return int(value)
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise ParameterError(f"{place} is {value!r}, which JSON does not have; write None or a word for it")
+            raise ParameterError(
+                f"{place} is {value!r}, which JSON does not have; write None or a word for it"
+            )
         return float(value)
     if isinstance(value, list | tuple):
         return [as_json(item, f"{place}[{i}]") for i, item in enumerate(value)]
     if not isinstance(value, Mapping):
         kind = type(value).__name__
-        raise ParameterError(f"{place} is of type {kind}, which JSON does not have; numbers, strings, lists and dicts can be")
+        raise ParameterError(
+            f"{place} is of type {kind}, which JSON does not have; numbers, strings, lists and "
+            "dicts can be"
+        )
     for key in value:
         if not isinstance(key, str):
             raise ParameterError(f"{place} has the key {key!r}; keys are strings in JSON")
@@ -314,7 +396,9 @@ def one_line(value: Any) -> str:
 
 
 def differences(there: Any, here: Any, place: str = "") -> Iterator[str]:
-    """Sentences about the differences of two JSON values, entry by entry, also within strings that are JSON themselves."""
+    """Sentences about the differences of two JSON values, entry by entry, also within strings that
+    are JSON themselves.
+    """
     there, here = _parsed(there), _parsed(here)
     if isinstance(there, dict) and isinstance(here, dict):
         for key in dict.fromkeys([*there, *here]):

@@ -1,4 +1,6 @@
-"""The Zarr store of a sweep: made in one step, written chunk by chunk, readable by any reader of Zarr v3 at any time."""
+"""The Zarr store of a sweep: made in one step, written chunk by chunk, readable by any reader of
+Zarr v3 at any time.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-LONGEST_NAME_OF_A_FILE = 200  # bytes: file systems allow 255, and half-written files have longer names
+# bytes: file systems allow 255, and half-written files have longer names
+LONGEST_NAME_OF_A_FILE = 200
 BEGIN_ANEW = "name another store, or begin anew (`sweep.remove_store`, `saltus run --fresh`)"
 
 log = logging.getLogger("saltus.sweep")
@@ -35,14 +38,16 @@ log = logging.getLogger("saltus.sweep")
 class Store:
     """The arrays of a plan, in a folder.
 
-    A chunk is done when the files of all variables are there. A file is written once, and is complete or not there. Its bytes
-    depend on the computed numbers alone, not on who wrote the store, when, or in which order.
+    A chunk is done when the files of all variables are there. A file is written once, and is
+    complete or not there. Its bytes depend on the computed numbers alone, not on who wrote the
+    store, when, or in which order.
     """
 
     def __init__(self, plan: Plan, path: Path) -> None:
         import zarr
 
-        self.plan, self.path = plan, path
+        self.plan = plan
+        self.path = path
         self.zarr = _zarr_store(path)
         # Otherwise a chunk of nothing but fill values has no file, and would never be done.
         with zarr.config.set({"array.write_empty_chunks": True}):
@@ -50,7 +55,8 @@ class Store:
             self.arrays = {name: group[name] for name in plan.variables}
 
     def missing(self) -> list[Index]:
-        """The chunks that are not done; a file that is damaged is removed first, so that its chunk is computed again.
+        """The chunks that are not done; a file that is damaged is removed first, so that its chunk
+        is computed again.
 
         Raises
         ------
@@ -64,8 +70,13 @@ class Store:
             try:
                 file.unlink()
             except OSError as error:
-                raise SweepError(f"{file} is damaged and cannot be removed ({reason(error)})") from error
-        found = [files.chunks_of(self.path, name, self.plan.chunks.grid, count).there for name, count in extra.items()]
+                raise SweepError(
+                    f"{file} is damaged and cannot be removed ({reason(error)})"
+                ) from error
+        found = [
+            files.chunks_of(self.path, name, self.plan.chunks.grid, count).there
+            for name, count in extra.items()
+        ]
         return [tuple(map(int, index)) for index in np.argwhere(~np.logical_and.reduce(found))]
 
     def write(self, index: Index, values: Arrays) -> None:
@@ -93,8 +104,13 @@ class Store:
             files.chunk_file(self.path, name, index, len(variable.extra)).unlink(missing_ok=True)
 
     def note(self, failures: Iterable[Failure]) -> None:
-        """Keep a list of the failed chunks beside the arrays, for `status`; without failures the file is removed."""
-        entries = [{"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts} for f in failures]
+        """Keep a list of the failed chunks beside the arrays, for `status`; without failures the
+        file is removed.
+        """
+        entries = [
+            {"index": f.index, "place": f.place, "error": f.error, "attempts": f.attempts}
+            for f in failures
+        ]
         file = self.path / files.FAILURES
         with contextlib.suppress(OSError):  # a full disk is reported when a chunk is written
             if entries:
@@ -127,7 +143,9 @@ def opened(plan: Plan, path: Path) -> Iterator[Store]:
         (_restore if (path / files.CHECKSUMS).is_file() else _create)(plan, path)
     with files.locked(path) as got:
         if got is False:
-            raise SweepError(f"another run is writing to {path}; wait for it, or stop it, and run again")
+            raise SweepError(
+                f"another run is writing to {path}; wait for it, or stop it, and run again"
+            )
         if got:
             files.sweep_up(path)
         if files.damaged_files(path):
@@ -141,10 +159,13 @@ def check_store(plan: Plan, path: Path) -> None:
     Raises
     ------
     ParameterError
-        The message says what is there, or what is so damaged that the plan of the store is not known.
+        The message says what is there, or what is so damaged that the plan of the store is not
+        known.
     """
     if not 0 < len(os.fsencode(path.name)) <= LONGEST_NAME_OF_A_FILE:
-        raise ParameterError(f"store must name a folder, such as 'chart.zarr', got {shown(str(path))}", "store")
+        raise ParameterError(
+            f"store must name a folder, such as 'chart.zarr', got {shown(str(path))}", "store"
+        )
     if (path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file():
         if files.damaged_files(path):
             _restorable(plan, path)
@@ -158,7 +179,9 @@ def check_store(plan: Plan, path: Path) -> None:
             )
     elif path.is_file() or (path.is_dir() and any(path.iterdir())):
         kind = "a file" if path.is_file() else "a folder with something else in it"
-        raise ParameterError(f"{path} is {kind}; name a store that does not exist yet, or one of this plan", "store")
+        raise ParameterError(
+            f"{path} is {kind}; name a store that does not exist yet, or one of this plan", "store"
+        )
 
 
 @answered
@@ -185,7 +208,9 @@ def remove_store(path: Path | str) -> None:
     if not os.path.exists(path):  # also False for a name that is too long
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
-        raise ParameterError(f"{path} is no store, so it is not removed; name another place", "path")
+        raise ParameterError(
+            f"{path} is no store, so it is not removed; name another place", "path"
+        )
     if files.in_use(path):
         raise SweepError(f"a run is writing to {path}; wait for it, or stop it, and run again")
     try:
@@ -195,7 +220,8 @@ def remove_store(path: Path | str) -> None:
 
 
 def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
-    """The content of the damaged files of a store that is made anew from its plan: metadata and coordinates, no chunks.
+    """The content of the damaged files of a store that is made anew from its plan: metadata and
+    coordinates, no chunks.
 
     Raises
     ------
@@ -212,12 +238,22 @@ def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
         kept = files.checksums(path)
     except (OSError, ValueError):
         kept = {}
-    intact = {name for name in content if (path / name).is_file() and (path / name).read_bytes() == content[name]}
-    if files.METADATA in intact or kept.get(files.METADATA) == expected[files.METADATA]:  # it holds the plan
+    intact = {
+        name
+        for name in content
+        if (path / name).is_file() and (path / name).read_bytes() == content[name]
+    }
+    # it holds the plan
+    if files.METADATA in intact or kept.get(files.METADATA) == expected[files.METADATA]:
         return {name: content[name] for name in content if name not in intact}
-    if files.METADATA not in damaged and all(kept.get(name, "") == expected.get(name) for name in damaged):
+    if files.METADATA not in damaged and all(
+        kept.get(name, "") == expected.get(name) for name in damaged
+    ):
         return {name: content[name] for name in damaged}
-    raise ParameterError(f"{path / damaged[0]} is damaged, so the store cannot be gone on with; {BEGIN_ANEW}", "store")
+    raise ParameterError(
+        f"{path / damaged[0]} is damaged, so the store cannot be gone on with; {BEGIN_ANEW}",
+        "store",
+    )
 
 
 def _restore(plan: Plan, path: Path) -> None:
@@ -227,7 +263,9 @@ def _restore(plan: Plan, path: Path) -> None:
         try:
             write_durably(path / name, content)
         except OSError as error:
-            raise SweepError(f"{path / name} is damaged and cannot be written again ({reason(error)})") from error
+            raise SweepError(
+                f"{path / name} is damaged and cannot be written again ({reason(error)})"
+            ) from error
 
 
 @answered
@@ -239,7 +277,8 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
     path
         The store.
     partial
-        Whether it may be incomplete; chunks that are not computed yet have each variable's fill value, NaN for reals.
+        Whether it may be incomplete; chunks that are not computed yet have each variable's fill
+        value, NaN for reals.
 
     Raises
     ------
@@ -264,8 +303,17 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
         )
     try:
         return _dataset(_zarr_store(Path(path)))
-    except (AttributeError, IndexError, KeyError, NotImplementedError, TypeError, ValueError) as error:  # as forged metadata may
-        raise ParameterError(f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path") from None
+    except (
+        AttributeError,
+        IndexError,
+        KeyError,
+        NotImplementedError,
+        TypeError,
+        ValueError,
+    ) as error:  # as forged metadata may
+        raise ParameterError(
+            f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path"
+        ) from None
 
 
 def reason(error: OSError) -> str:
@@ -276,8 +324,9 @@ def reason(error: OSError) -> str:
 def _zarr_store(folder: Path) -> Any:
     """Zarr's store in a folder, in which every file is flushed to the disk before it gets its name.
 
-    Zarr's own store also writes a file under another name and renames it, but does not wait for the disk, so that after a power
-    failure a name may stand without its content. Here a name means that the chunk is done.
+    Zarr's own store also writes a file under another name and renames it, but does not wait for the
+    disk, so that after a power failure a name may stand without its content. Here a name means that
+    the chunk is done.
     """
     import asyncio
 
@@ -298,15 +347,19 @@ def _zarr_store(folder: Path) -> Any:
 def _dataset(store: Any) -> xarray.Dataset:
     import xarray
 
-    # Nothing is decoded, so that a variable in seconds stays a number and a fill value stays a value.
-    dataset: xarray.Dataset = xarray.open_zarr(store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False)
+    # Nothing is decoded, so that a variable in seconds stays a number and a fill value stays a
+    # value.
+    dataset: xarray.Dataset = xarray.open_zarr(
+        store, chunks=None, consolidated=True, zarr_format=3, decode_cf=False
+    )
     return dataset
 
 
 def _create(plan: Plan, path: Path) -> None:
     """Make the store of `plan`, without any chunk, at `path`, in one step.
 
-    Ctrl-C waits until it is made: Zarr writes in a thread of its own, which would go on writing into a folder that is removed.
+    Ctrl-C waits until it is made: Zarr writes in a thread of its own, which would go on writing
+    into a folder that is removed.
     """
     with files.deferred_interrupts() as raise_if_interrupted:
         try:
@@ -318,20 +371,31 @@ def _create(plan: Plan, path: Path) -> None:
                 raise
             files.finish(part, path)
         except OSError as error:
-            raise SweepError(f"the store {path} cannot be made ({reason(error)}); name another") from error
+            raise SweepError(
+                f"the store {path} cannot be made ({reason(error)}); name another"
+            ) from error
     raise_if_interrupted()
 
 
 def _make(plan: Plan, folder: Path) -> None:
-    """Write the metadata and the coordinates, then their checksums; none of these files is ever written again."""
+    """Write the metadata and the coordinates, then their checksums; none of these files is ever
+    written again.
+    """
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    store, codecs = _zarr_store(folder), [ZstdCodec(level=0), Crc32cCodec()]  # Zarr's own choice, and a checksum of each chunk
+    # Zarr's own choice, and a checksum of each chunk
+    store = _zarr_store(folder)
+    codecs = [ZstdCodec(level=0), Crc32cCodec()]
     group = zarr.create_group(store, zarr_format=3, attributes=plan.attributes)
     for name, values in plan.axes.items():
         coordinate = group.create_array(
-            name, shape=values.shape, chunks=values.shape, dtype=values.dtype, dimension_names=[name], compressors=codecs
+            name,
+            shape=values.shape,
+            chunks=values.shape,
+            dtype=values.dtype,
+            dimension_names=[name],
+            compressors=codecs,
         )
         coordinate[:] = values
     for name, variable in plan.variables.items():
@@ -352,10 +416,17 @@ def _make(plan: Plan, folder: Path) -> None:
 def _consolidate(folder: Path, names: list[str]) -> None:
     """Copy the metadata of all arrays into the group's, where xarray reads them at once.
 
-    Zarr's own function for it warns that its specification does not have them yet, and Python cannot be told in one thread alone
-    not to show a warning.
+    Zarr's own function for it warns that its specification does not have them yet, and Python
+    cannot be told in one thread alone not to show a warning.
     """
     group = json.loads((folder / files.METADATA).read_text(encoding="utf-8"))
-    arrays = {name: json.loads((folder / name / files.METADATA).read_text(encoding="utf-8")) for name in names}
-    group["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    arrays = {
+        name: json.loads((folder / name / files.METADATA).read_text(encoding="utf-8"))
+        for name in names
+    }
+    group["consolidated_metadata"] = {
+        "kind": "inline",
+        "must_understand": False,
+        "metadata": arrays,
+    }
     write_durably(folder / files.METADATA, json.dumps(group, indent=2).encode())

@@ -1,6 +1,8 @@
-"""Files of a store: complete or not there, found by name, and locked while a run writes; and those of a memo.
+"""Files of a store: complete or not there, found by name, and locked while a run writes; and those
+of a memo.
 
-A file of a memo is JSON and the bytes of arrays, with a checksum; reading it makes numbers and texts, and runs nothing.
+A file of a memo is JSON and the bytes of arrays, with a checksum; reading it makes numbers and
+texts, and runs nothing.
 """
 
 from __future__ import annotations
@@ -27,19 +29,28 @@ from saltus.sweep.chunks import Index
 
 METADATA = "zarr.json"
 FAILURES = ".failures.json"
-CHECKSUMS = ".checksums.json"  # the digests of the files that are written when the store is made: all but the chunks
-ASKED_ONE_BY_ONE = 100_000  # sizes and times are read of so many chunks of a variable; the others are only listed
-LOCK_PATIENCE = 1.0  # how long to wait for a lock, s: a process that only checks whether there is one holds it briefly
+# the digests of the files that are written when the store is made: all but the chunks
+CHECKSUMS = ".checksums.json"
+# sizes and times are read of so many chunks of a variable; the others are only listed
+ASKED_ONE_BY_ONE = 100_000
+# how long to wait for a lock, s: a process that only checks whether there is one holds it briefly
+LOCK_PATIENCE = 1.0
 
 
 def write_checksums(root: Path) -> None:
     """Write down the SHA-256 of every file below the new store at `root`."""
-    found = {str(file.relative_to(root)): _sha256(file) for file in sorted(root.rglob("*")) if file.is_file()}
+    found = {
+        str(file.relative_to(root)): _sha256(file)
+        for file in sorted(root.rglob("*"))
+        if file.is_file()
+    }
     write_durably(root / CHECKSUMS, json.dumps(found, indent=1).encode())
 
 
 def damaged_files(root: Path) -> list[str]:
-    """The files other than chunks that are missing or have changed since the store at `root` was made."""
+    """The files other than chunks that are missing or have changed since the store at `root` was
+    made.
+    """
     try:
         known = checksums(root)
     except (OSError, ValueError):
@@ -60,7 +71,11 @@ def checksums(root: Path) -> dict[str, str]:
     if not (root / CHECKSUMS).is_file():  # a pipe may have no end
         raise FileNotFoundError
     known = parsed_json((root / CHECKSUMS).read_bytes())
-    if not isinstance(known, dict) or METADATA not in known or not all(isinstance(text, str) for text in known.values()):
+    if (
+        not isinstance(known, dict)
+        or METADATA not in known
+        or not all(isinstance(text, str) for text in known.values())
+    ):
         raise ValueError
     return known
 
@@ -73,7 +88,9 @@ def _sha256(file: Path) -> str | None:
 
 
 def chunk_name(variable: str, index: Index, extra: int) -> str:
-    """The path in a store, by Zarr's default encoding, of a chunk of a variable with `extra` dimensions after the grid's axes."""
+    """The path in a store, by Zarr's default encoding, of a chunk of a variable with `extra`
+    dimensions after the grid's axes.
+    """
     return "/".join((variable, "c", *map(str, index), *("0" for _ in range(extra))))
 
 
@@ -84,7 +101,9 @@ def chunk_file(root: Path, variable: str, index: Index, extra: int) -> Path:
 
 @dataclass
 class Found:
-    """Files of a store: their number, their size in bytes, when the last one was written (0.0: none), and the chunks there."""
+    """Files of a store: their number, their size in bytes, when the last one was written (0.0:
+    none), and the chunks there.
+    """
 
     there: np.ndarray  # (chunks along each axis), bool
     count: int = 0
@@ -92,7 +111,9 @@ class Found:
     updated: float = 0.0
 
     def add(self, path: str) -> bool:
-        """Add a file after asking the system about it; False for devices and pipes, which may have no end."""
+        """Add a file after asking the system about it; False for devices and pipes, which may have
+        no end.
+        """
         try:
             found = os.stat(path)
         except OSError:  # a half-written file that was moved to its place in the meantime
@@ -106,17 +127,22 @@ class Found:
 
 
 def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> Found:
-    """The chunks of a variable with `extra` dimensions beside the grid's axes that have a file in the store at `root`.
+    """The chunks of a variable with `extra` dimensions beside the grid's axes that have a file in
+    the store at `root`.
 
-    If there are more than `ASKED_ONE_BY_ONE` chunks only their folders are read, in a sixth of the time: the size is then
-    estimated from the first ones, and the time of the last write is that of the folders.
+    If there are more than `ASKED_ONE_BY_ONE` chunks only their folders are read, in a sixth of the
+    time: the size is then estimated from the first ones, and the time of the last write is that of
+    the folders.
     """
-    found, inner, further = Found(np.zeros(grid, dtype=bool)), "/0" * extra, 0
+    found = Found(np.zeros(grid, dtype=bool))
+    inner = "/0" * extra
+    further = 0
     names = [{str(i): i for i in range(n)} for n in grid]
 
     def look(folder: str, there: np.ndarray) -> None:
         nonlocal further
-        places, before = names[-there.ndim], further
+        places = names[-there.ndim]
+        before = further
         with contextlib.suppress(OSError), os.scandir(folder) as entries:
             for entry in entries:
                 place = places.get(entry.name)
@@ -139,7 +165,8 @@ def chunks_of(root: Path, variable: str, grid: tuple[int, ...], extra: int) -> F
 
 def other_files(root: Path, variables: Iterable[str]) -> Found:
     """The files below `root` other than chunks of its variables: metadata, coordinates, parts."""
-    found, chunks = Found(np.empty(0)), {str(root / variable / "c") for variable in variables}
+    found = Found(np.empty(0))
+    chunks = {str(root / variable / "c") for variable in variables}
     folders = [str(root)]
     while folders:
         with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
@@ -170,7 +197,10 @@ def finish(part: Path, path: Path) -> None:
 
 
 def sweep_up(path: Path) -> None:
-    """Remove the half-written files of killed runs, in the store at `path` and beside it. The caller holds the lock."""
+    """Remove the half-written files of killed runs, in the store at `path` and beside it.
+
+    The caller holds the lock.
+    """
     for part in list(path.rglob(f".*{PART}")):  # no other process writes here without the lock
         with contextlib.suppress(OSError):
             shutil.rmtree(part) if part.is_dir() else part.unlink()
@@ -182,9 +212,11 @@ def sweep_up(path: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[bool | None]:
-    """Lock the store at `path` for one run; yields whether this succeeded, None if there are no locks or it is read-only.
+    """Lock the store at `path` for one run; yields whether this succeeded, None if there are no
+    locks or it is read-only.
 
-    The lock is on the store's metadata file, which is never written again. It is released when the process ends, however it ends.
+    The lock is on the store's metadata file, which is never written again. It is released when the
+    process ends, however it ends.
     """
     try:
         file = (path / METADATA).open("r+b")
@@ -210,10 +242,12 @@ def in_use(path: Path) -> bool | None:
 
 @contextlib.contextmanager
 def deferred_interrupts() -> Iterator[Callable[[], None]]:
-    """A context in which Ctrl-C raises nothing at once; the function that it yields raises KeyboardInterrupt if there was one.
+    """A context in which Ctrl-C raises nothing at once; the function that it yields raises
+    KeyboardInterrupt if there was one.
 
-    Python would raise it wherever the main thread happens to be: in a destructor of another library, where it is lost, or while a
-    lock is being taken. Outside the main thread signals do not arrive, and the context changes nothing.
+    Python would raise it wherever the main thread happens to be: in a destructor of another
+    library, where it is lost, or while a lock is being taken. Outside the main thread signals do
+    not arrive, and the context changes nothing.
     """
     seen: list[int] = []
 
@@ -235,7 +269,9 @@ def deferred_interrupts() -> Iterator[Callable[[], None]]:
         signal.signal(signal.SIGINT, before)
 
 
-FOLDER, SUFFIX = "parts", ".memo"  # of a store: where its memo is, and how the files of it end
+# of a store: where its memo is, and how the files of it end
+FOLDER = "parts"
+SUFFIX = ".memo"
 
 
 def files_of(store: Path) -> list[Path]:
@@ -244,8 +280,11 @@ def files_of(store: Path) -> list[Path]:
 
 
 def memo_status(store: Path, verify: bool = False) -> tuple[dict[str, int], list[str]]:
-    """How many chunks of each kind the memo in a store has; with `verify` all are read, and those that are damaged are named."""
-    counts, damaged = dict[str, int](), []
+    """How many chunks of each kind the memo in a store has; with `verify` all are read, and those
+    that are damaged are named.
+    """
+    counts = dict[str, int]()
+    damaged = []
     for file in files_of(store):
         kind = file.name.rpartition("_")[0]
         counts[kind] = counts.get(kind, 0) + 1
@@ -258,7 +297,9 @@ def memo_status(store: Path, verify: bool = False) -> tuple[dict[str, int], list
 
 
 def packed(value: Any) -> bytes:
-    """A value of what JSON has and of arrays as bytes: a line of JSON, then the bytes of the arrays in their order."""
+    """A value of what JSON has and of arrays as bytes: a line of JSON, then the bytes of the arrays
+    in their order.
+    """
     arrays: list[np.ndarray] = []
 
     def plain(part: Any) -> Any:
@@ -298,7 +339,11 @@ def unpacked(content: bytes) -> Any:
         descr, shape = part["array"]
         dtype = np.lib.format.descr_to_dtype(_fields(descr))
         count = int(np.prod(shape, dtype=object))
-        array = np.frombuffer(rest, dtype, count, at).reshape(shape) if count else np.zeros(shape, dtype)
+        array = (
+            np.frombuffer(rest, dtype, count, at).reshape(shape)
+            if count
+            else np.zeros(shape, dtype)
+        )
         at += count * dtype.itemsize
         return array.copy()
 
@@ -312,4 +357,6 @@ def _fields(descr: Any) -> Any:
     """The description of a type of arrays, in which JSON has made lists of tuples."""
     if isinstance(descr, str):
         return descr
-    return [(name, _fields(inner), *(tuple(shape) for shape in more)) for name, inner, *more in descr]
+    return [
+        (name, _fields(inner), *(tuple(shape) for shape in more)) for name, inner, *more in descr
+    ]

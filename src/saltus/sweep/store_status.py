@@ -27,8 +27,8 @@ NAMED = 3  # damaged files that a sentence names
 class StoreStatus:
     """The state of a sweep, from its store.
 
-    A failed chunk is one that raised an error when it was last tried. The size of stores with more than 100 000 chunks is
-    estimated (`estimated`). A chunk with a damaged file is not done.
+    A failed chunk is one that raised an error when it was last tried. The size of stores with more
+    than 100 000 chunks is estimated (`estimated`). A chunk with a damaged file is not done.
 
     Attributes
     ----------
@@ -87,7 +87,9 @@ class StoreStatus:
 
     @property
     def estimated(self) -> bool:
-        """Whether `bytes` is an estimate, because the system was not asked for the size of every file."""
+        """Whether `bytes` is an estimate, because the system was not asked for the size of every
+        file.
+        """
         return self.total > files.ASKED_ONE_BY_ONE
 
     @property
@@ -98,7 +100,8 @@ class StoreStatus:
 
 @answered
 def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
-    """The state of the sweep whose store is at `path`; with `verify` all of it is read, and damaged files are found.
+    """The state of the sweep whose store is at `path`; with `verify` all of it is read, and damaged
+    files are found.
 
     Parameters
     ----------
@@ -149,14 +152,22 @@ def status(path: Path | str, *, verify: bool = False) -> StoreStatus:
 
 
 def _is_missing(done: np.ndarray, index: Index) -> bool:
-    """Whether a chunk with this index exists and is not done; the index is from a list of failures, which may be damaged."""
-    return len(index) == done.ndim and all(0 <= i < n for i, n in zip(index, done.shape, strict=True)) and not done[index]
+    """Whether a chunk with this index exists and is not done; the index is from a list of failures,
+    which may be damaged.
+    """
+    return (
+        len(index) == done.ndim
+        and all(0 <= i < n for i, n in zip(index, done.shape, strict=True))
+        and not done[index]
+    )
 
 
 def damage(found: StoreStatus) -> str:
     """The damage of a store, as the beginning of a sentence."""
     count = len(found.damaged)
-    named = ", ".join(found.damaged[:NAMED]) + (f" and {count - NAMED} more" if count > NAMED else "")
+    named = ", ".join(found.damaged[:NAMED]) + (
+        f" and {count - NAMED} more" if count > NAMED else ""
+    )
     return f"{found.path} has {count} damaged or missing file{'s' * (count > 1)} ({named})"
 
 
@@ -168,7 +179,9 @@ def _broken_chunks(path: Path, chunks: ChunkGrid, extra: dict[str, int]) -> dict
         arrays: Any = zarr.open_group(str(path), mode="r", zarr_format=3)
         broken = list(damaged_chunks(path, arrays, chunks, extra))
     except (AttributeError, KeyError, NotImplementedError, TypeError, ValueError) as error:
-        raise ParameterError(f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path") from None
+        raise ParameterError(
+            f"{path} cannot be read as a Zarr store ({type(error).__name__}: {error!s:.80})", "path"
+        ) from None
     return {files.chunk_name(name, index, extra[name]): index for name, index in broken}
 
 
@@ -178,8 +191,8 @@ def read_plan(path: Path) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        At `path` there is nothing, no store, or the store of something else than a sweep; or its metadata are damaged, or are not
-        those of its plan.
+        At `path` there is nothing, no store, or the store of something else than a sweep; or its
+        metadata are damaged, or are not those of its plan.
     """
     if not os.path.exists(path):  # also False for a name that is too long
         raise ParameterError(f"there is no store at {path}", "path")
@@ -188,29 +201,49 @@ def read_plan(path: Path) -> dict[str, Any]:
     metadata = path / files.METADATA
     if not metadata.is_file():
         raise ParameterError(f"{path} is not a store: it has no {files.METADATA}", "path")
-    damaged = [name for name in (files.METADATA, files.CHECKSUMS) if name in files.damaged_files(path)]
+    damaged = [
+        name for name in (files.METADATA, files.CHECKSUMS) if name in files.damaged_files(path)
+    ]
     try:
         group = parsed_json(metadata.read_bytes())
     except (OSError, RecursionError, ValueError) as error:
         raise ParameterError(f"{metadata} cannot be read ({error!s:.80})", "path") from error
     try:
         plan = parsed_json(group["attributes"]["plan"])
-        plan = {key: plan[key] for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")}
+        plan = {
+            key: plan[key]
+            for key in ("function", "arguments", "order", "axes", "chunk", "variables", "attrs")
+        }
         grid_of(plan)
     except (RecursionError, KeyError, TypeError, ValueError, AttributeError):
-        raise ParameterError(f"{path} is a Zarr store, but not of a sweep: it keeps no plan", "path") from None
+        raise ParameterError(
+            f"{path} is a Zarr store, but not of a sweep: it keeps no plan", "path"
+        ) from None
     if damaged:
-        raise ParameterError(f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin anew", "path")
+        raise ParameterError(
+            (
+                f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin "
+                "anew"
+            ),
+            "path",
+        )
     _check_codecs(path, group)
     return plan
 
 
 def _check_codecs(path: Path, group: dict[str, Any]) -> None:
-    """Refuse arrays that are not read by the codecs of saltus alone: Zarr's older format may hold pickles, which run code."""
+    """Refuse arrays that are not read by the codecs of saltus alone: Zarr's older format may hold
+    pickles, which run code.
+    """
     arrays = group.get("consolidated_metadata", {}).get("metadata", {}).values()
-    known = all(array.get("zarr_format") == 3 and {codec["name"] for codec in array["codecs"]} <= CODECS for array in arrays)
+    known = all(
+        array.get("zarr_format") == 3 and {codec["name"] for codec in array["codecs"]} <= CODECS
+        for array in arrays
+    )
     if group.get("zarr_format") != 3 or not known:
-        raise ParameterError(f"{path} is no store that saltus has made: it has codecs of other programs", "path")
+        raise ParameterError(
+            f"{path} is no store that saltus has made: it has codecs of other programs", "path"
+        )
 
 
 def grid_of(plan: dict[str, Any]) -> ChunkGrid:
@@ -231,7 +264,9 @@ def grid_of(plan: dict[str, Any]) -> ChunkGrid:
     return ChunkGrid(sizes, {name: plan["chunk"][name] for name in sizes})
 
 
-def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]) -> Iterator[tuple[str, Index]]:
+def damaged_chunks(
+    path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, int]
+) -> Iterator[tuple[str, Index]]:
     """The (variable, chunk) of every chunk in the store at `path` that is there and cannot be read.
 
     Parameters
@@ -246,20 +281,31 @@ def damaged_chunks(path: Path, arrays: Any, chunks: ChunkGrid, extra: dict[str, 
         The number of dimensions of each variable beside the grid's axes.
     """
     for name, count in extra.items():
-        array, found = arrays[name], files.chunks_of(path, name, chunks.grid, count).there
+        array = arrays[name]
+        found = files.chunks_of(path, name, chunks.grid, count).there
         for i, row in enumerate(found):
             there: list[Index] = [(i, *map(int, index)) for index in np.argwhere(row)]
             if not there:
                 continue
             rows = chunks.slices(there[0])[0]
-            if row.all() and _row_size(array, rows) < LIMITS.any_machine and _can_be_read(array, (rows,)):
+            if (
+                row.all()
+                and _row_size(array, rows) < LIMITS.any_machine
+                and _can_be_read(array, (rows,))
+            ):
                 continue
-            yield from ((name, index) for index in there if not _can_be_read(array, chunks.slices(index)))
+            yield from (
+                (name, index) for index in there if not _can_be_read(array, chunks.slices(index))
+            )
 
 
 def _row_size(array: Any, rows: slice) -> float:
     """The size of some rows in bytes, according to the array's metadata."""
-    return float(float(rows.stop - rows.start) * math.prod(map(float, array.shape[1:])) * array.dtype.itemsize)
+    return float(
+        float(rows.stop - rows.start)
+        * math.prod(map(float, array.shape[1:]))
+        * array.dtype.itemsize
+    )
 
 
 def _can_be_read(array: Any, cut: tuple[slice, ...]) -> bool:
@@ -275,8 +321,19 @@ def _failures(path: Path) -> tuple[Failure, ...]:
         return ()
     try:
         entries = parsed_json((path / files.FAILURES).read_text(encoding="utf-8"))
-        failures = [Failure(tuple(map(int, e["index"])), str(e["place"]), str(e["error"]), int(e["attempts"])) for e in entries]
-    except (OSError, RecursionError, KeyError, TypeError, ValueError):  # a damaged list loses no result
+        failures = [
+            Failure(
+                tuple(map(int, e["index"])), str(e["place"]), str(e["error"]), int(e["attempts"])
+            )
+            for e in entries
+        ]
+    except (
+        OSError,
+        RecursionError,
+        KeyError,
+        TypeError,
+        ValueError,
+    ):  # a damaged list loses no result
         return ()
     return tuple(sorted(failures, key=lambda failure: failure.index))  # workers fail in any order
 

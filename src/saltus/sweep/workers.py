@@ -1,6 +1,7 @@
 """Chunks computed by other processes of this machine, or by the workers of a Dask cluster.
 
-Results are sent to this process, which writes them: the machines need no common disk, and only one process ever writes.
+Results are sent to this process, which writes them: the machines need no common disk, and only one
+process ever writes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ READY = "ready"
 
 
 class Workers:
-    """Up to `count` processes that compute chunks, started as they are needed and kept from one sweep to the next.
+    """Up to `count` processes that compute chunks, started as they are needed and kept from one
+    sweep to the next.
 
     It is a context manager; the processes end with the context.
     """
@@ -43,7 +45,8 @@ class Workers:
     def outcomes(self, plan: Computation, queue: deque[Index]) -> Iterator[tuple[Index, Any]]:
         """Compute the chunks in the queue, and yield the outcome of each as it comes.
 
-        If a process dies (killed, out of memory), only its own chunk fails, and another process takes its place.
+        If a process dies (killed, out of memory), only its own chunk fails, and another process
+        takes its place.
 
         Raises
         ------
@@ -70,7 +73,8 @@ class Workers:
                     assert index is not None
                     yield index, outcome
         finally:
-            for worker in [worker for worker in pool if worker.index is not None]:  # their chunks are not needed any more
+            # their chunks are not needed any more
+            for worker in [worker for worker in pool if worker.index is not None]:
                 pool.remove(worker)
                 worker.stop()
 
@@ -79,7 +83,8 @@ class _Worker:
     """A process, the pipe to it, and the chunk that it has."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks in whatever state they are
+        # a fork would copy threads' locks in whatever state they are
+        context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs,), daemon=True)
         self.process.start()
@@ -122,7 +127,8 @@ def _death(code: int) -> str:
 
 def _work(connection: Connection) -> None:
     """The main loop of a process: compute the chunks that it is sent, until the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the one that writes decides when to stop
+    # Ctrl-C reaches all processes; the one that writes decides when to stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(EOFError, OSError):  # the process that writes has ended
         connection.send(READY)
         while True:
@@ -133,24 +139,29 @@ def _work(connection: Connection) -> None:
 class ClusterSettings:
     """How long to wait for a cluster, and how many chunks it gets at once."""
 
-    patience: float = 5.0  # The time given to the scheduler to answer, and again to have a worker, s.
+    # The time given to the scheduler to answer, and again to have a worker, s.
+    patience: float = 5.0
     poll: float = 0.01  # The time between two checks for results and interrupts, s.
-    ahead: int = 2  # Chunks for each of the cluster's threads: one in work and one waiting; more would only fill memory.
+    # Chunks for each of the cluster's threads: one in work and one waiting; more would only fill
+    # memory.
+    ahead: int = 2
 
 
 CLUSTER = ClusterSettings()
 
 
 def on_cluster(plan: Computation, queue: deque[Index], address: str) -> Iterator[tuple[Index, Any]]:
-    """Compute the chunks in the queue on the cluster at `address`, and yield the outcome of each as it comes.
+    """Compute the chunks in the queue on the cluster at `address`, and yield the outcome of each as
+    it comes.
 
-    A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the plan's function, in the same
-    versions as here.
+    A chunk whose worker dies is given to another by the scheduler. The workers need saltus and the
+    plan's function, in the same versions as here.
 
     Raises
     ------
     SweepError
-        `distributed` is not installed, the scheduler does not answer or goes away, or it has no workers.
+        `distributed` is not installed, the scheduler does not answer or goes away, or it has no
+        workers.
     """
     client = _connect(address)
     try:
@@ -161,19 +172,28 @@ def on_cluster(plan: Computation, queue: deque[Index], address: str) -> Iterator
         with deferred_interrupts() as raise_if_interrupted:
             while queue or flying:
                 raise_if_interrupted()
-                while queue and len(flying) < max(CLUSTER.ahead, CLUSTER.ahead * sum(client.nthreads().values())):
+                while queue and len(flying) < max(
+                    CLUSTER.ahead, CLUSTER.ahead * sum(client.nthreads().values())
+                ):
                     index = queue.popleft()
-                    # Not pure: otherwise Dask would keep the error of a failed chunk, and not try it again.
-                    future = client.submit(attempt, plan.function, plan.arguments, plan.block(index), pure=False)
+                    # Not pure: otherwise Dask would keep the error of a failed chunk, and not try
+                    # it again.
+                    future = client.submit(
+                        attempt, plan.function, plan.arguments, plan.block(index), pure=False
+                    )
                     flying[future.key] = index
                     done.add(future)
                 while not done.has_ready():
                     raise_if_interrupted()
                     time.sleep(CLUSTER.poll)
                 future, result = next(done)
-                if isinstance(result, BaseException):  # the status may be out of date if a worker was lost; the result is not
+                # the status may be out of date if a worker was lost; the result is not
+                if isinstance(result, BaseException):
                     raise OSError("the task was given up")
-                yield flying.pop(future.key), Raised(_reason(result)) if future.status == "error" else result
+                yield (
+                    flying.pop(future.key),
+                    Raised(_reason(result)) if future.status == "error" else result,
+                )
                 del future, result  # so that the cluster forgets them
             raise_if_interrupted()
     except OSError as error:
@@ -189,7 +209,9 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError:
-        raise SweepError('a Dask cluster needs the package distributed: pip install "saltus[cluster]"') from None
+        raise SweepError(
+            'a Dask cluster needs the package distributed: pip install "saltus[cluster]"'
+        ) from None
     try:
         client = Client(address, timeout=CLUSTER.patience, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -200,7 +222,9 @@ def _connect(address: str) -> Any:
         client.wait_for_workers(1, timeout=CLUSTER.patience)
     except TimeoutError:
         client.close(timeout=1)
-        raise SweepError(f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`") from None
+        raise SweepError(
+            f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`"
+        ) from None
     return client
 
 

@@ -1,6 +1,8 @@
-"""Systems: the contract of a model, the models, their loads and impact laws, and the system that joins the three.
+"""Systems: the contract of a model, the models, their loads and impact laws, and the system that
+joins the three.
 
-Every class here is frozen, dimensionless and pure; `UnitCell` converts from and to SI. Nothing here integrates anything.
+Every class here is frozen, dimensionless and pure; `UnitCell` converts from and to SI. Nothing here
+integrates anything.
 """
 
 from saltus._front_door import front_door

@@ -1,4 +1,5 @@
-"""The contract of a model with several contacts or dry friction, what may hold its coordinates, and its accelerations then.
+"""The contract of a model with several contacts or dry friction, what may hold its coordinates, and
+its accelerations then.
 
 The accelerations take numbers, arrays or symbols.
 """
@@ -20,29 +21,34 @@ Number = Any  # a float, or a parameter of the model while its equations are tra
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >= 0.
+    """A contact that keeps a coordinate q on one side of a position p: its gap is sign (q - p) >=
+    0.
 
-    While it is closed, q stays at p. Its reaction, the impulse or force on q times the sign, is not negative.
+    While it is closed, q stays at p. Its reaction, the impulse or force on q times the sign, is not
+    negative.
 
-    Between bodies q is a sum of coordinates with constant coefficients, such as the distance y - x, and its reaction acts on each
-    of them with its coefficient. A channel of the load that displaces the ground may be one of them: a wall that moves, or a
-    table that shakes, q = x - zeta(t). So may functions h(q) of the coordinates, which are methods of the model: a corner, or a
-    wall that is curved.
+    Between bodies q is a sum of coordinates with constant coefficients, such as the distance y - x,
+    and its reaction acts on each of them with its coefficient. A channel of the load that displaces
+    the ground may be one of them: a wall that moves, or a table that shakes, q = x - zeta(t). So
+    may functions h(q) of the coordinates, which are methods of the model: a corner, or a wall that
+    is curved.
 
     Parameters
     ----------
     name
         Its name, such as "lower", in events and in the names of stops.
     coordinate
-        The name of the model's coordinate; or a dictionary of the coefficients of several, {"y": 1.0, "x": -1.0} for y - x, and
-        of load channels whose names begin with "ground", and of methods h(q) of the model. One coordinate at least must be read
-        by none of these; where none is, a method h_inverse(value) is needed that gives the single coordinate of which h is.
+        The name of the model's coordinate; or a dictionary of the coefficients of several, {"y":
+        1.0, "x": -1.0} for y - x, and of load channels whose names begin with "ground", and of
+        methods h(q) of the model. One coordinate at least must be read by none of these; where none
+        is, a method h_inverse(value) is needed that gives the single coordinate of which h is.
     sign
         +1 where the coordinate stays above the position, -1 where it stays below.
     position
         p, a number, which may be one of the model's parameters.
     group
-        The contact's group: an impact passes speed on to the other contacts of its group (`transfer`).
+        The contact's group: an impact passes speed on to the other contacts of its group
+        (`transfer`).
     restitution
         e of the impacts that close it, in [0, 1]; by default that of the system's impact law.
 
@@ -64,7 +70,9 @@ class Contact:
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):
-            raise ParameterError(f"the sign of the contact {self.name!r} must be +1 or -1, got {self.sign!r}", "sign")
+            raise ParameterError(
+                f"the sign of the contact {self.name!r} must be +1 or -1, got {self.sign!r}", "sign"
+            )
 
     def gap(self, position: Any) -> Any:
         """sign (q - p), at a position q.
@@ -79,20 +87,24 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under a normal force N:
+    """Coulomb friction along a coordinate q on a ground that moves with the speed w, under a normal
+    force N:
 
-        it slides, and the force on q is -mu N sign(q' - w), or it sticks, q' = w, and the force is at most mu_s N.
+        it slides, and the force on q is -mu N sign(q' - w), or it sticks, q' = w, and the force is
+        at most mu_s N.
 
-    N is the reaction of a contact, if one is named, and else the model's `normal_forces`, of time, state and load. mu is mu_k, or
-    falls with u = abs(q' - w) as Stribeck has it: mu_k + (mu_s - mu_k) exp(-u / v_s). A friction in a contact acts along another
-    coordinate, while it is closed and at its impacts J, with impulses of at most mu_k J.
+    N is the reaction of a contact, if one is named, and else the model's `normal_forces`, of time,
+    state and load. mu is mu_k, or falls with u = abs(q' - w) as Stribeck has it: mu_k + (mu_s -
+    mu_k) exp(-u / v_s). A friction in a contact acts along another coordinate, while it is closed
+    and at its impacts J, with impulses of at most mu_k J.
 
     Parameters
     ----------
     name
         Its name, such as "belt", in events.
     coordinate
-        The name of the model's coordinate, or a dictionary of the coefficients of several, as of a `Contact`.
+        The name of the model's coordinate, or a dictionary of the coefficients of several, as of a
+        `Contact`.
     kinetic
         mu_k, a number, which may be one of the model's parameters.
     static
@@ -123,8 +135,14 @@ class Friction:
 
     @property
     def limit(self) -> str:
-        """The name of the limit at which a motion ends: no normal force presses, or more than one reaction is possible."""
-        return f"normal force of {self.name}" if self.contact is None else f"Painleve's paradox at {self.contact}"
+        """The name of the limit at which a motion ends: no normal force presses, or more than one
+        reaction is possible.
+        """
+        return (
+            f"normal force of {self.name}"
+            if self.contact is None
+            else f"Painleve's paradox at {self.contact}"
+        )
 
     @property
     def most(self) -> Any:
@@ -144,7 +162,8 @@ class Friction:
         return self.kinetic + (self.most - self.kinetic) * np.exp(-speed / self.stribeck_speed)
 
     def slipping(self, velocity: Any, direction: Any) -> Any:
-        """mu sign(q' - w) at a velocity q' along which it slides in a direction, +1 or -1; 0 if it sticks, 0.
+        """mu sign(q' - w) at a velocity q' along which it slides in a direction, +1 or -1; 0 if it
+        sticks, 0.
 
         Parameters
         ----------
@@ -158,12 +177,14 @@ class Friction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surface:
-    """A surface q = p of the state space that motions pass, and on whose two sides the right-hand side may differ:
+    """A surface q = p of the state space that motions pass, and on whose two sides the right-hand
+    side may differ:
 
         M(q) q'' = r(t, q, v, s),    s = sign (q - p) / abs(q - p) = +1 or -1.
 
-    A soft stop, a backlash, a spring with two stiffnesses or a preload are such; q may be a sum of coordinates as that of a
-    `Contact`. At a crossing coordinates and velocities are continuous. The model's `force` reads s by the surface's name.
+    A soft stop, a backlash, a spring with two stiffnesses or a preload are such; q may be a sum of
+    coordinates as that of a `Contact`. At a crossing coordinates and velocities are continuous. The
+    model's `force` reads s by the surface's name.
 
     Parameters
     ----------
@@ -176,7 +197,8 @@ class Surface:
     sign
         +1 where s is +1 above the position, -1 where it is +1 below.
     stiffness, damping
-        k and c of the force -k (q - p) - c q' that acts on the side +1, of a `Structure`; another model has it in its `force`.
+        k and c of the force -k (q - p) - c q' that acts on the side +1, of a `Structure`; another
+        model has it in its `force`.
 
     Examples
     --------
@@ -193,7 +215,9 @@ class Surface:
 
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):
-            raise ParameterError(f"the sign of the surface {self.name!r} must be +1 or -1, got {self.sign!r}", "sign")
+            raise ParameterError(
+                f"the sign of the surface {self.name!r} must be +1 or -1, got {self.sign!r}", "sign"
+            )
 
     def side(self, position: Any) -> Any:
         """s, +1 or -1, at a position q.
@@ -206,12 +230,15 @@ class Surface:
         return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
 
 
-MOST_CONTACTS = np.iinfo(np.int64).bits  # Those closed are bits of a whole number; a friction or a surface takes two.
-MOST_FRICTIONS = 6  # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
+# Those closed are bits of a whole number; a friction or a surface takes two.
+MOST_CONTACTS = np.iinfo(np.int64).bits
+# Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
+MOST_FRICTIONS = 6
 
 
 class ContactModel(Model):
-    """An oscillator of one or more coordinates with several contacts, contacts that hold single coordinates, or dry friction:
+    """An oscillator of one or more coordinates with several contacts, contacts that hold single
+    coordinates, or dry friction:
 
         M(q) q'' = r(t, q, v) + the reactions of closed contacts + the frictions.
 
@@ -219,15 +246,20 @@ class ContactModel(Model):
 
     1. `force`, r(t, q, v); its accelerations follow from it;
     2. `mass_matrix`, M(q), symmetric and positive definite, where that is not the identity;
-    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum, on one side of a position. While
-       a contact is closed it holds it as long as its reaction presses; impacts follow the system's law (`NewtonImpact`);
-    4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1, of those that are in no contact.
+    3. `contacts`, a tuple of `Contact`, each of which keeps one coordinate, or a sum, on one side
+       of a position. While
+       a contact is closed it holds it as long as its reaction presses; impacts follow the system's
+       law (`NewtonImpact`);
+    4. `frictions`, a tuple of `Friction`, and their `normal_forces` N(t, q, v), by default 1, of
+       those that are in no contact.
        A friction that sticks holds the velocity of its coordinate, or of a sum of several;
-    5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load, sides), and reads `sides.stop`,
+    5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load,
+       sides), and reads `sides.stop`,
        +1 or -1, of the surface "stop";
-    6. optionally `after_impact`, by which the coordinates of first order jump at impacts, `transfers` (whether an impact passes
-       speed on to the other contacts of its group, as a crossing does) and `singularity`, a name for where M(q) has no inverse: a
-       motion that gets there ends with this name as `limit`.
+    6. optionally `after_impact`, by which the coordinates of first order jump at impacts,
+       `transfers` (whether an impact passes
+       speed on to the other contacts of its group, as a crossing does) and `singularity`, a name
+       for where M(q) has no inverse: a motion that gets there ends with this name as `limit`.
 
     Examples
     --------
@@ -269,17 +301,25 @@ class ContactModel(Model):
 
     @property
     def friction_limits(self) -> tuple[str, ...]:
-        """The limits at which its frictions end a motion: that of one in a contact only where M(q) depends on q, as it is else
-        known from the start whether reactions are the only ones."""
+        """The limits at which its frictions end a motion: that of one in a contact only where M(q)
+        depends on q, as it is else known from the start whether reactions are the only ones."""
         pressed = [friction for friction in self.frictions if friction.contact is not None]
         if pressed:
             size = len(self.coordinates)
-            one, other = (mass_rows(self, tuple(x / (1 + i) for i in range(size))) for x in (0.13, 0.21))  # any numbers
+            # any numbers
+            one, other = (
+                mass_rows(self, tuple(x / (1 + i) for i in range(size))) for x in (0.13, 0.21)
+            )
             pressed = pressed if np.not_equal(one, other).any() else []
-        return tuple(friction.limit for friction in self.frictions if friction.contact is None or friction in pressed)
+        return tuple(
+            friction.limit
+            for friction in self.frictions
+            if friction.contact is None or friction in pressed
+        )
 
     def reaches(self, coordinate: str, values: Any) -> Any:
-        """Whether a coordinate can have these values: where the gap of none of its contacts is negative.
+        """Whether a coordinate can have these values: where the gap of none of its contacts is
+        negative.
 
         Parameters
         ----------
@@ -288,7 +328,11 @@ class ContactModel(Model):
         values
             The values, an array.
         """
-        gaps = [np.asarray(contact.gap(values)) for contact in self.contacts if contact.coordinate == coordinate]
+        gaps = [
+            np.asarray(contact.gap(values))
+            for contact in self.contacts
+            if contact.coordinate == coordinate
+        ]
         return np.min(gaps or [np.zeros(np.shape(values))], axis=0) >= 0.0
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
@@ -305,7 +349,9 @@ class ContactModel(Model):
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
-        raise NotImplementedError(f"{type(self).__name__} must define force(t, theta, velocity, load)")
+        raise NotImplementedError(
+            f"{type(self).__name__} must define force(t, theta, velocity, load)"
+        )
 
     def mass_matrix(self, theta: Any) -> Any:
         """M(q): a number, or rows of numbers, symmetric and positive definite.
@@ -324,10 +370,11 @@ class ContactModel(Model):
         return getattr(self, "own_class", type(self)).after_impact is not ContactModel.after_impact
 
     def after_impact(self, contact: str, theta: Any, velocity: Any) -> Any:
-        """The coordinates of first order just after an impact, a number or a tuple of several; by default those before it.
+        """The coordinates of first order just after an impact, a number or a tuple of several; by
+        default those before it.
 
-        Where contacts of one block close together, the last of them counts, and the end of an accumulation of impacts counts as
-        one impact.
+        Where contacts of one block close together, the last of them counts, and the end of an
+        accumulation of impacts counts as one impact.
 
         Parameters
         ----------
@@ -341,7 +388,8 @@ class ContactModel(Model):
         return tuple(theta[len(self.moving) :])
 
     def normal_forces(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[Any, ...]:
-        """The normal force N of each friction; the motion ends where one is not positive. By default it is 1, so that mu N is mu.
+        """The normal force N of each friction; the motion ends where one is not positive. By
+        default it is 1, so that mu N is mu.
 
         Parameters
         ----------
@@ -362,29 +410,36 @@ class SolvedMotion(NamedTuple):
 
     acceleration: list[Any]
     along: dict[int, Any]  # the force along each dependent sum, by its place among the coordinates
-    sums: dict[int, list[Any]]  # and its row for impacts, in the place of that of the mass matrix: minus its coefficients, then 1
+    # and its row for impacts, in the place of that of the mass matrix: minus its coefficients, then
+    # 1
+    sums: dict[int, list[Any]]
 
 
 def solved_motion(
     model: Model, t: Any, q: Any, v: Any, load: Any, free: Sequence[Any], slides: Sequence[Any] = ()
 ) -> SolvedMotion:
-    """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is free, 0 where it is held.
+    """The accelerations a of (D M D + 1 - D) a = D r, with D = diag(free): 1 where a coordinate is
+    free, 0 where it is held.
 
-    r has the force of each friction that slides, -mu N s with its direction s in `slides`, 0 where it sticks. Behind them may
-    be +1 or -1 for each surface: whether its coordinate is above the position; else the state says so. Where N is the reaction
-    of a contact, plus or minus the row n of M a - r, its multiple is added to the row of the friction.
+    r has the force of each friction that slides, -mu N s with its direction s in `slides`, 0 where
+    it sticks. Behind them may be +1 or -1 for each surface: whether its coordinate is above the
+    position; else the state says so. Where N is the reaction of a contact, plus or minus the row n
+    of M a - r, its multiple is added to the row of the friction.
 
-    q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from its first row on, without
-    exchanging rows, as the pivots of a positive definite matrix are positive; rows of frictions in contacts come last.
+    q and v are scalars where there is one coordinate, else tuples. The matrix is eliminated from
+    its first row on, without exchanging rows, as the pivots of a positive definite matrix are
+    positive; rows of frictions in contacts come last.
 
-    A dependent sum (`InGapCoordinates`) has a row g of coefficients of the others. While its contact is closed, h = 1, and else
-    h = 0, a force l acts along it, which keeps g a = b:
+    A dependent sum (`InGapCoordinates`) has a row g of coefficients of the others. While its
+    contact is closed, h = 1, and else h = 0, a force l acts along it, which keeps g a = b:
 
         D M a - h D g' l = D r,    h g D a + (1 - h) l = h b.
     """
     load = _on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
-    late = _add_frictions(model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free))
+    late = _add_frictions(
+        model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free)
+    )
     size = len(force)
     matrix = [[held_entry(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
     right = [free[i] * force[i] for i in range(size)]
@@ -412,19 +467,34 @@ def solved_motion(
                 value = value - matrix[i][j] * solved[j]
         solved[i] = value / matrix[i][i]
     along = {place: (1.0 - free[place]) * solved[place] for place in sums}
-    rows = {i: [1.0 if j == i else 0.0 if is_zero(x) else -x for j, x in enumerate(row)] for i, (row, _) in sums.items()}
-    return SolvedMotion([free[i] * force[i] if i in sums else x for i, x in enumerate(solved)], along, rows)
+    rows = {
+        i: [1.0 if j == i else 0.0 if is_zero(x) else -x for j, x in enumerate(row)]
+        for i, (row, _) in sums.items()
+    }
+    return SolvedMotion(
+        [free[i] * force[i] if i in sums else x for i, x in enumerate(solved)], along, rows
+    )
 
 
-def dependent_sums(model: Any, t: Any, q: Any, v: Any, load: Any) -> dict[int, tuple[list[Any], Any]]:
-    """The dependent sums of a model in coordinates of its gaps, by their places among these (`InGapCoordinates`)."""
+def dependent_sums(
+    model: Any, t: Any, q: Any, v: Any, load: Any
+) -> dict[int, tuple[list[Any], Any]]:
+    """The dependent sums of a model in coordinates of its gaps, by their places among these
+    (`InGapCoordinates`).
+    """
     found = model.dependent_sums(t, q, v, load) if getattr(model, "dependent", 0) else []
     return dict(enumerate(found, len(model.coordinates) - len(found)))
 
 
-def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any], given: tuple[Any, ...]) -> list[int]:
-    """Add the forces of frictions that slide to the rows M and r; returns the places of those in contacts."""
-    names, (normals, slides, free), late = model.coordinates, given, dict[int, None]()
+def _add_frictions(
+    model: Model, v: Any, mass: list[list[Any]], force: list[Any], given: tuple[Any, ...]
+) -> list[int]:
+    """Add the forces of frictions that slide to the rows M and r; returns the places of those in
+    contacts.
+    """
+    names = model.coordinates
+    (normals, slides, free) = given
+    late = dict[int, None]()
     rates = v if len(names) > 1 else [v]
     for friction, normal, s in zip(model.frictions, normals, slides, strict=False):
         place = names.index(friction.coordinate)
@@ -432,10 +502,14 @@ def _add_frictions(model: Model, v: Any, mass: list[list[Any]], force: list[Any]
             force[place] = force[place] - friction.slipping(rates[place], s) * normal
     for friction, s in zip(model.frictions, slides, strict=False):
         if friction.contact is not None:
-            place, contact = names.index(friction.coordinate), contact_of(model, friction)
+            place = names.index(friction.coordinate)
+            contact = contact_of(model, friction)
             held = names.index(contact.coordinate)
             share = contact.sign * friction.slipping(rates[place], s) * (1.0 - free[held])
-            mass[place] = [a if is_zero(b) else a + share * b for a, b in zip(mass[place], mass[held], strict=True)]
+            mass[place] = [
+                a if is_zero(b) else a + share * b
+                for a, b in zip(mass[place], mass[held], strict=True)
+            ]
             force[place] = force[place] + share * force[held]
             late[place] = None
     return list(late)
@@ -447,32 +521,62 @@ def contact_of(model: Model, friction: Friction) -> Contact:
 
 
 def reactions(
-    model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = (), along: Any = ()
+    model: Model,
+    t: Any,
+    q: Any,
+    v: Any,
+    a: Sequence[Any],
+    load: Any,
+    slides: Sequence[Any] = (),
+    along: Any = (),
 ) -> list[Any]:
     """The force of each contact along its sign, sign (M a - r)_i; 0 where its coordinate is free.
 
-    r then has the force of a friction along this coordinate. While it sticks it carries what it can, so that the force is
-    sign (M a - r)_i + mu_s N, which vanishes when the friction cannot hold the coordinate alone any more. Without `slides` it
-    does what it does in a closed contact. `along` has the forces along dependent sums (`solved_motion`), which are reactions.
+    r then has the force of a friction along this coordinate. While it sticks it carries what it
+    can, so that the force is sign (M a - r)_i + mu_s N, which vanishes when the friction cannot
+    hold the coordinate alone any more. Without `slides` it does what it does in a closed contact.
+    `along` has the forces along dependent sums (`solved_motion`), which are reactions.
     """
-    slides = slides if len(slides) else [np.sign(-friction.ground_speed) for friction in model.frictions]
-    lacking, names = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along)), model.coordinates
+    slides = (
+        slides if len(slides) else [np.sign(-friction.ground_speed) for friction in model.frictions]
+    )
+    lacking = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along))
+    names = model.coordinates
     found = [contact.sign * lacking[names.index(contact.coordinate)] for contact in model.contacts]
-    for friction, normal, s in zip(model.frictions, _pressing(model, t, q, v, load, lacking), slides, strict=False):
+    for friction, normal, s in zip(
+        model.frictions, _pressing(model, t, q, v, load, lacking), slides, strict=False
+    ):
         for i, contact in enumerate(model.contacts):
             if contact.coordinate == friction.coordinate:
-                slips = friction.slipping(v[names.index(friction.coordinate)] if len(names) > 1 else v, s)
-                found[i] = found[i] + (contact.sign * slips + (1.0 - s * s) * friction.most) * normal
+                slips = friction.slipping(
+                    v[names.index(friction.coordinate)] if len(names) > 1 else v, s
+                )
+                found[i] = (
+                    found[i] + (contact.sign * slips + (1.0 - s * s) * friction.most) * normal
+                )
     return found
 
 
 def stick_margins(
-    model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], load: Any, slides: Sequence[Any] = (), along: Any = ()
+    model: Model,
+    t: Any,
+    q: Any,
+    v: Any,
+    a: Sequence[Any],
+    load: Any,
+    slides: Sequence[Any] = (),
+    along: Any = (),
 ) -> list[Any]:
-    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a - r)_i that makes it stick."""
-    lacking, margins = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along)), []
-    for friction, normal in zip(model.frictions, _pressing(model, t, q, v, load, lacking), strict=True):
-        force, most = lacking[model.coordinates.index(friction.coordinate)], friction.most * normal
+    """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a -
+    r)_i that makes it stick.
+    """
+    lacking = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along))
+    margins = []
+    for friction, normal in zip(
+        model.frictions, _pressing(model, t, q, v, load, lacking), strict=True
+    ):
+        force = lacking[model.coordinates.index(friction.coordinate)]
+        most = friction.most * normal
         margins += [most - force, most + force]
     return margins
 
@@ -497,17 +601,29 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
     """
     given = model.normal_forces(t, q, v, load) if model.frictions else ()
     if len(given) != len(model.frictions):
-        kind, count = type(model).__name__, len(model.frictions)
-        raise ParameterError(f"{kind}.normal_forces must return {count} value(s), one for each friction, got {given!r}", "model")
+        kind = type(model).__name__
+        count = len(model.frictions)
+        raise ParameterError(
+            (
+                f"{kind}.normal_forces must return {count} value(s), one for each friction, got "
+                f"{given!r}"
+            ),
+            "model",
+        )
     return tuple(given)
 
 
-def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], given: tuple[Any, Any]) -> list[Any]:
-    """M a - r, the force that must act on each coordinate besides r, and besides those along dependent sums, for these
-    accelerations; of a dependent sum the force along it."""
+def _lacking(
+    model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], given: tuple[Any, Any]
+) -> list[Any]:
+    """M a - r, the force that must act on each coordinate besides r, and besides those along
+    dependent sums, for these accelerations; of a dependent sum the force along it."""
     load, along = given
     mass, force = mass_and_force(model, t, q, v, load)
-    found = [sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r for row, r in zip(mass, force, strict=True)]
+    found = [
+        sum(m * x for m, x in zip(row, a, strict=True) if not is_zero(m)) - r
+        for row, r in zip(mass, force, strict=True)
+    ]
     for place, (row, _) in dependent_sums(model, t, q, v, load).items():
         found[place] = along[place]
         for j, entry in enumerate(row):
@@ -515,28 +631,43 @@ def _lacking(model: Model, t: Any, q: Any, v: Any, a: Sequence[Any], given: tupl
     return found
 
 
-def mass_and_force(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[list[list[Any]], list[Any]]:
+def mass_and_force(
+    model: Any, t: Any, q: Any, v: Any, load: Any
+) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
     force = model.force(t, q, v, load, *sides_for(model, t, q, load))
     return mass_rows(model, q, t, load), [force] if len(model.coordinates) == 1 else list(force)
 
 
 def mass_rows(model: Any, q: Any, t: Any = 0.0, load: Any = None) -> list[list[Any]]:
-    """M(q) as rows, for any number of coordinates; where walls move it depends on time, without a load as if none moved."""
-    mass = model.mass_matrix(q, t, load) if getattr(model, "has_moving_walls", False) else model.mass_matrix(q)
+    """M(q) as rows, for any number of coordinates; where walls move it depends on time, without a
+    load as if none moved.
+    """
+    mass = (
+        model.mass_matrix(q, t, load)
+        if getattr(model, "has_moving_walls", False)
+        else model.mass_matrix(q)
+    )
     return [[mass]] if len(model.coordinates) == 1 else [list(row) for row in mass]
 
 
 def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
-    """The load together with the sides of surfaces, if these are given behind the directions of the frictions."""
+    """The load together with the sides of surfaces, if these are given behind the directions of the
+    frictions.
+    """
     above = slides[len(model.frictions) :]
     if not (model.surfaces and len(above)):
         return load
-    return LoadOnSides(load, Sides({each.name: each.sign * s for each, s in zip(model.surfaces, above, strict=True)}))
+    return LoadOnSides(
+        load,
+        Sides({each.name: each.sign * s for each, s in zip(model.surfaces, above, strict=True)}),
+    )
 
 
 def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
-    """The argument `sides` of a model's force, if it takes one: those that come with the load, else those of the coordinates."""
+    """The argument `sides` of a model's force, if it takes one: those that come with the load, else
+    those of the coordinates.
+    """
     if not model.surfaces:
         return ()
     if isinstance(load, LoadOnSides):
@@ -544,8 +675,16 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
     known = dict(zip(model.coordinates, q if len(model.coordinates) > 1 else (q,), strict=True))
 
     def value_of(name: str) -> Any:
-        """The value of a term of a sum: a coordinate, a displacement of the ground or a function of the model."""
-        return known[name] if name in known else getattr(load, name)(t) if name in model.channels else getattr(model, name)(q)
+        """The value of a term of a sum: a coordinate, a displacement of the ground or a function of
+        the model.
+        """
+        return (
+            known[name]
+            if name in known
+            else getattr(load, name)(t)
+            if name in model.channels
+            else getattr(model, name)(q)
+        )
 
     def kept(surface: Surface) -> Any:
         """The coordinate of a surface, or its sum."""

@@ -1,4 +1,6 @@
-"""Drawings: the mechanism of a model in one of its states, as lines and circles in the plane of motion."""
+"""Drawings: the mechanism of a model in one of its states, as lines and circles in the plane of
+motion.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,13 @@ from saltus.checks import check_states
 from saltus.errors import ParameterError
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.model import Model
-from saltus.systems.oscillators import BeltOscillator, ImpactPair, RockingBlock, TwoStops, WallOscillator
+from saltus.systems.oscillators import (
+    BeltOscillator,
+    ImpactPair,
+    RockingBlock,
+    TwoStops,
+    WallOscillator,
+)
 from saltus.systems.system import System
 from saltus.systems.two_layer import CellChain, TwoLayer
 from saltus.systems.unit_cell import CellLayout, UnitCell
@@ -51,11 +59,12 @@ class Shape:
 
 
 def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
-    """The mechanism of a system with given coordinates: always the same shapes in the same order, wherever they are.
+    """The mechanism of a system with given coordinates: always the same shapes in the same order,
+    wherever they are.
 
-    A model of your own may have a method `drawing(position)` that returns a list of `Shape`; without one, each of its coordinates
-    is drawn as a mass on a line. Angles are drawn as they are, lengths in the unit of the coordinate. The frame is that of the
-    ground.
+    A model of your own may have a method `drawing(position)` that returns a list of `Shape`;
+    without one, each of its coordinates is drawn as a mass on a line. Angles are drawn as they are,
+    lengths in the unit of the coordinate. The frame is that of the ground.
 
     Parameters
     ----------
@@ -83,7 +92,11 @@ def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
     if not model.moving:
         names = ", ".join(model.coordinates)
         raise ParameterError(
-            f"{type(model).__name__} has {names} of first order, which move nothing: give it a `drawing`", "system"
+            (
+                f"{type(model).__name__} has {names} of first order, which move nothing: give it a "
+                "`drawing`"
+            ),
+            "system",
         )
     draw = next((draw for kind, draw in DRAWN.items() if isinstance(model, kind)), _masses)
     return tuple(draw(model, place))
@@ -105,31 +118,50 @@ def _box(role: str, x: float, y: float, width: float, height: float) -> Shape:
 
 def _spring(x: float, y: float, to: float, to_y: float | None = None) -> Shape:
     """A spring from (x, y) to another place, by default at the same height."""
-    start, end = np.array([x, y]), np.array([to, y if to_y is None else to_y])
-    along, share = end - start, np.concatenate([[0.0], np.linspace(0.15, 0.85, 13), [1.0]])  # six coils
+    start = np.array([x, y])
+    end = np.array([to, y if to_y is None else to_y])
+    # six coils
+    along = end - start
+    share = np.concatenate([[0.0], np.linspace(0.15, 0.85, 13), [1.0]])
     sideways = np.concatenate([[0.0, 0.0], np.tile([1.0, -1.0], 6)[:11], [0.0, 0.0]])
     length = math.hypot(*along) or 1.0
     across = np.array([-along[1], along[0]]) / length
-    return Shape("line", start + share[:, None] * along + 0.09 * sideways[:, None] * across, "spring")
+    return Shape(
+        "line", start + share[:, None] * along + 0.09 * sideways[:, None] * across, "spring"
+    )
 
 
 def _block(model: RockingBlock, place: np.ndarray) -> list[Shape]:
-    """A block with the half diagonal 1; it turns about its right corner for theta > 0, about its left one for theta < 0."""
-    theta, width, height = float(place[0]), math.sin(model.alpha), math.cos(model.alpha)
-    corners = np.array([[-width, 0], [width, 0], [width, 2 * height], [-width, 2 * height], [-width, 0]])
+    """A block with the half diagonal 1; it turns about its right corner for theta > 0, about its
+    left one for theta < 0.
+    """
+    theta = float(place[0])
+    width = math.sin(model.alpha)
+    height = math.cos(model.alpha)
+    corners = np.array(
+        [[-width, 0], [width, 0], [width, 2 * height], [-width, 2 * height], [-width, 0]]
+    )
     pivot = np.array([width if theta >= 0 else -width, 0.0])
     turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
-    return [_line("ground", (-1.6, 0), (1.6, 0)), Shape("line", (corners - pivot) @ turn.T + pivot, "body")]
+    return [
+        _line("ground", (-1.6, 0), (1.6, 0)),
+        Shape("line", (corners - pivot) @ turn.T + pivot, "body"),
+    ]
 
 
 def _on_spring(x: float, left: float, y: float = 0.25) -> list[Shape]:
     """A mass on a spring that is fixed at `left`."""
-    return [_line("wall", (left, 0.0), (left, 0.55)), _spring(left, y, x - 0.2), _box("mass", x - 0.1, y, 0.2, 0.4)]
+    return [
+        _line("wall", (left, 0.0), (left, 0.55)),
+        _spring(left, y, x - 0.2),
+        _box("mass", x - 0.1, y, 0.2, 0.4),
+    ]
 
 
 def _wall(model: WallOscillator, place: np.ndarray) -> list[Shape]:
     """The mass, whose right face is at x, on a spring, and the wall at d."""
-    left, right = min(-2.0, model.wall - 2.0), max(1.5, model.wall + 0.4)
+    left = min(-2.0, model.wall - 2.0)
+    right = max(1.5, model.wall + 0.4)
     return [
         _line("ground", (left, 0.0), (right, 0.0)),
         *_on_spring(float(place[0]), left),
@@ -139,7 +171,10 @@ def _wall(model: WallOscillator, place: np.ndarray) -> list[Shape]:
 
 def _stops(model: TwoStops, place: np.ndarray) -> list[Shape]:
     """A mass whose faces meet the stops at d_1 and d_2, on a spring above."""
-    x, left, right, half = float(place[0]), model.left, model.right, 0.2
+    x = float(place[0])
+    left = model.left
+    right = model.right
+    half = 0.2
     return [
         _line("ground", (left - half - 0.5, 0.0), (right + half + 0.5, 0.0)),
         _line("wall", (left - half, 0.0), (left - half, 0.45)),
@@ -153,7 +188,9 @@ def _stops(model: TwoStops, place: np.ndarray) -> list[Shape]:
 
 def _pair(model: ImpactPair, place: np.ndarray) -> list[Shape]:
     """The case at z on its spring, and the mass in it at the distance x from its middle."""
-    z, x, half = float(place[0]), float(place[1]), model.clearance + 0.2
+    z = float(place[0])
+    x = float(place[1])
+    half = model.clearance + 0.2
     left = -half - 1.8
     return [
         _line("ground", (left, 0.0), (half + 1.5, 0.0)),
@@ -168,13 +205,21 @@ def _belt(model: BeltOscillator, place: np.ndarray) -> list[Shape]:
     """A mass on a spring, on a belt between two wheels."""
     x = float(place[0])
     wheels = [_disc("hinge", (at, -0.2), 0.2) for at in (-1.4, 1.4)]
-    return [_line("ground", (-1.4, 0.0), (1.4, 0.0)), _line("ground", (-1.4, -0.4), (1.4, -0.4)), *wheels, *_on_spring(x, -2.2)]
+    return [
+        _line("ground", (-1.4, 0.0), (1.4, 0.0)),
+        _line("ground", (-1.4, -0.4), (1.4, -0.4)),
+        *wheels,
+        *_on_spring(x, -2.2),
+    ]
 
 
 def cell_shapes(layout: CellLayout, shift: float = 0.0) -> list[Shape]:
-    """The shapes of a unit cell: its supports, bars, sliders, hinges and masses, moved to the right by `shift`."""
+    """The shapes of a unit cell: its supports, bars, sliders, hinges and masses, moved to the right
+    by `shift`.
+    """
     points = {name: at + np.array([shift, 0.0]) for name, at in layout.points.items()}
-    left, right = points["lower_left"], points["lower_right"]
+    left = points["lower_left"]
+    right = points["lower_right"]
     aside = np.array([0.25, 0.0])
     shapes = [_line("ground", left - aside - [0.0, 0.1], right + aside - [0.0, 0.1])]
     shapes += [_line("bar", points[first], points[last]) for first, last in layout.bars]
@@ -193,7 +238,9 @@ def _layered(beta0: float, lower: float, upper: float, shift: float = 0.0) -> li
     """The cell with these openings, which are kept within what the mechanism allows."""
     cell = _cell_of(beta0)
     limit = cell.kinematic_limit
-    return cell_shapes(cell.layout(min(max(lower, 0.0), limit), max(min(upper, 0.0), -limit)), shift)
+    return cell_shapes(
+        cell.layout(min(max(lower, 0.0), limit), max(min(upper, 0.0), -limit)), shift
+    )
 
 
 def _metainterface(model: Metainterface, place: np.ndarray) -> list[Shape]:
@@ -209,14 +256,23 @@ def _two_layers(model: TwoLayer, place: np.ndarray) -> list[Shape]:
 def _chain(model: CellChain, place: np.ndarray) -> list[Shape]:
     """The cells side by side, with the springs between their masses."""
     step = BASE + 0.9  # with a space between two cells
-    cells = [_layered(model.beta0, float(place[2 * i]), float(place[2 * i + 1]), i * step) for i in range(model.cells)]
+    cells = [
+        _layered(model.beta0, float(place[2 * i]), float(place[2 * i + 1]), i * step)
+        for i in range(model.cells)
+    ]
     masses = [[shape.points[0] for shape in cell if shape.role == "mass"] for cell in cells]
-    springs = [_spring(*a, *b) for before, after in pairwise(masses) for a, b in zip(before, after, strict=True)]
+    springs = [
+        _spring(*a, *b)
+        for before, after in pairwise(masses)
+        for a, b in zip(before, after, strict=True)
+    ]
     return [shape for cell in cells for shape in cell] + springs
 
 
 def _masses(model: Model, place: np.ndarray) -> list[Shape]:
-    """A mass on a line of its own for each coordinate that is not of first order, above a mark at 0."""
+    """A mass on a line of its own for each coordinate that is not of first order, above a mark at
+    0.
+    """
     shapes: list[Shape] = []
     for i, x in enumerate(place[: len(model.moving)].tolist()):
         y = -0.8 * i

@@ -1,16 +1,19 @@
-"""The motion of a structure between its events in its eigenmodes, of which those that have died out limit no step.
+"""The motion of a structure between its events in its eigenmodes, of which those that have died out
+limit no step.
 
-While a structure keeps its contacts and the sides of its surfaces, its state obeys x' = A x + B u, with the inputs u: the
-channels of the load, 1, and the positions at which contacts hold it. In A's eigenvectors each coordinate y has an equation of
-its own,
+While a structure keeps its contacts and the sides of its surfaces, its state obeys x' = A x + B u,
+with the inputs u: the channels of the load, 1, and the positions at which contacts hold it. In A's
+eigenvectors each coordinate y has an equation of its own,
 
     y' = lambda y + f(t).
 
-Its Taylor coefficients follow forwards from its value, y_(k+1) = (lambda y_k + f_k) / (k + 1), and limit the step to a few
-1 / abs(lambda), however small y is, as what rounding leaves of it grows as fast in them. But one polynomial of the same degree n
-obeys the equation up to the power t^n, found backwards: y_k = ((k + 1) y_(k+1) - f_k) / lambda from y_n = -f_n / lambda. If the
-real part of lambda is negative, a solution differs from it by at most what it does at the start and the polynomial's last term.
-So a mode whose value is that of its polynomial to within the error that a step may make is followed on it.
+Its Taylor coefficients follow forwards from its value, y_(k+1) = (lambda y_k + f_k) / (k + 1), and
+limit the step to a few 1 / abs(lambda), however small y is, as what rounding leaves of it grows as
+fast in them. But one polynomial of the same degree n obeys the equation up to the power t^n, found
+backwards: y_k = ((k + 1) y_(k+1) - f_k) / lambda from y_n = -f_n / lambda. If the real part of
+lambda is negative, a solution differs from it by at most what it does at the start and the
+polynomial's last term. So a mode whose value is that of its polynomial to within the error that a
+step may make is followed on it.
 
 `in_modes` in `flow/kernel/steps.py` computes both, from the table that is made here.
 """
@@ -26,12 +29,15 @@ import numpy as np
 
 
 def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
-    """The table of a structure's eigenmodes that the kernel reads; empty where its own Taylor series are faster or more accurate.
+    """The table of a structure's eigenmodes that the kernel reads; empty where its own Taylor
+    series are faster or more accurate.
 
-    It begins with the number of channels and the place of a channel's series behind that of the one before. Then follow, for each
-    set of closed contacts and of surfaces on whose side +1 it is, lambda, how far a mode reaches in units of the state, the rows
-    of the inverse of the eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the reactions of the
-    contacts by eigenmodes and by inputs. The real and the imaginary part of a mode have rows of their own.
+    It begins with the number of channels and the place of a channel's series behind that of the one
+    before. Then follow, for each set of closed contacts and of surfaces on whose side +1 it is,
+    lambda, how far a mode reaches in units of the state, the rows of the inverse of the
+    eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the reactions
+    of the contacts by eigenmodes and by inputs. The real and the imaginary part of a mode have rows
+    of their own.
 
     Parameters
     ----------
@@ -45,14 +51,23 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _table(structure: Any, spacing: int) -> np.ndarray:
-    contacts, surfaces = structure.contacts, structure.surfaces
-    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12 coordinates, 5 for 40, 15 for 100.
-    if len(contacts) + len(surfaces) > 3 or longer_steps(structure) < 1.0 + len(structure.names) / 6.0:
+    contacts = structure.contacts
+    surfaces = structure.surfaces
+    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12
+    # coordinates, 5 for 40, 15 for 100.
+    if (
+        len(contacts) + len(surfaces) > 3
+        or longer_steps(structure) < 1.0 + len(structure.names) / 6.0
+    ):
         return np.zeros(0)
     blocks = [np.array([len(structure.channels), spacing, *(1.0 / np.arange(1, spacing + 1))])]
     for bits in range(1 << len(contacts) + len(surfaces)):
         closed = [c for i, c in enumerate(contacts) if bits >> i & 1]
-        pressed = [s for i, s in enumerate(surfaces) if (2 * (bits >> len(contacts) + i & 1) - 1) * s.sign > 0]
+        pressed = [
+            s
+            for i, s in enumerate(surfaces)
+            if (2 * (bits >> len(contacts) + i & 1) - 1) * s.sign > 0
+        ]
         block = _block(first_order_form(structure, closed, pressed))
         if block is None:
             return np.zeros(0)
@@ -61,37 +76,49 @@ def _table(structure: Any, spacing: int) -> np.ndarray:
 
 
 def longer_steps(structure: Any) -> float:
-    """How many times fewer steps the eigenmodes make of a period of the slowest mode with an impact in it: each mode is then
-    followed until it is 1e-10 of what it was. The modes are those with all contacts closed, without the terms that couple them.
+    """How many times fewer steps the eigenmodes make of a period of the slowest mode with an impact
+    in it: each mode is then followed until it is 1e-10 of what it was. The modes are those with all
+    contacts closed, without the terms that couple them.
     """
-    a, size = first_order_form(structure, structure.contacts, ())[0], len(structure.names)
+    a = first_order_form(structure, structure.contacts, ())[0]
+    size = len(structure.names)
     modes = np.arange(structure.local_count, size)
-    square, half = -a[size + modes, modes], -0.5 * a[size + modes, size + modes]
+    square = -a[size + modes, modes]
+    half = -0.5 * a[size + modes, size + modes]
     if not modes.size or not np.all(square > 0.0) or not np.any(half > 0.0):
         return 1.0
     root = np.sqrt((half**2 - square).astype(complex))
-    values, period = np.append(root - half, -root - half), 2.0 * math.pi / math.sqrt(square.min())
+    values = np.append(root - half, -root - half)
+    period = 2.0 * math.pi / math.sqrt(square.min())
     with np.errstate(divide="ignore"):
         lives = np.minimum(period, 23.0 / np.maximum(-values.real, 0.0))
     order = np.argsort(-lives)
-    fastest, ends = np.maximum.accumulate(np.abs(values[order])), lives[order]
+    fastest = np.maximum.accumulate(np.abs(values[order]))
+    ends = lives[order]
     return float(period * fastest[-1] / np.sum(fastest * (ends - np.append(ends[1:], 0.0))))
 
 
-def first_order_form(structure: Any, closed: Sequence[Any], pressed: Sequence[Any]) -> tuple[np.ndarray, ...]:
-    """A, B, P and Q of x' = A x + B u and of the reactions P x + Q u, (contacts,), while some contacts are closed. The
-    state x has the coordinates, then their rates; u has the channels of the load, 1, and the local displacements, of which
-    those that are held act.
+def first_order_form(
+    structure: Any, closed: Sequence[Any], pressed: Sequence[Any]
+) -> tuple[np.ndarray, ...]:
+    """A, B, P and Q of x' = A x + B u and of the reactions P x + Q u, (contacts,), while some
+    contacts are closed. The state x has the coordinates, then their rates; u has the channels of
+    the load, 1, and the local displacements, of which those that are held act.
 
     Parameters
     ----------
     closed, pressed
-        The contacts that hold their coordinates, and the surfaces on whose side +1 the structure is.
+        The contacts that hold their coordinates, and the surfaces on whose side +1 the structure
+        is.
     """
-    modes, local = vars(structure)["_modes"], structure.form[0]
-    m, n = len(local), len(structure.names)
-    mass, push = np.eye(n), np.zeros((n, 1))
-    stiffness, damping = np.array(modes.stiffness), np.zeros((n, n)) if modes.damping is None else np.array(modes.damping)
+    modes = vars(structure)["_modes"]
+    local = structure.form[0]
+    m = len(local)
+    n = len(structure.names)
+    mass = np.eye(n)
+    push = np.zeros((n, 1))
+    stiffness = np.array(modes.stiffness)
+    damping = np.zeros((n, n)) if modes.damping is None else np.array(modes.damping)
     mass[:m, :m] = modes.mass
     if not modes.coupled:  # but for rounding
         damping[m:, m:] = np.diag(np.diag(damping[m:, m:]))
@@ -124,9 +151,14 @@ def _block(form: Any) -> np.ndarray | None:
     if made is None:
         return None
     values, vectors, inverse = made
-    size, count = len(a), len(moving)
-    table = {name: np.zeros(shape) for name, shape in (("value", (size, 2)), ("reach", size), ("to", (size, size)))}
-    back, row = np.zeros((size, size)), 0
+    size = len(a)
+    count = len(moving)
+    table = {
+        name: np.zeros(shape)
+        for name, shape in (("value", (size, 2)), ("reach", size), ("to", (size, size)))
+    }
+    back = np.zeros((size, size))
+    row = 0
     for value, vector, left in zip(values, vectors.T, inverse, strict=True):
         if value.imag < 0.0:
             continue
@@ -138,21 +170,30 @@ def _block(form: Any) -> np.ndarray | None:
         for ahead, behind in parts:
             table["value"][row] = value.real, value.imag
             table["reach"][row] = 2.0 * np.abs(vector).max()
-            table["to"][row, moving], back[moving, row] = ahead, behind
+            table["to"][row, moving] = ahead
+            back[moving, row] = behind
             row += 1
     assert row == count
-    inputs, held = table["to"] @ b, reactions @ back
-    return np.concatenate([x.ravel() for x in (*table.values(), back[: size // 2], inputs, held, by_inputs)])
+    inputs = table["to"] @ b
+    held = reactions @ back
+    return np.concatenate(
+        [x.ravel() for x in (*table.values(), back[: size // 2], inputs, held, by_inputs)]
+    )
 
 
 def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Eigenvalues, eigenvectors and their inverse; None where two of one shape nearly agree, as with critical damping.
+    """Eigenvalues, eigenvectors and their inverse; None where two of one shape nearly agree, as
+    with critical damping.
 
-    Those of slow modes have errors of the rounding of the fastest one. Residuals in extended precision, where the machine has
-    it, give their corrections. Modes of different shapes may be as close as they like: what then couples them is rounding.
+    Those of slow modes have errors of the rounding of the fastest one. Residuals in extended
+    precision, where the machine has it, give their corrections. Modes of different shapes may be as
+    close as they like: what then couples them is rounding.
     """
     values, vectors = np.linalg.eig(a)
-    exact, shapes, real, half = values.astype(np.clongdouble), vectors.astype(np.clongdouble), values.imag == 0.0, len(a) // 2
+    exact = values.astype(np.clongdouble)
+    shapes = vectors.astype(np.clongdouble)
+    real = values.imag == 0.0
+    half = len(a) // 2
     known = [(np.flatnonzero(row), row[row != 0.0].astype(np.longdouble)) for row in a]
     if not np.linalg.cond(vectors) < 1.0 / np.finfo(float).eps:
         return None
@@ -160,7 +201,9 @@ def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None
         moved = np.array([row @ shapes[columns] for columns, row in known])
         error = np.linalg.solve(shapes.astype(complex), (moved - shapes * exact).astype(complex))
         apart = (exact[None, :] - exact[:, None]).astype(complex)
-        turned = np.divide(error, apart, out=np.zeros_like(error), where=np.abs(error) < 1e-3 * np.abs(apart))
+        turned = np.divide(
+            error, apart, out=np.zeros_like(error), where=np.abs(error) < 1e-3 * np.abs(apart)
+        )
         exact = exact + np.diag(error)
         exact[real] = exact[real].real
         shapes = shapes + shapes.astype(complex) @ turned
@@ -168,5 +211,7 @@ def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None
     vectors = shapes.astype(complex)
     inverse = np.linalg.inv(vectors)
     parts = ((vectors[part], inverse[:, part]) for part in (slice(half), slice(half, None)))
-    amplified = sum(np.linalg.norm(one, axis=0) * np.linalg.norm(other, axis=1) for one, other in parts)
+    amplified = sum(
+        np.linalg.norm(one, axis=0) * np.linalg.norm(other, axis=1) for one, other in parts
+    )
     return (exact.astype(complex), vectors, inverse) if np.all(amplified < 1e4) else None

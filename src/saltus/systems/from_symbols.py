@@ -1,7 +1,8 @@
-"""Models from expressions of SymPy: M(q) q'' = f(t, q, q') with contacts, as classes with a number for each parameter.
+"""Models from expressions of SymPy: M(q) q'' = f(t, q, q') with contacts, as classes with a number
+for each parameter.
 
-Nothing here imports SymPy before it is asked for a model. A class keeps its equations as Python's text, of which it is made anew
-in another process; SymPy is not needed there.
+Nothing here imports SymPy before it is asked for a model. A class keeps its equations as Python's
+text, of which it is made anew in another process; SymPy is not needed there.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from saltus.systems.serial import MODELS
 
 @dataclass(frozen=True)
 class _Equations:
-    """The parts of a class as text, in which `q`, `v`, `p` and `c` are coordinates, velocities, parameters and channels."""
+    """The parts of a class as text, in which `q`, `v`, `p` and `c` are coordinates, velocities,
+    parameters and channels.
+    """
 
     name: str
     coordinates: tuple[str, ...]
@@ -46,19 +49,22 @@ def from_sympy(
     contacts: Sequence[Contact] = (),
     name: str | None = None,
 ) -> ContactModel:
-    """A model M(q) q'' = f(t, q, q') from expressions of SymPy, or from `LagrangesMethod` or `KanesMethod` of its mechanics.
+    """A model M(q) q'' = f(t, q, q') from expressions of SymPy, or from `LagrangesMethod` or
+    `KanesMethod` of its mechanics.
 
-    The coordinates have the names of their symbols, and each parameter is a number of the model with its symbol's name. A
-    system with the model is written to files as others are; in another process call this function with the same equations and
-    `name` before such a file is read.
+    The coordinates have the names of their symbols, and each parameter is a number of the model
+    with its symbol's name. A system with the model is written to files as others are; in another
+    process call this function with the same equations and `name` before such a file is read.
 
     Parameters
     ----------
     equations
-        A `LagrangesMethod` or a `KanesMethod`, of which coordinates, mass matrix and forces are read, in place of the next four.
-        The speeds of a `KanesMethod` must be the rates of its coordinates.
+        A `LagrangesMethod` or a `KanesMethod`, of which coordinates, mass matrix and forces are
+        read, in place of the next four. The speeds of a `KanesMethod` must be the rates of its
+        coordinates.
     coordinates
-        The symbols of the coordinates: functions of time, `dynamicsymbols("x y")`, or plain symbols.
+        The symbols of the coordinates: functions of time, `dynamicsymbols("x y")`, or plain
+        symbols.
     velocities
         For plain symbols, those of their rates; of a function of time the rate is its derivative.
     mass
@@ -72,13 +78,15 @@ def from_sympy(
     contacts
         Contacts, with coordinates by name; a position may be an expression of the parameters.
     name
-        The name of the model's class, which no model with other equations has; by default FromSympy with a digest of them.
+        The name of the model's class, which no model with other equations has; by default FromSympy
+        with a digest of them.
 
     Raises
     ------
     ParameterError
-        SymPy is not installed; an argument is of another type; an expression has a symbol that is none of these; a mass matrix is
-        of another size or depends on velocities; a name that another model has.
+        SymPy is not installed; an argument is of another type; an expression has a symbol that is
+        none of these; a mass matrix is of another size or depends on velocities; a name that
+        another model has.
 
     Examples
     --------
@@ -101,8 +109,12 @@ def from_sympy(
         for symbol in sorted(given.free_symbols, key=str):
             if symbol not in names.values() or str(symbol)[0] not in allowed:
                 known = ", ".join(map(str, [*coordinates, *parameters]))
-                raise ParameterError(f"{what} has {shown(str(symbol))}, which is none of {known}", what)
-        printer = sympy.printing.numpy.NumPyPrinter({"fully_qualified_modules": False, "allow_unknown_functions": True})
+                raise ParameterError(
+                    f"{what} has {shown(str(symbol))}, which is none of {known}", what
+                )
+        printer = sympy.printing.numpy.NumPyPrinter(
+            {"fully_qualified_modules": False, "allow_unknown_functions": True}
+        )
         return str(printer.doprint(given))
 
     count = len(coordinates)
@@ -110,7 +122,10 @@ def from_sympy(
     forces = list(force) if isinstance(force, (Sequence, sympy.MatrixBase)) else [force]
     if rows.shape != (count, count) or len(forces) != count:
         raise ParameterError(
-            f"{count} coordinates need a mass matrix of {count} rows and {count} forces, got {rows.shape} and {len(forces)}",
+            (
+                f"{count} coordinates need a mass matrix of {count} rows and {count} forces, got "
+                f"{rows.shape} and {len(forces)}"
+            ),
             "force",
         )
     made = _Equations(
@@ -124,8 +139,12 @@ def from_sympy(
         tuple(text("contacts", contact.position, "p") for contact in contacts),
     )
     if name is None:
-        made = replace(made, name=f"FromSympy_{hashlib.sha256(repr(made).encode()).hexdigest()[:8]}")
-    model: ContactModel = _class_of(made)(**{_name_of(key): value for key, value in parameters.items()})
+        made = replace(
+            made, name=f"FromSympy_{hashlib.sha256(repr(made).encode()).hexdigest()[:8]}"
+        )
+    model: ContactModel = _class_of(made)(
+        **{_name_of(key): value for key, value in parameters.items()}
+    )
     return model
 
 
@@ -134,37 +153,61 @@ def _sympy() -> Any:
         import sympy
         import sympy.printing.numpy
     except ImportError:
-        raise ParameterError('from_sympy needs SymPy: pip install "saltus[sympy]"', "equations") from None
+        raise ParameterError(
+            'from_sympy needs SymPy: pip install "saltus[sympy]"', "equations"
+        ) from None
     return sympy
 
 
-def _check_types(sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any) -> None:
+def _check_types(
+    sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any
+) -> None:
     """Refuse what holds no symbols."""
     for what, given in (("parameters", parameters), ("channels", channels)):
         if not isinstance(given, Mapping):
-            raise ParameterError(f"{what} must be a dictionary such as {{k: 4.0}}, got {shown(given)}", what)
-    for what, given in (("coordinates", coordinates), ("velocities", velocities), ("channels", list(channels.values()))):
-        if not isinstance(given, Sequence) or not all(isinstance(each, sympy.Basic) for each in given):
-            raise ParameterError(f"{what} must be symbols of SymPy, such as [x], got {shown(given)}", what)
+            raise ParameterError(
+                f"{what} must be a dictionary such as {{k: 4.0}}, got {shown(given)}", what
+            )
+    for what, given in (
+        ("coordinates", coordinates),
+        ("velocities", velocities),
+        ("channels", list(channels.values())),
+    ):
+        if not isinstance(given, Sequence) or not all(
+            isinstance(each, sympy.Basic) for each in given
+        ):
+            raise ParameterError(
+                f"{what} must be symbols of SymPy, such as [x], got {shown(given)}", what
+            )
 
 
 def _read_method(equations: Any) -> tuple[Any, Any, Any, Any]:
     """Coordinates, velocities, mass matrix and forces of a method of SymPy's mechanics."""
     try:
-        coordinates, mass, force = list(equations.q), equations.mass_matrix, equations.forcing
+        coordinates = list(equations.q)
+        mass = equations.mass_matrix
+        force = equations.forcing
         kinematics = getattr(equations, "kindiffdict", None)  # of a KanesMethod alone
         speeds, rates = (list(equations.u), kinematics()) if kinematics else ([], {})
     except (AttributeError, ValueError, TypeError) as error:
         raise ParameterError(
-            f"equations must be a LagrangesMethod or a KanesMethod whose equations are formed, got {shown(equations)} ({error})",
+            (
+                "equations must be a LagrangesMethod or a KanesMethod whose equations are formed, "
+                f"got {shown(equations)} ({error})"
+            ),
             "equations",
         ) from None
     if any(rate != speed for rate, speed in zip(rates.values(), speeds, strict=False)):
-        raise ParameterError("the speeds of the KanesMethod must be the rates of its coordinates, u = q'", "equations")
+        raise ParameterError(
+            "the speeds of the KanesMethod must be the rates of its coordinates, u = q'",
+            "equations",
+        )
     return coordinates, speeds, mass, force
 
 
-def _replacements(sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any) -> tuple[Any, dict[Any, Any]]:
+def _replacements(
+    sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any
+) -> tuple[Any, dict[Any, Any]]:
     """What each symbol becomes in the text, derivatives first; and the symbols of the text."""
     names: dict[Any, Any] = {}
     for i, each in enumerate(coordinates):
@@ -174,19 +217,30 @@ def _replacements(sympy: Any, coordinates: Any, velocities: Any, parameters: Any
         if len(velocities) > i:
             names[velocities[i]] = sympy.Symbol(f"v[{i}]")
         elif not each.args:
-            raise ParameterError(f"velocities must have the rate of each coordinate, and {each} has none", "velocities")
+            raise ParameterError(
+                f"velocities must have the rate of each coordinate, and {each} has none",
+                "velocities",
+            )
     names |= {symbol: sympy.Symbol(f"c[{channel!r}]") for channel, symbol in channels.items()}
     for symbol in parameters:
         found = _name_of(symbol)
         if not found.isidentifier() or found.startswith("_"):
-            raise ParameterError(f"a parameter must have a name as Python's, got {shown(found)}", "parameters")
-        names[sympy.Symbol(symbol) if isinstance(symbol, str) else symbol] = sympy.Symbol(f"p.{found}")
+            raise ParameterError(
+                f"a parameter must have a name as Python's, got {shown(found)}", "parameters"
+            )
+        names[sympy.Symbol(symbol) if isinstance(symbol, str) else symbol] = sympy.Symbol(
+            f"p.{found}"
+        )
     return sorted(names.items(), key=lambda pair: not pair[0].is_Derivative), names
 
 
 def _name_of(symbol: Any) -> str:
     """The name of a symbol, or of a function of time."""
-    return symbol if isinstance(symbol, str) else str(getattr(symbol, "func", symbol) if symbol.args else symbol)
+    return (
+        symbol
+        if isinstance(symbol, str)
+        else str(getattr(symbol, "func", symbol) if symbol.args else symbol)
+    )
 
 
 _CLASSES: dict[str, Any] = {}  # by their equations, so that equal equations are one class
@@ -198,12 +252,18 @@ def _class_of(made: _Equations) -> Any:
         return _CLASSES[repr(made)]
     if made.name in MODELS:
         raise ParameterError(
-            f"there is a model {shown(made.name)} with other equations already; give this one another name", "name"
+            (
+                f"there is a model {shown(made.name)} with other equations already; give this one "
+                "another name"
+            ),
+            "name",
         )
     if not re.fullmatch(r"[A-Za-z]\w*", made.name):
         raise ParameterError(f"name must be one as Python's, got {shown(made.name)}", "name")
-    one, size = len(made.coordinates) == 1, len(made.coordinates)
-    pushed, masses = _compiled("q, v, p, c", made.force), _compiled("q, p", made.mass)
+    one = len(made.coordinates) == 1
+    size = len(made.coordinates)
+    pushed = _compiled("q, v, p, c", made.force)
+    masses = _compiled("q, p", made.mass)
     places = _compiled("p", made.positions)
 
     def rows(self: Any, theta: Any) -> Any:
@@ -216,18 +276,33 @@ def _class_of(made: _Equations) -> Any:
         return given[0] if one else tuple(given)
 
     def energy(self: Any, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
-        mass, rates = masses((theta,) if one else theta, self), (velocity,) if one else velocity
-        return 0.5 * sum(mass[size * i + j] * rates[i] * rates[j] for i in range(size) for j in range(size))
+        mass = masses((theta,) if one else theta, self)
+        rates = (velocity,) if one else velocity
+        return 0.5 * sum(
+            mass[size * i + j] * rates[i] * rates[j] for i in range(size) for j in range(size)
+        )
 
     def touching(self: Any) -> tuple[Contact, ...]:
-        return tuple(replace(each, position=at) for each, at in zip(made.contacts, places(self), strict=True))
+        return tuple(
+            replace(each, position=at) for each, at in zip(made.contacts, places(self), strict=True)
+        )
 
-    body: dict[str, Any] = {"coordinates": made.coordinates, "channels": made.channels, "mass_matrix": rows, "force": push}
+    body: dict[str, Any] = {
+        "coordinates": made.coordinates,
+        "channels": made.channels,
+        "mass_matrix": rows,
+        "force": push,
+    }
     body |= {"kinetic_energy": energy, "contacts": property(touching), "__module__": __name__}
     body["__post_init__"] = lambda self: settle_numbers(self, *made.parameters)
-    body["__reduce__"] = lambda self: (_made_again, (made, {name: getattr(self, name) for name in made.parameters}))
+    body["__reduce__"] = lambda self: (
+        _made_again,
+        (made, {name: getattr(self, name) for name in made.parameters}),
+    )
     fields = [(name, float) for name in made.parameters]
-    found = make_dataclass(made.name, fields, bases=(ContactModel,), namespace=body, frozen=True, kw_only=True)
+    found = make_dataclass(
+        made.name, fields, bases=(ContactModel,), namespace=body, frozen=True, kw_only=True
+    )
     found.__doc__ = f"{made.name}, a model from expressions of SymPy."
     _CLASSES[repr(made)] = MODELS[made.name] = found
     return found
@@ -240,4 +315,5 @@ def _made_again(made: _Equations, numbers: dict[str, float]) -> Any:
 
 def _compiled(arguments: str, texts: tuple[str, ...]) -> Any:
     """A function that returns the values of texts, of which functions are NumPy's."""
-    return eval(f"lambda {arguments}: [{', '.join(texts)}]", dict(vars(np)))  # texts that SymPy has printed
+    # texts that SymPy has printed
+    return eval(f"lambda {arguments}: [{', '.join(texts)}]", dict(vars(np)))

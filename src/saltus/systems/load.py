@@ -12,7 +12,8 @@ from saltus.systems.signals import Record, Signal, as_signal, scaled
 
 
 class Channel:
-    """One channel of a load at work: `channel(t)` is its value, `.velocity(t)` and `.acceleration(t)` its derivatives.
+    """One channel of a load at work: `channel(t)` is its value, `.velocity(t)` and
+    `.acceleration(t)` its derivatives.
 
     `t` is the dimensionless time tau: a number, an array, or the symbolic time of a traced model.
 
@@ -32,7 +33,8 @@ class Channel:
     __slots__ = ("_frequency", "_signal")
 
     def __init__(self, signal: Signal | None, frequency: Any) -> None:
-        self._signal, self._frequency = signal, frequency
+        self._signal = signal
+        self._frequency = frequency
 
     def __repr__(self) -> str:
         return "a load channel (call it with the time, as in load.horizontal(t))"
@@ -67,22 +69,25 @@ class Channel:
 
 @dataclass(frozen=True, init=False, repr=False)
 class Load:
-    """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H), vertical=-0.5)`.
+    """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H),
+    vertical=-0.5)`.
 
-    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of them, which may be written as a
-    list; a channel that is not named is 0. Channels that begin with `ground` are displacements of the ground (zeta, nu), all
-    others forces. Frozen.
+    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of
+    them, which may be written as a list; a channel that is not named is 0. Channels that begin with
+    `ground` are displacements of the ground (zeta, nu), all others forces. Frozen.
 
-    The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=-0.5)`;
-    (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z), vertical=-0.5)`; (iii) `loadpathb`,
-    `Load(frequency=W, horizontal=Harmonic(amplitude=H), vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=pi/2))`.
+    The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H),
+    vertical=-0.5)`; (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z),
+    vertical=-0.5)`; (iii) `loadpathb`, `Load(frequency=W, horizontal=Harmonic(amplitude=H),
+    vertical=Harmonic(mean=-0.5, amplitude=0.25, phase=pi/2))`.
 
     Parameters
     ----------
     frequency
         The base angular frequency Omega > 0 of every harmonic, or None for a load without a period.
     channels
-        A `Signal`, a number or a list of them for each channel by its name, such as horizontal=-0.5.
+        A `Signal`, a number or a list of them for each channel by its name, such as
+        horizontal=-0.5.
 
     Raises
     ------
@@ -99,16 +104,26 @@ class Load:
     frequency: float | None
     channels: dict[str, Signal]
 
-    def __init__(self, *, frequency: float | None = None, **channels: Signal | float | list[Any] | tuple[Any, ...]) -> None:
+    def __init__(
+        self,
+        *,
+        frequency: float | None = None,
+        **channels: Signal | float | list[Any] | tuple[Any, ...],
+    ) -> None:
         signals = {name: as_signal(value, f"load.{name}") for name, value in channels.items()}
         if frequency is not None:
             check_number("load.frequency", frequency, above=0.0)
             frequency = float(frequency)
             if not 2.0 * math.pi / frequency < 1e300:
-                raise ParameterError(f"load.frequency must make a finite forcing period, got {frequency!r}", "load.frequency")
+                raise ParameterError(
+                    f"load.frequency must make a finite forcing period, got {frequency!r}",
+                    "load.frequency",
+                )
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
-                raise ParameterError(f"load.{name} is harmonic, so load.frequency must be given", f"load.{name}")
+                raise ParameterError(
+                    f"load.{name} is harmonic, so load.frequency must be given", f"load.{name}"
+                )
             _check_quantity(name, signal)
         object.__setattr__(self, "frequency", frequency)
         object.__setattr__(self, "channels", signals)
@@ -119,12 +134,16 @@ class Load:
         return Channel(self.channels.get(name), self.frequency)
 
     def __hash__(self) -> int:
-        return hash((self.frequency, tuple(sorted(self.channels.items(), key=lambda item: item[0]))))
+        return hash(
+            (self.frequency, tuple(sorted(self.channels.items(), key=lambda item: item[0])))
+        )
 
     def __repr__(self) -> str:
         parts = [] if self.frequency is None else [f"frequency={self.frequency!r}"]
         for name, signal in self.channels.items():
-            value = getattr(signal, "value", signal) if type(signal).__name__ == "Constant" else signal
+            value = (
+                getattr(signal, "value", signal) if type(signal).__name__ == "Constant" else signal
+            )
             parts.append(f"{name}={value!r}")
         return f"Load({', '.join(parts)})"
 
@@ -135,15 +154,21 @@ class Load:
 
 
 class DeclaredLoad:
-    """A load as its model may read it: it has only the channels that the model declares, and a misspelt name is not read as 0."""
+    """A load as its model may read it: it has only the channels that the model declares, and a
+    misspelt name is not read as 0.
+    """
 
     def __init__(self, load: Any, model: Any) -> None:
-        self._load, self._model = load, model
+        self._load = load
+        self._model = model
 
     def __getattr__(self, name: str) -> Any:
         channels = self._model.channels
         if name not in (*channels, "frequency", "period"):
-            raise TraceError(f"{type(self._model).__name__} reads load.{name}, not one of its channels; {near(name, channels)}")
+            raise TraceError(
+                f"{type(self._model).__name__} reads load.{name}, not one of its channels; "
+                f"{near(name, channels)}"
+            )
         return getattr(self._load, name)
 
 
@@ -151,14 +176,24 @@ def _check_quantity(name: str, signal: Signal) -> None:
     terms: Any = getattr(signal, "terms", (signal,))
     for term in terms:
         if term.once and (term.quantity == "force") == name.startswith("ground"):
-            wanted = "displacement, velocity or acceleration" if name.startswith("ground") else "force"
+            wanted = (
+                "displacement, velocity or acceleration" if name.startswith("ground") else "force"
+            )
             kind = "record" if isinstance(term, Record) else type(term).__name__
-            raise ParameterError(f"load.{name} takes a {kind} of {wanted}, got quantity={term.quantity!r}", f"load.{name}")
+            raise ParameterError(
+                f"load.{name} takes a {kind} of {wanted}, got quantity={term.quantity!r}",
+                f"load.{name}",
+            )
 
 
 def reversed_load(load: Load, *endings: str) -> Load:
-    """A load in which the channels whose names have one of these endings, such as "horizontal", have the other sign."""
-    signals = {name: scaled(signal, -1.0) if name.endswith(endings) else signal for name, signal in load.channels.items()}
+    """A load in which the channels whose names have one of these endings, such as "horizontal",
+    have the other sign.
+    """
+    signals = {
+        name: scaled(signal, -1.0) if name.endswith(endings) else signal
+        for name, signal in load.channels.items()
+    }
     return Load(frequency=load.frequency, **signals)
 
 
@@ -175,7 +210,8 @@ class LoadOnSides:
     """A load together with the sides on which the equations are asked for."""
 
     def __init__(self, load: Any, sides: Sides) -> None:
-        self._load, self.sides = load, sides
+        self._load = load
+        self.sides = sides
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._load, name)

@@ -1,4 +1,6 @@
-"""The metainterface: the numbers of a cell, and its reduced model with one layer open at a time (paper, `gov_eqn_theta_long`)."""
+"""The metainterface: the numbers of a cell, and its reduced model with one layer open at a time
+(paper, `gov_eqn_theta_long`).
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LayeredCell(Model):
-    """A cell of two layers, the lower one with the index 1 and the upper one with 2, dimensionless (paper, `m_k_ratio`)."""
+    """A cell of two layers, the lower one with the index 1 and the upper one with 2, dimensionless
+    (paper, `m_k_ratio`).
+    """
 
     beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
     damping: float = 0.0  # C, at least 0
@@ -49,21 +53,25 @@ class LayeredCell(Model):
 class Metainterface(LayeredCell, OneContactModel):
     """The single-degree-of-freedom metainterface (paper, `gov_eqn_theta_long`).
 
-    theta > 0 is the lower layer open (side s = +1, P = 1), theta < 0 the upper one (s = -1, P = 0); dimensionless time tau:
+    theta > 0 is the lower layer open (side s = +1, P = 1), theta < 0 the upper one (s = -1, P = 0);
+    dimensionless time tau:
 
         (1+m)^P theta'' + c^P C theta' + k^P theta =
               sin(abs(theta) + beta0) [(1+h)^P H - (1+m)^P zeta'']
           + s cos(abs(theta) + beta0) [(1+v)^P V - (1+m)^P nu'']
 
-    The channels `horizontal`, `vertical` are H, V on the upper mass, `lower_horizontal`, `lower_vertical` are h H, v V on the
-    lower one, `ground_horizontal`, `ground_vertical` the displacements zeta, nu of the ground.
+    The channels `horizontal`, `vertical` are H, V on the upper mass, `lower_horizontal`,
+    `lower_vertical` are h H, v V on the lower one, `ground_horizontal`, `ground_vertical` the
+    displacements zeta, nu of the ground.
 
-    Margins, at which a motion may be asked to stop: `line_limit`, pi - beta0 - abs(theta) (`line_cond`, n = 1);
-    `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes again (errata 20); `reaction`, the closed
-    layer's reaction, positive while it keeps the layer closed (errata 21): with the lower layer open
-    -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0
-    >= 0, with the upper one open R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
-    - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
+    Margins, at which a motion may be asked to stop: `line_limit`, pi - beta0 - abs(theta)
+    (`line_cond`, n = 1); `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes
+    again (errata 20); `reaction`, the closed layer's reaction, positive while it keeps the layer
+    closed (errata 21): with the lower layer open -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 +
+    theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0, with the upper one open R1
+    = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
+    - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one
+      of `eomnl`.
 
     Parameters
     ----------
@@ -78,7 +86,8 @@ class Metainterface(LayeredCell, OneContactModel):
     dissipation_ratio
         c = C1 / C2, at least 0.
     smoothing
-        B, if sgn(theta) is to be replaced by tanh(B theta / 2) (`smoothing`); None keeps the exact sign.
+        B, if sgn(theta) is to be replaced by tanh(B theta / 2) (`smoothing`); None keeps the exact
+        sign.
 
     Examples
     --------
@@ -107,11 +116,14 @@ class Metainterface(LayeredCell, OneContactModel):
                 )
 
     def check_load(self, load: Load) -> None:
-        """Refuse loads on the lower layer with a smoothed sign, which makes no difference between the layers (errata 18)."""
+        """Refuse loads on the lower layer with a smoothed sign, which makes no difference between
+        the layers (errata 18).
+        """
         for name in ("lower_horizontal", "lower_vertical"):
             if self.smoothing is not None and not vanishes(load.channels.get(name, Constant(0.0))):
                 raise ParameterError(
-                    f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them", f"load.{name}"
+                    f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them",
+                    f"load.{name}",
                 )
 
     @property
@@ -120,11 +132,16 @@ class Metainterface(LayeredCell, OneContactModel):
         return (1, -1) if self.smoothing is None else ()
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """theta'' of `gov_eqn_theta_long`, with `side` or, with `smoothing`, tanh(B theta / 2) in place of sgn(theta)."""
+        """theta'' of `gov_eqn_theta_long`, with `side` or, with `smoothing`, tanh(B theta / 2) in
+        place of sgn(theta).
+        """
         if self.smoothing is None:
-            lower, sign, size = (1 + side) / 2, side, abs(theta)
+            lower = (1 + side) / 2
+            sign = side
+            size = abs(theta)
         else:
-            lower, sign = 0.0, np.tanh(theta * (self.smoothing / 2))
+            lower = 0.0
+            sign = np.tanh(theta * (self.smoothing / 2))
             size = theta * sign
         mass = 1 + self.mass_ratio * lower
         damping = self.damping * (1 + (self.dissipation_ratio - 1) * lower)
@@ -134,26 +151,38 @@ class Metainterface(LayeredCell, OneContactModel):
         return (push - damping * velocity - stiffness * theta) / mass
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
-        """T / K2 of `kin_eng` with the other layer closed (errata 5): with x' = zeta' + theta' sin(beta0 + abs(theta)),
-        y' = nu' + s theta' cos(beta0 + abs(theta)), (1+m)/2 (x'^2 + y'^2) on the lower layer and
-        m/2 (zeta'^2 + nu'^2) + (x'^2 + y'^2)/2 on the upper one.
+        """T / K2 of `kin_eng` with the other layer closed (errata 5): with x' = zeta' + theta'
+        sin(beta0 + abs(theta)), y' = nu' + s theta' cos(beta0 + abs(theta)), (1+m)/2 (x'^2 + y'^2)
+        on the lower layer and m/2 (zeta'^2 + nu'^2) + (x'^2 + y'^2)/2 on the upper one.
         """
-        lower, m = (1 + side) / 2, self.mass_ratio
-        zeta, nu = load.ground_horizontal.velocity(t), load.ground_vertical.velocity(t)
+        lower = (1 + side) / 2
+        m = self.mass_ratio
+        zeta = load.ground_horizontal.velocity(t)
+        nu = load.ground_vertical.velocity(t)
         angle = self.beta0 + side * theta
         x = zeta + velocity * np.sin(angle)
         y = nu + side * velocity * np.cos(angle)
         return (1 + m * lower) / 2 * (x * x + y * y) + m * (1 - lower) / 2 * (zeta * zeta + nu * nu)
 
     def inelastic_factor(self, side: Any) -> Any:
-        """-cos(2 beta0) from lower to upper, -cos(2 beta0) / (1+m) back, and 0 outside 45 to 135 degrees (errata 25)."""
+        """-cos(2 beta0) from lower to upper, -cos(2 beta0) / (1+m) back, and 0 outside 45 to 135
+        degrees (errata 25).
+        """
         mass = 1 + self.mass_ratio * (1 - side) / 2
         return np.maximum(-np.cos(2 * self.beta0), 0.0) / mass
 
-    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
-        """The straight line, the kinematic limit and the closed layer's reaction; all positive in the mechanism."""
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
+    ) -> dict[str, Any]:
+        """The straight line, the kinematic limit and the closed layer's reaction; all positive in
+        the mechanism.
+        """
         opening = math.pi - self.beta0
-        size = side * theta if self.smoothing is None else theta * np.tanh(theta * (self.smoothing / 2))
+        size = (
+            side * theta
+            if self.smoothing is None
+            else theta * np.tanh(theta * (self.smoothing / 2))
+        )
         margins = {"line_limit": opening - size, "kinematic_limit": 2 * opening - size}
         if self.smoothing is None:
             across, along = self._forces(t, (1 - side) / 2, load)
@@ -167,7 +196,9 @@ class Metainterface(LayeredCell, OneContactModel):
         return margins
 
     def mirror(self, load: Load) -> Load | None:
-        """The load with every horizontal channel reversed, for k = c = 1+m = 1+h = 1+v (errata 18); None otherwise."""
+        """The load with every horizontal channel reversed, for k = c = 1+m = 1+h = 1+v (errata 18);
+        None otherwise.
+        """
         ratio = 1 + self.mass_ratio
         channels = load.channels
         same = self.stiffness_ratio == ratio and self.dissipation_ratio == ratio
@@ -181,8 +212,16 @@ class Metainterface(LayeredCell, OneContactModel):
     def _forces(self, t: Any, lower: Any, load: Load) -> tuple[Any, Any]:
         """[(1+h)^P H - (1+m)^P zeta''] and [(1+v)^P V - (1+m)^P nu''], with P = `lower`."""
         mass = 1 + self.mass_ratio * lower
-        across = load.horizontal(t) + lower * load.lower_horizontal(t) - mass * load.ground_horizontal.acceleration(t)
-        along = load.vertical(t) + lower * load.lower_vertical(t) - mass * load.ground_vertical.acceleration(t)
+        across = (
+            load.horizontal(t)
+            + lower * load.lower_horizontal(t)
+            - mass * load.ground_horizontal.acceleration(t)
+        )
+        along = (
+            load.vertical(t)
+            + lower * load.lower_vertical(t)
+            - mass * load.ground_vertical.acceleration(t)
+        )
         return across, along
 
 

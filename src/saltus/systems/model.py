@@ -24,35 +24,44 @@ class MarginKind(StrEnum):
     """
 
     LANDMARK = "landmark"  #: a place worth a mark: the mechanism goes on through it
-    ASSUMPTION = "assumption"  #: an assumption of the model fails: the mechanism does something else
+    # : an assumption of the model fails: the mechanism does something else
+    ASSUMPTION = "assumption"
     LIMIT = "limit"  #: the mechanism has no such positions
 
 
 class Count(int):
-    """A whole number of a part of a system that says how many of something there are, such as cells: it belongs to the structure,
-    as names do, and is none of the numbers that have dotted paths and vary."""
+    """A whole number of a part of a system that says how many of something there are, such as
+    cells: it belongs to the structure, as names do, and is none of the numbers that have dotted
+    paths and vary."""
 
     __slots__ = ()
 
 
 class Model:
-    """A smooth oscillator, and what all models share. Subclass it as a frozen, keyword-only dataclass of numbers and give it:
+    """A smooth oscillator, and what all models share. Subclass it as a frozen, keyword-only
+    dataclass of numbers and give it:
 
-    1. `coordinates`, the names of its degrees of freedom, their `units` ("1" where it gives none), and `channels`, the load
-       channels that it reads; in `first_order` those of the coordinates, the last ones, whose rates follow from the state, as
-       those of a voltage or a temperature: what the model returns for such a coordinate is its rate in place of an acceleration;
-    2. `acceleration`, an expression of numbers, NumPy functions, load channels and `abs` of the coordinate. It is traced
+    1. `coordinates`, the names of its degrees of freedom, their `units` ("1" where it gives none),
+       and `channels`, the load
+       channels that it reads; in `first_order` those of the coordinates, the last ones, whose rates
+       follow from the state, as those of a voltage or a temperature: what the model returns for
+       such a coordinate is its rate in place of an acceleration;
+    2. `acceleration`, an expression of numbers, NumPy functions, load channels and `abs` of the
+       coordinate. It is traced
        once with symbols into a Taylor recurrence, so it may not branch on the state;
-    3. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact laws that need
-       it), `margins` (what must stay positive), `margin_kinds` (what it means to pass them; an assumption that fails where
-       a margin has none), `stops` (the margins that end a motion unasked), `check_load`, and `damping`, the coefficient of
-       the velocity in the equation of motion.
+    3. optionally `mirror` (the symmetry that maps motions to motions), `kinetic_energy` (for impact
+       laws that need
+       it), `margins` (what must stay positive), `margin_kinds` (what it means to pass them; an
+       assumption that fails where a margin has none), `stops` (the margins that end a motion
+       unasked), `check_load`, and `damping`, the coefficient of the velocity in the equation of
+       motion.
 
-    A model whose motion crosses a contact or is turned back by a wall is an `OneContactModel`. One with several contacts, with
-    contacts that hold single coordinates, or with dry friction is a `ContactModel`. Each has a contract of its own.
+    A model whose motion crosses a contact or is turned back by a wall is an `OneContactModel`. One
+    with several contacts, with contacts that hold single coordinates, or with dry friction is a
+    `ContactModel`. Each has a contract of its own.
 
-    Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate, the velocity and the
-    acceleration are scalars; with several they are tuples.
+    Every argument may be a number, an array or a symbol. With one degree of freedom the coordinate,
+    the velocity and the acceleration are scalars; with several they are tuples.
 
     Examples
     --------
@@ -75,9 +84,11 @@ class Model:
     channels: ClassVar[tuple[str, ...]] = ()
     margin_kinds: ClassVar[Mapping[str, MarginKind]] = {}
     stops: ClassVar[tuple[str, ...]] = ()
-    singularity: ClassVar[str] = ""  # a name for the states in which the acceleration is infinite, if there are such
+    # a name for the states in which the acceleration is infinite, if there are such
+    singularity: ClassVar[str] = ""
     damping: float = 0.0  # small vibrations decay as exp(-damping tau / 2)
-    usual_impact: ClassVar[Any] = None  # the impact law of a `System` that is given none; None keeps the velocity
+    # the impact law of a `System` that is given none; None keeps the velocity
+    usual_impact: ClassVar[Any] = None
 
     def unit_of(self, coordinate: str) -> str:
         """The unit of one of the coordinates, such as "rad".
@@ -88,7 +99,10 @@ class Model:
             Its name.
         """
         if coordinate not in self.coordinates:
-            raise ParameterError(f"no coordinate {shown(coordinate)}; {near(coordinate, self.coordinates)}", "coordinate")
+            raise ParameterError(
+                f"no coordinate {shown(coordinate)}; {near(coordinate, self.coordinates)}",
+                "coordinate",
+            )
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     def margin_kind(self, margin: str) -> MarginKind:
@@ -103,7 +117,9 @@ class Model:
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """The numbers of its smooth modes; none without a contact that the motion crosses or bounces from."""
+        """The numbers of its smooth modes; none without a contact that the motion crosses or
+        bounces from.
+        """
         return ()
 
     @property
@@ -148,20 +164,26 @@ class Model:
 
     @property
     def holds_coordinates(self) -> bool:
-        """Whether contacts or frictions may hold its coordinates one by one, while the others move on, or it has surfaces.
+        """Whether contacts or frictions may hold its coordinates one by one, while the others move
+        on, or it has surfaces.
 
-        A perturbation of a coordinate that is held is lost. Such a model may be at rest in many states.
+        A perturbation of a coordinate that is held is lost. Such a model may be at rest in many
+        states.
         """
         return bool(self.contacts or self.frictions or self.surfaces)
 
     @property
     def names_its_contacts(self) -> bool:
-        """Whether its impacts are at contacts with names; the extrema of a motion then do not tell which of them it hits."""
+        """Whether its impacts are at contacts with names; the extrema of a motion then do not tell
+        which of them it hits.
+        """
         return bool(self.contacts)
 
     @property
     def has_state_plane(self) -> bool:
-        """Whether its state is a point of a plane on which areas change smoothly: one coordinate, which nothing holds."""
+        """Whether its state is a point of a plane on which areas change smoothly: one coordinate,
+        which nothing holds.
+        """
         return len(self.coordinates) == 1 and not self.holds_coordinates and not self.first_order
 
     @property
@@ -170,7 +192,8 @@ class Model:
         return self.coordinates[: len(self.coordinates) - len(self.first_order)]
 
     def reaches(self, coordinate: str, values: Any) -> Any:
-        """Whether a coordinate can have these values, an array of their shape: a contact keeps it from others.
+        """Whether a coordinate can have these values, an array of their shape: a contact keeps it
+        from others.
 
         Parameters
         ----------
@@ -183,7 +206,9 @@ class Model:
 
     @property
     def images(self) -> tuple[str, ...]:
-        """For each coordinate of a mirror image, the original one whose negative it is: the same, unless the mirror swaps two."""
+        """For each coordinate of a mirror image, the original one whose negative it is: the same,
+        unless the mirror swaps two.
+        """
         return self.coordinates
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
@@ -202,7 +227,9 @@ class Model:
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
-        raise NotImplementedError(f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)")
+        raise NotImplementedError(
+            f"{type(self).__name__} must define acceleration(t, theta, velocity, side, load)"
+        )
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         """The kinetic energy; `saltus.energies` and impact laws that restitute energy need it.
@@ -220,14 +247,17 @@ class Model:
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         """
-        name, several = type(self).__name__, len(self.coordinates) > 1
+        name = type(self).__name__
+        several = len(self.coordinates) > 1
         raise ParameterError(
             f"{name} defines no kinetic_energy, which this needs: add kinetic_energy(self, t, theta, velocity, side, load), such "
             f"as return {'0.5 * sum(v**2 for v in velocity)' if several else '0.5 * velocity**2'} where the mass is 1",
             "model",
         )
 
-    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> dict[str, Any]:
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any
+    ) -> dict[str, Any]:
         """Named quantities that must stay positive for the motion to be one of the real mechanism.
 
         Parameters
@@ -260,7 +290,8 @@ class Model:
         return tuple(self.margins(0.0, at, still, still, self.every_side[0], load))
 
     def check_load(self, load: Any) -> None:
-        """Refuse, with a ParameterError, a load whose channels are known but cannot act on this model as it is.
+        """Refuse, with a ParameterError, a load whose channels are known but cannot act on this
+        model as it is.
 
         Parameters
         ----------
@@ -269,13 +300,15 @@ class Model:
         """
 
     def mirror(self, load: Any) -> Any:
-        """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None without such a symmetry.
+        """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None
+        without such a symmetry.
 
-        a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load) must hold, and the same for the reset; this
-        is checked at one state, and a mirror for which it does not hold is refused.
+        a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load) must hold,
+        and the same for the reset; this is checked at one state, and a mirror for which it does not
+        hold is refused.
 
-        The mirror turns the signs of all coordinates, velocities and sides; it does not shift the time. Of several coordinates
-        it may swap some, see `images`.
+        The mirror turns the signs of all coordinates, velocities and sides; it does not shift the
+        time. Of several coordinates it may swap some, see `images`.
 
         Parameters
         ----------
@@ -286,17 +319,21 @@ class Model:
 
 
 class OneContactModel(Model):
-    """An oscillator of one coordinate whose motion crosses a contact, or is turned back by a wall. Besides what a `Model` has
-    (`coordinates`, `channels`, optional parts) give it:
+    """An oscillator of one coordinate whose motion crosses a contact, or is turned back by a wall.
+    Besides what a `Model` has (`coordinates`, `channels`, optional parts) give it:
 
-    1. `acceleration` on each side: it may use `side`, which is fixed along an arc, in place of a branch on the state (the sign of
+    1. `acceleration` on each side: it may use `side`, which is fixed along an arc, in place of a
+       branch on the state (the sign of
        the coordinate is ambiguous at contact);
-    2. `sides`, the numbers of its smooth modes: (+1, -1), the default, for a motion that crosses the contact, or (+1,) for a wall
+    2. `sides`, the numbers of its smooth modes: (+1, -1), the default, for a motion that crosses
+       the contact, or (+1,) for a wall
        that turns it back. A contact that some numbers of a model take away has () then;
-    3. `gap`, positive inside a mode: its first zero, reached from above, ends the mode; and `contact`, the coordinate at which
-       the gaps of all sides are zero. By default they are side * theta and 0. While the system rests there the accelerations at
-       contact decide when it leaves;
-    4. `reset`, the next side and the velocity after an impact, given the impact law; a wall must define it. By default the motion
+    3. `gap`, positive inside a mode: its first zero, reached from above, ends the mode; and
+       `contact`, the coordinate at which
+       the gaps of all sides are zero. By default they are side * theta and 0. While the system
+       rests there the accelerations at contact decide when it leaves;
+    4. `reset`, the next side and the velocity after an impact, given the impact law; a wall must
+       define it. By default the motion
        passes through the contact;
     5. optionally `inelastic_factor`, for impact laws that need it.
 
@@ -344,7 +381,14 @@ class OneContactModel(Model):
         values
             The values, an array.
         """
-        return np.max([np.asarray(self.gap(values, side)) for side in self.sides] or [np.zeros(np.shape(values))], axis=0) >= 0.0
+        return (
+            np.max(
+                [np.asarray(self.gap(values, side)) for side in self.sides]
+                or [np.zeros(np.shape(values))],
+                axis=0,
+            )
+            >= 0.0
+        )
 
     def inward(self, side: int) -> float:
         """+1 or -1: the direction of the coordinate from the contact into a mode.
@@ -358,10 +402,12 @@ class OneContactModel(Model):
         return 1.0 if into > 0.0 else -1.0
 
     def reset(self, t: Any, velocity: Any, side: Any, load: Any, impact: Any) -> tuple[Any, Any]:
-        """The side on which the motion goes on, and its velocity there, after an impact that ends the mode `side`.
+        """The side on which the motion goes on, and its velocity there, after an impact that ends
+        the mode `side`.
 
-        Both velocities are rates of the coordinate, positive towards larger coordinates, and not speeds of approach. Here the
-        motion passes through the contact and the sign of the velocity stays; a model with a wall turns the sign itself.
+        Both velocities are rates of the coordinate, positive towards larger coordinates, and not
+        speeds of approach. Here the motion passes through the contact and the sign of the velocity
+        stays; a model with a wall turns the sign itself.
 
         Parameters
         ----------
@@ -374,12 +420,14 @@ class OneContactModel(Model):
         load
             The load, whose channels are called with the time: `load.horizontal(t)`.
         impact
-            The impact law, whose `velocity_after` gives the velocity after the impact without a change of sign.
+            The impact law, whose `velocity_after` gives the velocity after the impact without a
+            change of sign.
         """
         return -side, impact.velocity_after(self, t, velocity, side, -side, load)
 
     def inelastic_factor(self, side: Any) -> Any:
-        """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode `side`.
+        """The velocity factor of a frictionless, perfectly inelastic impact that ends the mode
+        `side`.
 
         Parameters
         ----------
@@ -387,16 +435,19 @@ class OneContactModel(Model):
             The mode that the impact ends.
         """
         raise ParameterError(
-            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it", "impact"
+            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it",
+            "impact",
         )
 
 
 def check_one_contact(model: OneContactModel | type[OneContactModel]) -> None:
-    """Refuse sides that no contact has, several coordinates, and a wall without a reset that turns the motion round.
+    """Refuse sides that no contact has, several coordinates, and a wall without a reset that turns
+    the motion round.
 
     A class whose sides depend on its numbers is not refused, as its sides are not known yet.
     """
-    name, sides = getattr(model, "__name__", type(model).__name__), model.sides
+    name = getattr(model, "__name__", type(model).__name__)
+    sides = model.sides
     if isinstance(sides, property):
         return
     if sides not in ((1, -1), (1,), ()):
@@ -418,11 +469,13 @@ def check_one_contact(model: OneContactModel | type[OneContactModel]) -> None:
         )
 
 
-# --- derivatives of functions of the coordinates ---------------------------------------------------------------------------
+# --- derivatives of functions of the coordinates -----------------------------
 
-SCALES = (0.21, 0.0, 1.3, -0.4)  # of states at which functions are tried; one in their domain is needed
+# of states at which functions are tried; one in their domain is needed
+SCALES = (0.21, 0.0, 1.3, -0.4)
 
-# By the name of NumPy's function, its derivatives to its arguments, as functions of these and of its value.
+# By the name of NumPy's function, its derivatives to its arguments, as functions of these and of
+# its value.
 SLOPES: dict[str, tuple[Callable[..., Any], ...]] = {
     "add": (lambda a, b, y: 1.0, lambda a, b, y: 1.0),
     "subtract": (lambda a, b, y: 1.0, lambda a, b, y: -1.0),
@@ -445,28 +498,40 @@ SLOPES: dict[str, tuple[Callable[..., Any], ...]] = {
 
 
 class Jet(np.lib.mixins.NDArrayOperatorsMixin):
-    """A number, an array or a symbol along a curve, with its first derivative there and, if that is asked for, its second one."""
+    """A number, an array or a symbol along a curve, with its first derivative there and, if that is
+    asked for, its second one.
+    """
 
     __slots__ = ("first", "second", "value")
     __array_priority__ = 2000  # above that of symbols, which it may hold
 
     def __init__(self, value: Any, first: Any, second: Any = None) -> None:
-        self.value, self.first, self.second = value, first, second
+        self.value = value
+        self.first = first
+        self.second = second
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Jet:
         slopes = SLOPES.get(ufunc.__name__)
         if method != "__call__" or kwargs or slopes is None:
-            raise TraceError(f"np.{ufunc.__name__} of coordinates has no derivative here; known are {', '.join(SLOPES)}")
+            raise TraceError(
+                f"np.{ufunc.__name__} of coordinates has no derivative here; known are {', '.join(SLOPES)}"
+            )
         jets = [x if isinstance(x, Jet) else Jet(x, 0.0, 0.0) for x in inputs]
-        values, known = [x.value for x in jets], all(x.second is not None for x in jets)
+        values = [x.value for x in jets]
+        known = all(x.second is not None for x in jets)
         moving = [not (is_zero(x.first) and (x.second is None or is_zero(x.second))) for x in jets]
-        y, firsts = ufunc(*values), [x.first for x in jets]
-        steep = [slope(*values, y) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)]
+        y = ufunc(*values)
+        firsts = [x.first for x in jets]
+        steep = [
+            slope(*values, y) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)
+        ]
         first = weighted(steep, firsts)
         if not known:
             return Jet(y, first)
         along = [*(Jet(x.value, x.first) for x in jets), Jet(y, first)]
-        bent = [slope(*along) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)]
+        bent = [
+            slope(*along) if moves else 0.0 for slope, moves in zip(slopes, moving, strict=True)
+        ]
         turned = [x.first if isinstance(x, Jet) else 0.0 for x in bent]
         return Jet(y, first, weighted([*steep, *turned], [*(x.second for x in jets), *firsts]))
 
@@ -492,11 +557,16 @@ def is_zero(entry: Any) -> bool:
 
 
 def derivatives_along(function: Any, given: list[list[Any]]) -> list[Any]:
-    """A function of a point, and the first and second derivatives of its value where those of the point are given too."""
+    """A function of a point, and the first and second derivatives of its value where those of the
+    point are given too.
+    """
     if len(given) == 1:
         return [as_given(function(given[0]))]
     found = function([Jet(*each) for each in zip(*given, strict=True)])
-    return [as_given([getattr(x, name) for x in found]) for name in ("value", "first", "second")[: len(given)]]
+    return [
+        as_given([getattr(x, name) for x in found])
+        for name in ("value", "first", "second")[: len(given)]
+    ]
 
 
 def is_function(model: Any, name: str) -> bool:
@@ -512,18 +582,32 @@ def reads_of(model: Any, name: str) -> tuple[int, ...]:
     ParameterError
         It has no value, or none at numbers with derivatives.
     """
-    size, what = len(model.coordinates), f"{type(model).__name__}.{name}"
+    size = len(model.coordinates)
+    what = f"{type(model).__name__}.{name}"
     try:
         for scale in SCALES:
             q = [scale / (1 + i) for i in range(size)]
             with np.errstate(all="ignore"):
                 if np.isfinite(float(getattr(model, name)(as_given(q)))):
-                    derivatives_along(lambda x: [getattr(model, name)(as_given(x))], [q, [1.0] * size, [0.0] * size])
-                    beside = [[np.nan if i == j else x for i, x in enumerate(q)] for j in range(size)]
-                    return tuple(j for j, x in enumerate(beside) if np.isnan(float(getattr(model, name)(as_given(x)))))
+                    derivatives_along(
+                        lambda x: [getattr(model, name)(as_given(x))],
+                        [q, [1.0] * size, [0.0] * size],
+                    )
+                    beside = [
+                        [np.nan if i == j else x for i, x in enumerate(q)] for j in range(size)
+                    ]
+                    return tuple(
+                        j
+                        for j, x in enumerate(beside)
+                        if np.isnan(float(getattr(model, name)(as_given(x))))
+                    )
     except Exception as error:  # a user's own code may raise anything
-        raise ParameterError(f"{what} fails: {type(error).__name__}: {error}; it takes the coordinates q", "model") from error
-    raise ParameterError(f"{what} must return a number at the coordinates q, and has none at {shown(q)}", "model")
+        raise ParameterError(
+            f"{what} fails: {type(error).__name__}: {error}; it takes the coordinates q", "model"
+        ) from error
+    raise ParameterError(
+        f"{what} must return a number at the coordinates q, and has none at {shown(q)}", "model"
+    )
 
 
 def as_given(values: list[Any]) -> Any:
@@ -532,8 +616,14 @@ def as_given(values: list[Any]) -> Any:
 
 
 def each_of(values: Any) -> list[Any]:
-    """The values of all coordinates, of one or of several, whose numbers may be the rows of an array."""
-    return list(values) if isinstance(values, (tuple, list)) or (isinstance(values, np.ndarray) and values.ndim > 1) else [values]
+    """The values of all coordinates, of one or of several, whose numbers may be the rows of an
+    array.
+    """
+    return (
+        list(values)
+        if isinstance(values, (tuple, list)) or (isinstance(values, np.ndarray) and values.ndim > 1)
+        else [values]
+    )
 
 
 def less(values: Sequence[Any], others: Sequence[Any]) -> list[Any]:

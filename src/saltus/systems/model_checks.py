@@ -1,4 +1,6 @@
-"""The checks of a model that are made when a system is made of it, so that none fails only when it is first simulated."""
+"""The checks of a model that are made when a system is made of it, so that none fails only when it
+is first simulated.
+"""
 
 from __future__ import annotations
 
@@ -12,25 +14,54 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import MOST_CONTACTS, MOST_FRICTIONS, Contact, ContactModel, Friction, Surface, sides_for
+from saltus.systems.contact_model import (
+    MOST_CONTACTS,
+    MOST_FRICTIONS,
+    Contact,
+    ContactModel,
+    Friction,
+    Surface,
+    sides_for,
+)
 from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.gap_places import INVERSE, Part
 from saltus.systems.impact_laws import ImpactLaw, check_paradox
 from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import SCALES, Jet, Model, OneContactModel, as_given, check_one_contact, is_function
+from saltus.systems.model import (
+    SCALES,
+    Jet,
+    Model,
+    OneContactModel,
+    as_given,
+    check_one_contact,
+    is_function,
+)
 
-# The parts of the contracts of the two siblings: a class that defines one of them and is of neither has the wrong base.
+# The parts of the contracts of the two siblings: a class that defines one of them and is of neither
+# has the wrong base.
 OWN_PARTS = {
     OneContactModel: ("sides", "gap", "reset", "inelastic_factor"),
-    ContactModel: ("contacts", "frictions", "surfaces", "force", "mass_matrix", "normal_forces", "transfers", "after_impact"),
+    ContactModel: (
+        "contacts",
+        "frictions",
+        "surfaces",
+        "force",
+        "mass_matrix",
+        "normal_forces",
+        "transfers",
+        "after_impact",
+    ),
 }
-# What may be rounding in a gap at the contact, relative to its rate, and in entries of a mass matrix; a mistake is larger.
+# What may be rounding in a gap at the contact, relative to its rate, and in entries of a mass
+# matrix; a mistake is larger.
 MODEL_ROUNDING = 1e-9
-PROBE = (0.37, 0.21, 0.13)  # time, coordinate and velocity at which a model's answers are counted: any numbers would do
+# time, coordinate and velocity at which a model's answers are counted: any numbers would do
+PROBE = (0.37, 0.21, 0.13)
 
 
 def check_works(model: Model) -> bool:
-    """Refuse a model that cannot be simulated: parts of another class of models, parts that are missing or of the wrong size.
+    """Refuse a model that cannot be simulated: parts of another class of models, parts that are
+    missing or of the wrong size.
 
     Returns whether contacts or surfaces of it are of sums of coordinates.
 
@@ -54,14 +85,21 @@ def check_works(model: Model) -> bool:
     return sums
 
 
-_known = set[type[Model]]()  # classes of which one model has passed, as systems are made by the thousand
+# classes of which one model has passed, as systems are made by the thousand
+_known = set[type[Model]]()
 
 
 def _check_class(kind: type[Model]) -> None:
-    """Refuse a class that lacks its equation of motion, or has parts that only another class of models has."""
+    """Refuse a class that lacks its equation of motion, or has parts that only another class of
+    models has.
+    """
     _check_fields(kind)
     for base, parts in OWN_PARTS.items():
-        given = [name for name in parts if getattr(kind, name, ()) not in ((), getattr(Model, name, None))]
+        given = [
+            name
+            for name in parts
+            if getattr(kind, name, ()) not in ((), getattr(Model, name, None))
+        ]
         if given and not issubclass(kind, base):
             raise ParameterError(
                 f"{kind.__name__} defines {given[0]}, so its base class must be saltus.{base.__name__}, not "
@@ -70,9 +108,13 @@ def _check_class(kind: type[Model]) -> None:
             )
     if issubclass(kind, ContactModel):
         if kind.force is ContactModel.force and kind.acceleration is ContactModel.acceleration:
-            raise ParameterError(f"{kind.__name__} must define force(t, q, velocity, load)", "model")
+            raise ParameterError(
+                f"{kind.__name__} must define force(t, q, velocity, load)", "model"
+            )
     elif kind.acceleration is Model.acceleration:
-        raise ParameterError(f"{kind.__name__} must define acceleration(t, q, velocity, side, load)", "model")
+        raise ParameterError(
+            f"{kind.__name__} must define acceleration(t, q, velocity, side, load)", "model"
+        )
     for base in (each for each in (Model, OneContactModel, ContactModel) if issubclass(kind, each)):
         for name, function in vars(base).items():
             if isinstance(function, FunctionType) and not name.startswith("_"):
@@ -80,9 +122,15 @@ def _check_class(kind: type[Model]) -> None:
 
 
 def _check_fields(kind: type[Model]) -> None:
-    """Refuse numbers of a class that is no dataclass, and those whose names are those of a contract's methods."""
+    """Refuse numbers of a class that is no dataclass, and those whose names are those of a
+    contract's methods.
+    """
     fields: dict[str, Any] = getattr(kind, "__dataclass_fields__", {})
-    given = {name for name, what in vars(kind).get("__annotations__", {}).items() if "ClassVar" not in str(what)}
+    given = {
+        name
+        for name, what in vars(kind).get("__annotations__", {}).items()
+        if "ClassVar" not in str(what)
+    }
     if lost := sorted(given - fields.keys()):
         raise ParameterError(
             f"{kind.__name__} is no dataclass, so {', '.join(lost)} would be no parameter: write @dataclass(frozen=True, "
@@ -107,12 +155,18 @@ def _check_arguments(kind: type[Model], name: str, function: FunctionType) -> No
     try:
         inspect.signature(getattr(kind, name)).bind(*wanted)
     except TypeError:
-        raise ParameterError(f"{kind.__name__}.{name} must take the arguments {', '.join(wanted)}", "model") from None
+        raise ParameterError(
+            f"{kind.__name__}.{name} must take the arguments {', '.join(wanted)}", "model"
+        ) from None
 
 
 def _check_first_order(model: Model) -> None:
-    """Refuse coordinates of first order that are not the last ones, and those of which a part of the model needs the velocity."""
-    kind, names, given = type(model).__name__, model.coordinates, model.first_order
+    """Refuse coordinates of first order that are not the last ones, and those of which a part of
+    the model needs the velocity.
+    """
+    kind = type(model).__name__
+    names = model.coordinates
+    given = model.first_order
     if isinstance(given, str) or given != names[len(names) - len(given) :]:
         raise ParameterError(
             f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)}, such as ({names[-1]!r},), "
@@ -121,13 +175,22 @@ def _check_first_order(model: Model) -> None:
         )
     if given and model.sides:
         raise ParameterError(
-            f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact", "model"
+            f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact",
+            "model",
         )
     jumps = isinstance(model, ContactModel) and model.jumps
     if jumps and not (given and model.contacts):
-        what = "no contact" if given else "no coordinate of first order, such as first_order = ('voltage',)"
+        what = (
+            "no contact"
+            if given
+            else "no coordinate of first order, such as first_order = ('voltage',)"
+        )
         raise ParameterError(f"{kind} defines after_impact and has {what}: leave it out", "model")
-    parts: tuple[Contact | Friction | Surface, ...] = (*model.contacts, *model.frictions, *model.surfaces)
+    parts: tuple[Contact | Friction | Surface, ...] = (
+        *model.contacts,
+        *model.frictions,
+        *model.surfaces,
+    )
     for part in parts:
         terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
         held = [name for name in terms if name in getattr(model, "own_class", model).first_order]
@@ -140,32 +203,55 @@ def _check_first_order(model: Model) -> None:
             )
     if jumps and isinstance(model, InGapCoordinates) and any(model.gap_sums()[1]):
         raise ParameterError(
-            f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out", "model"
+            f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out",
+            "model",
         )
 
 
 def _check_rates(model: Model) -> None:
-    """Refuse functions that read the velocity of a coordinate of first order, which is to follow from the state."""
-    size, moving, (t, q, v), load = len(model.coordinates), len(model.moving), PROBE, DeclaredLoad(Load(frequency=1.0), model)
+    """Refuse functions that read the velocity of a coordinate of first order, which is to follow
+    from the state.
+    """
+    size = len(model.coordinates)
+    moving = len(model.moving)
+    (t, q, v) = PROBE
+    load = DeclaredLoad(Load(frequency=1.0), model)
 
     def is_known(method: str, unknown: float) -> bool:
         state = [(q,) * size, (v,) * moving + (unknown,) * (size - moving)]
         place, speed = (x[0] if size == 1 else x for x in state)
-        rest = {"force": (load, *sides_for(model, t, place, load)), "normal_forces": (load,), "margins": (speed, 1, load)}
-        arguments = (model.contacts[0].name, place, speed) if method == "after_impact" else (t, place, speed)
-        found = _asked(model, method, *arguments, *rest.get(method, () if method == "after_impact" else (1, load)))
+        rest = {
+            "force": (load, *sides_for(model, t, place, load)),
+            "normal_forces": (load,),
+            "margins": (speed, 1, load),
+        }
+        arguments = (
+            (model.contacts[0].name, place, speed)
+            if method == "after_impact"
+            else (t, place, speed)
+        )
+        found = _asked(
+            model,
+            method,
+            *arguments,
+            *rest.get(method, () if method == "after_impact" else (1, load)),
+        )
         values = list(found.values()) if isinstance(found, dict) else found
         return found is None or bool(np.isfinite(np.asarray(values, dtype=float)).all())
 
-    methods = ["acceleration", "margins"] + ["kinetic_energy"] * (type(model).kinetic_energy is not Model.kinetic_energy)
+    methods = ["acceleration", "margins"] + ["kinetic_energy"] * (
+        type(model).kinetic_energy is not Model.kinetic_energy
+    )
     if isinstance(model, ContactModel):
         methods = ["force", "normal_forces", *methods] + ["after_impact"] * bool(model.contacts)
     for contact in model.contacts if model.first_order else ():
-        found, wanted = _asked(model, "after_impact", contact.name, (q,) * size, (v,) * size), size - moving
+        found = _asked(model, "after_impact", contact.name, (q,) * size, (v,) * size)
+        wanted = size - moving
         if found is not None and (len(found) if _is_row(found) else 1) != wanted:
             names = ", ".join(model.first_order)
             raise ParameterError(
-                f"{type(model).__name__}.after_impact must return {wanted} value(s), of {names}, got {shown(found)}", "model"
+                f"{type(model).__name__}.after_impact must return {wanted} value(s), of {names}, got {shown(found)}",
+                "model",
             )
     for method in methods:
         if is_known(method, v) and not is_known(method, math.nan):
@@ -178,24 +264,33 @@ def _check_rates(model: Model) -> None:
 
 
 def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
-    """Refuse a gap that is not 0 at `contact`, and a reset that sends the motion beyond the contact.
+    """Refuse a gap that is not 0 at `contact`, and a reset that sends the motion beyond the
+    contact.
 
     Raises
     ------
     ParameterError
         The error has the numbers.
     """
-    point, name = float(model.contact), type(model).__name__
-    rates = {side: float(model.gap(point + 0.5, side)) - float(model.gap(point - 0.5, side)) for side in model.sides}
+    point = float(model.contact)
+    name = type(model).__name__
+    rates = {
+        side: float(model.gap(point + 0.5, side)) - float(model.gap(point - 0.5, side))
+        for side in model.sides
+    }
     for side, rate in rates.items():
         at = float(model.gap(point, side))
         if rate == 0.0:
-            raise ParameterError(f"{name}.gap must depend on the coordinate, such as side * (x - d)", "model")
+            raise ParameterError(
+                f"{name}.gap must depend on the coordinate, such as side * (x - d)", "model"
+            )
         if abs(at) > MODEL_ROUNDING * abs(rate):
             raise ParameterError(
-                f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both", "model"
+                f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both",
+                "model",
             )
-        before = -math.copysign(PROBE[2], rate)  # a slow impact: a law may have no meaning for fast ones
+        # a slow impact: a law may have no meaning for fast ones
+        before = -math.copysign(PROBE[2], rate)
         answer = _asked(model, "reset", 0.0, before, side, Load(), impact)
         if answer is None:
             continue
@@ -205,46 +300,65 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
                 f"{name}.reset sends the motion beyond the contact: on side {side} the velocity {before:g} becomes "
                 f"{float(after):g} on side {int(following)}; velocities are rates of the coordinate, and "
                 + (
-                    "a bounce turns the sign of what impact.velocity_after returns" if following == side else "a passage keeps it"
+                    "a bounce turns the sign of what impact.velocity_after returns"
+                    if following == side
+                    else "a passage keeps it"
                 ),
                 "model",
             )
 
 
 def check_contact_model(model: ContactModel) -> bool:
-    """Refuse contacts and frictions that have no meaning; returns whether there are sums of coordinates among them.
+    """Refuse contacts and frictions that have no meaning; returns whether there are sums of
+    coordinates among them.
 
     Raises
     ------
     ParameterError
-        Sides; too many parts or two of one name; an unknown coordinate, or one that two parts hold; a sum of coordinates without
-        meaning; two contacts that leave no room; a coefficient of friction below 0; mu_s < mu_k.
+        Sides; too many parts or two of one name; an unknown coordinate, or one that two parts hold;
+        a sum of coordinates without meaning; two contacts that leave no room; a coefficient of
+        friction below 0; mu_s < mu_k.
     """
-    contacts, frictions, kind = model.contacts, model.frictions, type(model).__name__
+    contacts = model.contacts
+    frictions = model.frictions
+    kind = type(model).__name__
     if model.sides:
-        raise ParameterError(f"{kind} is a ContactModel, so it has no sides: leave them out", "model")
+        raise ParameterError(
+            f"{kind} is a ContactModel, so it has no sides: leave them out", "model"
+        )
     rows = len(frictions) + len(model.surfaces)
     most = MOST_FRICTIONS if model.rubs_in_contacts else MOST_CONTACTS - 2 * rows
     given = (("frictions and surfaces", rows, MOST_FRICTIONS), ("contacts", len(contacts), most))
     for what, count, most in given:
         if count > most:
-            raise ParameterError(f"{kind} has {count} {what}, and at most {most} can be followed", "model")
+            raise ParameterError(
+                f"{kind} has {count} {what}, and at most {most} can be followed", "model"
+            )
     parts: tuple[Contact | Surface, ...] = (*contacts, *model.surfaces)
     names = [*(part.name for part in parts), *(friction.name for friction in frictions)]
     if len(set(names)) < len(names):
         raise ParameterError(
-            f"contacts, frictions and surfaces of {kind} must have names of their own, got {', '.join(names)}", "model"
+            f"contacts, frictions and surfaces of {kind} must have names of their own, got {', '.join(names)}",
+            "model",
         )
     for contact in parts:
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
-            known, what = ", ".join(model.coordinates), _named(contact)
+            known = ", ".join(model.coordinates)
+            what = _named(contact)
             raise ParameterError(f"{what} {contact.coordinate!r}, but {kind} has {known}", "model")
         if not isinstance(contact.coordinate, str):
             _check_sum(model, contact)
     for a in contacts:
         for b in contacts:
-            if a is not b and a.coordinate == b.coordinate and not (a.sign != b.sign and b.gap(a.position) > 0.0):
-                raise ParameterError(f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them", "model")
+            if (
+                a is not b
+                and a.coordinate == b.coordinate
+                and not (a.sign != b.sign and b.gap(a.position) > 0.0)
+            ):
+                raise ParameterError(
+                    f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them",
+                    "model",
+                )
     _check_frictions(model)
     _check_mass(model)
     sums = any(not isinstance(part.coordinate, str) for part in (*parts, *frictions))
@@ -255,25 +369,43 @@ def check_contact_model(model: ContactModel) -> bool:
 
 def _check_frictions(model: ContactModel) -> None:
     """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
-    kind, taken, pressed = type(model).__name__, list[Any](), [friction.contact for friction in model.frictions]
+    kind = type(model).__name__
+    taken = list[Any]()
+    pressed = [friction.contact for friction in model.frictions]
     for friction in model.frictions:
         where = f"the friction {friction.name!r} of {kind}"
         if isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
-            raise ParameterError(f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}", "model")
+            raise ParameterError(
+                f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}",
+                "model",
+            )
         if not isinstance(friction.coordinate, str):
             _check_sum(model, friction)
         if friction.coordinate in taken:
-            raise ParameterError(f"{where} and another one hold {friction.coordinate}: take two coordinates", "model")
-        if friction.contact is not None and friction.contact not in [contact.name for contact in model.contacts]:
-            raise ParameterError(f"{where} is in the contact {shown(friction.contact)}, which {kind} does not have", "model")
+            raise ParameterError(
+                f"{where} and another one hold {friction.coordinate}: take two coordinates", "model"
+            )
+        if friction.contact is not None and friction.contact not in [
+            contact.name for contact in model.contacts
+        ]:
+            raise ParameterError(
+                f"{where} is in the contact {shown(friction.contact)}, which {kind} does not have",
+                "model",
+            )
         if friction.contact is not None and pressed.count(friction.contact) > 1:
-            raise ParameterError(f"{where} is in the contact {friction.contact!r}, as another one is: one is followed", "model")
+            raise ParameterError(
+                f"{where} is in the contact {friction.contact!r}, as another one is: one is followed",
+                "model",
+            )
         for other in (c for c in model.contacts if c.name == friction.contact):
             if other.coordinate in [each.coordinate for each in model.frictions]:
                 way = f"along whose coordinate {other.coordinate} a friction acts: take another one"
                 raise ParameterError(f"{where} is in the contact {other.name!r}, {way}", "model")
         if friction.stribeck_speed is not None and not float(friction.stribeck_speed) > 0.0:
-            raise ParameterError(f"{where} must have stribeck_speed > 0, got {float(friction.stribeck_speed):g}", "model")
+            raise ParameterError(
+                f"{where} must have stribeck_speed > 0, got {float(friction.stribeck_speed):g}",
+                "model",
+            )
         if not 0.0 <= float(friction.kinetic) <= float(friction.most):
             pair = f"kinetic = {float(friction.kinetic):g} and static = {float(friction.most):g}"
             raise ParameterError(f"{where} must have 0 <= kinetic <= static, got {pair}", "model")
@@ -282,30 +414,55 @@ def _check_frictions(model: ContactModel) -> None:
 
 def _check_mass(model: ContactModel) -> None:
     """Refuse a mass matrix of another size than the coordinates have, or one that is not symmetric."""
-    names, kind = model.coordinates, type(model)
+    names = model.coordinates
+    kind = type(model)
     size = len(names)
     if kind.mass_matrix is ContactModel.mass_matrix:
         return
-    found = _asked(model, "mass_matrix", PROBE[1] if size == 1 else tuple(PROBE[1] / (1 + i) for i in range(size)))
+    found = _asked(
+        model,
+        "mass_matrix",
+        PROBE[1] if size == 1 else tuple(PROBE[1] / (1 + i) for i in range(size)),
+    )
     if found is None:
         return
     if _size_of(found) != ("a number" if size == 1 else f"{size} rows of {size} numbers"):
-        wanted = "a number, as there is one coordinate" if size == 1 else f"{size} rows of {size} numbers, for {', '.join(names)}"
-        raise ParameterError(f"{kind.__name__}.mass_matrix must return {wanted}, got {_size_of(found)}", "model")
+        wanted = (
+            "a number, as there is one coordinate"
+            if size == 1
+            else f"{size} rows of {size} numbers, for {', '.join(names)}"
+        )
+        raise ParameterError(
+            f"{kind.__name__}.mass_matrix must return {wanted}, got {_size_of(found)}", "model"
+        )
     moving = len(model.moving)
-    others = [[float(found[i][j]) - (i == j) for j in range(size)] for i in range(moving, size)] if size > 1 else []
+    others = (
+        [[float(found[i][j]) - (i == j) for j in range(size)] for i in range(moving, size)]
+        if size > 1
+        else []
+    )
     if np.any(others) or (size > moving and size == 1):
         what = f"{', '.join(model.first_order)}, which have no inertia"
-        raise ParameterError(f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {what}", "model")
+        raise ParameterError(
+            f"{kind.__name__}.mass_matrix must have the rows of the unit matrix for {what}", "model"
+        )
     if model.jumps and size > 1:
-        other = _asked(model, "mass_matrix", tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)))
-        if other is None or not np.array_equal(np.array(found, dtype=float), np.array(other, dtype=float)):
+        other = _asked(
+            model,
+            "mass_matrix",
+            tuple(PROBE[1] / (1 + i) if i < moving else PROBE[2] for i in range(size)),
+        )
+        if other is None or not np.array_equal(
+            np.array(found, dtype=float), np.array(other, dtype=float)
+        ):
             jumping = ", ".join(model.first_order)
             raise ParameterError(
-                f"{kind.__name__}.mass_matrix depends on {jumping}, which jumps at impacts: leave one out", "model"
+                f"{kind.__name__}.mass_matrix depends on {jumping}, which jumps at impacts: leave one out",
+                "model",
             )
     for i, j in itertools.combinations(range(size), 2):
-        a, b = found[i][j], found[j][i]
+        a = found[i][j]
+        b = found[j][i]
         if a is b or a == b:  # as they are nearly always
             continue
         a, b = float(a), float(b)
@@ -332,34 +489,47 @@ def _is_row(found: Any) -> bool:
 
 
 def _check_sum(model: ContactModel, contact: Part) -> None:
-    """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one side."""
-    names, given = model.coordinates, contact.coordinate
+    """Refuse a sum of coordinates and displacements of the ground that a contact cannot keep on one
+    side.
+    """
+    names = model.coordinates
+    given = contact.coordinate
     where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
     if not isinstance(given, Mapping) or not given:
         raise ParameterError(
-            f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}", "model"
+            f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}",
+            "model",
         )
     grounds = [channel for channel in model.channels if channel.startswith("ground")]
     for name, factor in given.items():
-        own = is_function(model, name) and callable(getattr(model, name, None)) and not hasattr(ContactModel, name)
+        own = (
+            is_function(model, name)
+            and callable(getattr(model, name, None))
+            and not hasattr(ContactModel, name)
+        )
         if name not in (*names, *grounds) and not own:
             known = ", ".join((*names, *grounds))
             reason = " (a wall moves with a channel whose name begins with ground, as those are displacements)"
             no_function = f" and no function {name}(q) of {type(model).__name__}"
             raise ParameterError(
-                f"{_named(contact)} {shown(name)}, none of {known}{reason if name in model.channels else no_function}", "model"
+                f"{_named(contact)} {shown(name)}, none of {known}{reason if name in model.channels else no_function}",
+                "model",
             )
         if own and hasattr(model, name + INVERSE):
             _check_inverse(model, name)
         if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor != 0.0):
             raise ParameterError(
-                f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}", "model"
+                f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}",
+                "model",
             )
     if all(name in grounds for name in given):
-        raise ParameterError(f"{_named(contact)} {', '.join(given)} and no coordinate of {', '.join(names)}", "model")
+        raise ParameterError(
+            f"{_named(contact)} {', '.join(given)} and no coordinate of {', '.join(names)}", "model"
+        )
     if type(model).acceleration is not ContactModel.acceleration:
         raise ParameterError(
-            f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force, not acceleration", "model"
+            f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force, not acceleration",
+            "model",
         )
 
 
@@ -368,42 +538,70 @@ def _check_inverse(model: ContactModel, name: str) -> None:
     for x in SCALES:
         value = _asked(model, name, as_given([x] * len(model.coordinates)))
         found = None if value is None else _asked(model, name + INVERSE, value)
-        again = None if found is None else _asked(model, name, as_given([Jet(found, 1.0)] * len(model.coordinates)))
+        again = (
+            None
+            if found is None
+            else _asked(model, name, as_given([Jet(found, 1.0)] * len(model.coordinates)))
+        )
         if again is not None and (again.first < 0.0 or abs(again.value - value) > MODEL_ROUNDING):
             what = f"{type(model).__name__}.{name}{INVERSE} must give the coordinate at which {name} has a value"
-            raise ParameterError(f"{what}, where {name} rises with it, and gives {found:g} for {float(value):g}", "model")
+            raise ParameterError(
+                f"{what}, where {name} rises with it, and gives {found:g} for {float(value):g}",
+                "model",
+            )
 
 
 def _named(part: Contact | Surface | Friction) -> str:
-    """What a part is called, with the verb for what it does to its coordinate: a motion passes a surface."""
-    verb = "holds" if isinstance(part, Contact) else "rubs on" if isinstance(part, Friction) else "is of"
+    """What a part is called, with the verb for what it does to its coordinate: a motion passes a
+    surface.
+    """
+    verb = (
+        "holds"
+        if isinstance(part, Contact)
+        else "rubs on"
+        if isinstance(part, Friction)
+        else "is of"
+    )
     return f"the {type(part).__name__.lower()} {part.name!r} {verb}"
 
 
 def _probe(model: Model) -> None:
-    """Refuse a model whose equations fail at a state by a mistake of its author, or have other sizes than its coordinates."""
-    size, (t, q, v), load = len(model.coordinates), PROBE, DeclaredLoad(Load(frequency=1.0), model)
+    """Refuse a model whose equations fail at a state by a mistake of its author, or have other
+    sizes than its coordinates.
+    """
+    size = len(model.coordinates)
+    (t, q, v) = PROBE
+    load = DeclaredLoad(Load(frequency=1.0), model)
     state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
     single = all(isinstance(each.coordinate, str) for each in getattr(model, "surfaces", ()))
     if model.first_order and single and not isinstance(model, InGapCoordinates):
         _check_rates(model)
     if isinstance(model, ContactModel) and single and type(model).force is not ContactModel.force:
         pushed = _asked(model, "force", t, *state, load, *sides_for(model, t, state[0], load))
-        if pushed is not None and _size_of(pushed) != ("a number" if size == 1 else f"{size} numbers"):
+        if pushed is not None and _size_of(pushed) != (
+            "a number" if size == 1 else f"{size} numbers"
+        ):
             wanted = "a number" if size == 1 else f"{size} numbers"
             names = ", ".join(model.coordinates)
             raise ParameterError(
-                f"{type(model).__name__}.force must return {wanted}, for {names}, got {_size_of(pushed)}", "model"
+                f"{type(model).__name__}.force must return {wanted}, for {names}, got {_size_of(pushed)}",
+                "model",
             )
     for side in model.every_side:
         found = _asked(model, "acceleration", t, *state, side, load)
         count = len(found) if isinstance(found, (tuple, list)) else 1
         if found is not None and count != size:
-            raise ParameterError(f"{type(model).__name__}.acceleration must return {size} value(s), got {shown(found)}", "model")
+            raise ParameterError(
+                f"{type(model).__name__}.acceleration must return {size} value(s), got {shown(found)}",
+                "model",
+            )
 
 
 def _asked(model: Model, method: str, *arguments: Any) -> Any:
-    """What a method of a model answers; None where its numbers have no value there. Errors of saltus go on."""
+    """What a method of a model answers; None where its numbers have no value there.
+
+    Errors of saltus go on.
+    """
     try:
         with np.errstate(all="ignore"):
             return getattr(model, method)(*arguments)

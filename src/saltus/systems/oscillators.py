@@ -18,10 +18,12 @@ from saltus.systems.model import MarginKind, OneContactModel
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WallOscillator(OneContactModel):
-    """x'' + c x' + k x = F(tau) - zeta'', free while x < d; at the wall x = d the velocity turns round, v+ = -e v-.
+    """x'' + c x' + k x = F(tau) - zeta'', free while x < d; at the wall x = d the velocity turns
+    round, v+ = -e v-.
 
-    x is relative to the ground, to which spring, dashpot and wall are fixed, and which the channel `ground` displaces by zeta.
-    The one mode ends with an impact at the wall and begins anew. It can rest at the wall while F - zeta'' - k d > 0.
+    x is relative to the ground, to which spring, dashpot and wall are fixed, and which the channel
+    `ground` displaces by zeta. The one mode ends with an impact at the wall and begins anew. It can
+    rest at the wall while F - zeta'' - k d > 0.
 
     Parameters
     ----------
@@ -62,7 +64,12 @@ class WallOscillator(OneContactModel):
 
     def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
         """x'' = F - zeta'' - c x' - k x."""
-        return load.force(t) - load.ground.acceleration(t) - self.damping * velocity - self.stiffness * x
+        return (
+            load.force(t)
+            - load.ground.acceleration(t)
+            - self.damping * velocity
+            - self.stiffness * x
+        )
 
     def gap(self, x: Any, side: Any) -> Any:
         """d - x."""
@@ -79,9 +86,11 @@ class WallOscillator(OneContactModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoStops(ContactModel):
-    """x'' + c x' + k x = F(tau) - zeta'' for d_1 <= x <= d_2: contacts `left` and `right`, with a law such as `NewtonImpact`.
+    """x'' + c x' + k x = F(tau) - zeta'' for d_1 <= x <= d_2: contacts `left` and `right`, with a
+    law such as `NewtonImpact`.
 
-    x is relative to the ground, to which spring, dashpot and stops are fixed, and which the channel `ground` displaces by zeta.
+    x is relative to the ground, to which spring, dashpot and stops are fixed, and which the channel
+    `ground` displaces by zeta.
 
     Parameters
     ----------
@@ -112,7 +121,9 @@ class TwoStops(ContactModel):
         settle_numbers(self, "stiffness", "damping", at_least=0.0)
         settle_numbers(self, "left", "right")
         if not self.left < self.right:
-            raise ParameterError(f"left must lie below right = {self.right:g}, got {self.left:g}", "left")
+            raise ParameterError(
+                f"left must lie below right = {self.right:g}, got {self.left:g}", "left"
+            )
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -122,7 +133,12 @@ class TwoStops(ContactModel):
 
     def force(self, t: Any, x: Any, velocity: Any, load: Load) -> Any:
         """F - zeta'' - c x' - k x."""
-        return load.force(t) - load.ground.acceleration(t) - self.damping * velocity - self.stiffness * x
+        return (
+            load.force(t)
+            - load.ground.acceleration(t)
+            - self.damping * velocity
+            - self.stiffness * x
+        )
 
     def mirror(self, load: Load) -> Load | None:
         """The load with the force and the ground reversed, for d_1 = -d_2; None otherwise."""
@@ -135,14 +151,16 @@ class TwoStops(ContactModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactPair(ContactModel):
-    """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the case's middle, |x| <= d:
+    """An impact damper: a case on a spring, at z, and a mass in it at the distance x from the
+    case's middle, |x| <= d:
 
         z'' + c z' + k z + mu (z'' + x'') = F(tau) - (1 + mu) zeta'',
         mu (z'' + x'') = -mu zeta'' while no wall pushes.
 
-    z is relative to the ground, to which spring and dashpot are fixed, and which the channel `ground` displaces by zeta. The
-    coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so that an impact at a wall acts on x alone, and the balance of
-    momentum gives the jump of z'. Contacts `left` at x = -d and `right` at x = d.
+    z is relative to the ground, to which spring and dashpot are fixed, and which the channel
+    `ground` displaces by zeta. The coordinates are those of T = (z'^2 + mu (z' + x')^2) / 2, so
+    that an impact at a wall acts on x alone, and the balance of momentum gives the jump of z'.
+    Contacts `left` at x = -d and `right` at x = d.
 
     Parameters
     ----------
@@ -186,7 +204,12 @@ class ImpactPair(ContactModel):
     def force(self, t: Any, q: Any, velocity: Any, load: Load) -> tuple[Any, Any]:
         """(F - (1 + mu) zeta'' - c z' - k z, -mu zeta'')."""
         ground = load.ground.acceleration(t)
-        pushed = load.force(t) - (1.0 + self.mass_ratio) * ground - self.damping * velocity[0] - self.stiffness * q[0]
+        pushed = (
+            load.force(t)
+            - (1.0 + self.mass_ratio) * ground
+            - self.damping * velocity[0]
+            - self.stiffness * q[0]
+        )
         return pushed, 0.0 * q[1] - self.mass_ratio * ground
 
     def mirror(self, load: Load) -> Load:
@@ -201,7 +224,8 @@ class ImpactPair(ContactModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeltOscillator(ContactModel):
-    """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction f (named `belt`) is
+    """x'' + c x' + k x = F(tau) + f, a mass pressed with N(tau) on a belt of speed w; the friction
+    f (named `belt`) is
 
         f = -mu_k N sign(x' - w) while it slides,    abs(f) <= mu_s N while it sticks, x' = w.
 
@@ -244,12 +268,20 @@ class BeltOscillator(ContactModel):
         settle_numbers(self, "normal_force", above=0.0)
         settle_numbers(self, "belt_speed")
         if self.static < self.kinetic:
-            raise ParameterError(f"static must be at least kinetic = {self.kinetic:g}, got {self.static:g}", "static")
+            raise ParameterError(
+                f"static must be at least kinetic = {self.kinetic:g}, got {self.static:g}", "static"
+            )
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
         """The friction of the belt."""
-        belt = Friction(name="belt", coordinate="x", kinetic=self.kinetic, static=self.static, ground_speed=self.belt_speed)
+        belt = Friction(
+            name="belt",
+            coordinate="x",
+            kinetic=self.kinetic,
+            static=self.static,
+            ground_speed=self.belt_speed,
+        )
         return (belt,)
 
     def normal_forces(self, t: Any, x: Any, velocity: Any, load: Load) -> tuple[Any, ...]:
@@ -273,15 +305,17 @@ class BeltOscillator(ContactModel):
 class RockingBlock(OneContactModel):
     """A rigid block rocking about its base corners, without bouncing (paper, `EOM&Rock`).
 
-    With time scaled by p = sqrt(3 g / (4 R)), zeta = 3 U_h / (4 R) and nu = 3 U_v / (4 R), on the side s = +1 or -1:
+    With time scaled by p = sqrt(3 g / (4 R)), zeta = 3 U_h / (4 R) and nu = 3 U_v / (4 R), on the
+    side s = +1 or -1:
 
         theta'' = -zeta'' cos(alpha - abs(theta)) - s (1 + nu'') sin(alpha - abs(theta))
 
-    The block is assumed to stay on the ground: for nu'' < -1 it would leave it, which is not checked.
-    A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
+    The block is assumed to stay on the ground: for nu'' < -1 it would leave it, which is not
+    checked. A motion stops, `overturned`, when the block lies on its side: pi/2 - abs(theta) = 0.
 
-    A system that is given no impact law has Housner's loss, `InelasticImpact`: each impact keeps 1 - (3/2) sin(alpha)^2 of the
-    velocity. `PhysicalBlock` makes the block and its loads from SI units.
+    A system that is given no impact law has Housner's loss, `InelasticImpact`: each impact keeps 1
+    - (3/2) sin(alpha)^2 of the velocity. `PhysicalBlock` makes the block and its loads from SI
+    units.
 
     Parameters
     ----------
@@ -312,22 +346,29 @@ class RockingBlock(OneContactModel):
         """theta'' of `EOM&Rock` in the time p t."""
         tilt = self.alpha - abs(theta)
         weight = 1 + load.ground_vertical.acceleration(t)
-        return -(load.ground_horizontal.acceleration(t) * np.cos(tilt)) - side * (weight * np.sin(tilt))
+        return -(load.ground_horizontal.acceleration(t) * np.cos(tilt)) - side * (
+            weight * np.sin(tilt)
+        )
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
         """T / ((4/3) M R^2 p^2) = [theta'^2 + (4/3)(zeta'^2 + nu'^2)
         + 2 theta' (zeta' cos(alpha - abs(theta)) + s nu' sin(alpha - abs(theta)))] / 2 (errata 10).
         """
-        zeta, nu = load.ground_horizontal.velocity(t), load.ground_vertical.velocity(t)
+        zeta = load.ground_horizontal.velocity(t)
+        nu = load.ground_vertical.velocity(t)
         tilt = self.alpha - side * theta
         ground = zeta * np.cos(tilt) + side * nu * np.sin(tilt)
         return (velocity * velocity + (zeta * zeta + nu * nu) * (4 / 3) + 2 * velocity * ground) / 2
 
     def inelastic_factor(self, side: Any) -> Any:
-        """1 - (3/2) sin(alpha)^2: angular momentum about the new corner is conserved (Housner 1963); not below 0."""
+        """1 - (3/2) sin(alpha)^2: angular momentum about the new corner is conserved (Housner
+        1963); not below 0.
+        """
         return np.maximum(1 - 1.5 * np.sin(self.alpha) * np.sin(self.alpha), 0.0)
 
-    def margins(self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load) -> dict[str, Any]:
+    def margins(
+        self, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Load
+    ) -> dict[str, Any]:
         """`overturned`: pi/2 - abs(theta)."""
         return {"overturned": math.pi / 2 - side * theta}
 

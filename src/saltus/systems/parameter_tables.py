@@ -1,4 +1,6 @@
-"""Tables of parameters: arrays or numbers by dotted path, broadcast together and checked before anything runs."""
+"""Tables of parameters: arrays or numbers by dotted path, broadcast together and checked before
+anything runs.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,8 @@ from saltus.errors import ParameterError, near, shown
 from saltus.systems.serial import numbers
 from saltus.systems.system import System
 
-# Up to this number of rows of parameters, a system is made of each; of more, those with a least or largest value are checked, and
-# as many more, evenly spaced.
+# Up to this number of rows of parameters, a system is made of each; of more, those with a least or
+# largest value are checked, and as many more, evenly spaced.
 MOST_CHECKED = 32
 
 
@@ -30,13 +32,17 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
         return {}
     if not isinstance(parameters, Mapping):
         raise ParameterError(
-            f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}", "parameters"
+            f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}",
+            "parameters",
         )
     known = [path for path, _ in numbers(system)]
     for path in parameters:
         if path not in known:
             system.get(str(path))  # refuses a path that leads nowhere
-            raise ParameterError(f"{path} is not a number, so it cannot be varied; {near(str(path), known)}", "parameters")
+            raise ParameterError(
+                f"{path} is not a number, so it cannot be varied; {near(str(path), known)}",
+                "parameters",
+            )
     return dict(parameters)
 
 
@@ -58,13 +64,15 @@ def check_parameters(system: System, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def distinct_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The different rows of columns (n,) in rising order, (m, columns), and the place of each row among them, (n,).
+    """The different rows of columns (n,) in rising order, (m, columns), and the place of each row
+    among them, (n,).
 
     It does what `np.unique` does along an axis, which takes ten times as long.
     """
     order = np.lexsort(columns[::-1])
     rows = np.stack(columns, axis=1)[order]
-    fresh, place = np.ones(len(rows), dtype=bool), np.empty(len(rows), dtype=int)
+    fresh = np.ones(len(rows), dtype=bool)
+    place = np.empty(len(rows), dtype=int)
     fresh[1:] = (rows[1:] != rows[:-1]).any(axis=1)
     place[order] = np.cumsum(fresh) - 1
     return rows[fresh], place
@@ -83,29 +91,46 @@ def finite_array(name: str, given: Any) -> Any:
     import xarray
 
     if (size := getattr(given, "size", 0)) > LIMITS.count:
-        raise ParameterError(f"{name} holds {size:.3g} numbers, and {LIMITS.count} are the most", name)
+        raise ParameterError(
+            f"{name} holds {size:.3g} numbers, and {LIMITS.count} are the most", name
+        )
     try:
         if np.iscomplexobj(given) or getattr(given, "dtype", np.dtype(float)).kind in "mM":
             raise TypeError
-        array = given.astype(float) if isinstance(given, xarray.DataArray) else np.asarray(given, dtype=float)
+        array = (
+            given.astype(float)
+            if isinstance(given, xarray.DataArray)
+            else np.asarray(given, dtype=float)
+        )
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} must be a number or an array of numbers, got {shown(given)}", name) from None
+        raise ParameterError(
+            f"{name} must be a number or an array of numbers, got {shown(given)}", name
+        ) from None
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
     return array
 
 
-def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
-    """Arrays broadcast together: their dimensions, shape and coordinates, and each array in one row, or as one number."""
+def broadcast_arrays(
+    arrays: dict[str, Any],
+) -> tuple[tuple[str, ...], tuple[int, ...], dict[str, Any], dict[str, np.ndarray]]:
+    """Arrays broadcast together: their dimensions, shape and coordinates, and each array in one
+    row, or as one number.
+    """
     import xarray
 
     named = {name: a for name, a in arrays.items() if isinstance(a, xarray.DataArray) and a.ndim}
     plain = {name: np.asarray(a) for name, a in arrays.items() if name not in named}
     many = [name for name, a in plain.items() if a.ndim]
     if named and many:
-        raise ParameterError(f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays, not both")
+        raise ParameterError(
+            f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays, not both"
+        )
     if named:
-        _check_together(min(named), {dim: size for a in named.values() for dim, size in a.sizes.items()}.values())
+        _check_together(
+            min(named),
+            {dim: size for a in named.values() for dim, size in a.sizes.items()}.values(),
+        )
         together = _aligned(named)
         dims, shape = next((tuple(str(d) for d in a.dims), a.shape) for a in together.values())
         flat = {name: a.values.reshape(-1) for name, a in together.items()} | plain
@@ -121,7 +146,12 @@ def broadcast_arrays(arrays: dict[str, Any]) -> tuple[tuple[str, ...], tuple[int
         ) from None
     _check_together(next(iter(many), "parameters"), shape)
     dims = ("trajectory",) if len(shape) == 1 else tuple(f"axis_{i}" for i in range(len(shape)))
-    return dims, shape, {}, {name: np.broadcast_to(a, shape).reshape(-1) if a.ndim else a for name, a in plain.items()}
+    return (
+        dims,
+        shape,
+        {},
+        {name: np.broadcast_to(a, shape).reshape(-1) if a.ndim else a for name, a in plain.items()},
+    )
 
 
 def _check_together(name: str, lengths: Iterable[int]) -> None:
@@ -145,7 +175,8 @@ def _aligned(named: dict[str, Any]) -> dict[str, Any]:
 
 
 def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
-    """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's coordinate.
+    """The coordinates of DataArrays; an array along a dimension of its own name is the dimension's
+    coordinate.
 
     As in xarray's arithmetic, coordinates on which two arrays do not agree are left out.
     """
@@ -160,8 +191,14 @@ def _coords(named: dict[str, Any], dims: tuple[str, ...]) -> dict[str, Any]:
             coords[str(name)] = values
     for name, array in named.items():
         if array.dims in ((name,), (f"initial_{name}",)):
-            coords.setdefault(str(array.dims[0]), array.copy().assign_coords({array.dims[0]: array.values}))
-    return {name: values.reset_coords(drop=True) for name, values in coords.items() if name not in unlike}
+            coords.setdefault(
+                str(array.dims[0]), array.copy().assign_coords({array.dims[0]: array.values})
+            )
+    return {
+        name: values.reset_coords(drop=True)
+        for name, values in coords.items()
+        if name not in unlike
+    }
 
 
 def check_path(system: System, path: Any, name: str = "path") -> None:
@@ -193,4 +230,6 @@ def check_along(system: System, path: str, values: Iterable[float], name: str) -
         try:
             system.with_({path: float(value)})
         except ParameterError as error:
-            raise ParameterError(f"{name} reach beyond what the system allows: {error}", name) from None
+            raise ParameterError(
+                f"{name} reach beyond what the system allows: {error}", name
+            ) from None

@@ -1,7 +1,8 @@
 """The shapes of pulses, loads that begin and end.
 
-A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the motion, as the samples of a
-record are, so that no step of an integration crosses them. In an ensemble each motion has its own breakpoints.
+A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the
+motion, as the samples of a record are, so that no step of an integration crosses them. In an
+ensemble each motion has its own breakpoints.
 """
 
 from __future__ import annotations
@@ -19,17 +20,34 @@ from saltus.errors import ParameterError
 from saltus.systems.signals import RATE, TIME, Pulse
 
 
-def in_other_units(pulse: Pulse, by_time: Callable[..., Any], by_rate: Callable[..., Any], unit: float, factor: float) -> Pulse:
+def in_other_units(
+    pulse: Pulse,
+    by_time: Callable[..., Any],
+    by_rate: Callable[..., Any],
+    unit: float,
+    factor: float,
+) -> Pulse:
     """The pulse with its times and rates converted by the unit of time, and `factor` times as high."""
     of = {"time": by_time, "rate": by_rate}
-    fields = {f.name: of[f.metadata["converts"]] for f in dataclasses.fields(pulse) if f.metadata.get("converts") in of}
+    fields = {
+        f.name: of[f.metadata["converts"]]
+        for f in dataclasses.fields(pulse)
+        if f.metadata.get("converts") in of
+    }
     changed = {name: convert(getattr(pulse, name), unit) for name, convert in fields.items()}
     return dataclasses.replace(pulse, **changed, amplitude=factor * pulse.amplitude)
 
 
-RICKER_REACH = 7.0  # the largest argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, less than rounding of the load
+# the largest argument u: beyond it (2 u^2 - 1) exp(-u^2) is below 1e-19, less than rounding of the
+# load
+RICKER_REACH = 7.0
 # Each function is the derivative of the one before.
-SINUSOIDS: tuple[Callable[[Any], Any], ...] = (np.sin, np.cos, lambda x: -np.sin(x), lambda x: -np.cos(x))
+SINUSOIDS: tuple[Callable[[Any], Any], ...] = (
+    np.sin,
+    np.cos,
+    lambda x: -np.sin(x),
+    lambda x: -np.cos(x),
+)
 
 
 def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
@@ -38,7 +56,9 @@ def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
         return rate**n * SINUSOIDS[n % 4](rate * since + phase)
     if n == -1:
         return (np.cos(phase) - np.cos(rate * since + phase)) / rate
-    return (np.sin(phase) - np.sin(rate * since + phase)) / (rate * rate) + np.cos(phase) / rate * since
+    return (np.sin(phase) - np.sin(rate * since + phase)) / (rate * rate) + np.cos(
+        phase
+    ) / rate * since
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +97,8 @@ class HalfSine(Pulse):
 
 @dataclass(frozen=True, kw_only=True)
 class OneSine(HalfSine):
-    """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a forward pulse of the velocity.
+    """amplitude sin(frequency s) for one period, 0 <= s <= 2 pi / frequency; of acceleration, a
+    forward pulse of the velocity.
 
     Parameters
     ----------
@@ -134,10 +155,12 @@ class OneCosine(OneSine):
 class MavroeidisPapageorgiou(Pulse):
     """The near-fault pulse of Mavroeidis and Papageorgiou (2003), BSSA 93(3), their velocity pulse:
 
-        amplitude / 2 (1 + cos(frequency r / gamma)) cos(frequency r + phase),    r from -h to h, h = pi gamma / frequency
+        amplitude / 2 (1 + cos(frequency r / gamma)) cos(frequency r + phase),    r from -h to h, h
+        = pi gamma / frequency
 
-    r is the time since its middle and `gamma` > 1 says how many oscillations it has. As a ground motion it is a `velocity`, or an
-    `acceleration` if `quantity` says so. It begins and ends with the value 0.
+    r is the time since its middle and `gamma` > 1 says how many oscillations it has. As a ground
+    motion it is a `velocity`, or an `acceleration` if `quantity` says so. It begins and ends with
+    the value 0.
 
     Parameters
     ----------
@@ -179,7 +202,8 @@ class MavroeidisPapageorgiou(Pulse):
 
     def shape(self, since: Any, n: int) -> Any:
         """The product of cosines as a sum of three sinusoids, differentiated or integrated."""
-        begin = self.phase - math.pi * self.gamma + 0.5 * math.pi  # the phase of the carrier, written as a sine, at the start
+        # the phase of the carrier, written as a sine, at the start
+        begin = self.phase - math.pi * self.gamma + 0.5 * math.pi
         carrier = sinusoid(self.frequency, begin, since, n)
         above = sinusoid(self.frequency * (1.0 + 1.0 / self.gamma), begin - math.pi, since, n)
         below = sinusoid(self.frequency * (1.0 - 1.0 / self.gamma), begin + math.pi, since, n)
@@ -188,10 +212,12 @@ class MavroeidisPapageorgiou(Pulse):
 
 @dataclass(frozen=True, kw_only=True)
 class Ricker(Pulse):
-    """The symmetric Ricker wavelet amplitude (1 - 2 u^2) exp(-u^2), u = frequency (s - 7 (2 / frequency)) / 2.
+    """The symmetric Ricker wavelet amplitude (1 - 2 u^2) exp(-u^2), u = frequency (s - 7 (2 /
+    frequency)) / 2.
 
-    Its peak is `7 (2 / frequency)` after `start`: before the start and after the end, abs(u) > 7, it is below 1e-19 of the
-    amplitude and taken as 0. As a ground acceleration it leaves the ground where it was, at rest.
+    Its peak is `7 (2 / frequency)` after `start`: before the start and after the end, abs(u) > 7,
+    it is below 1e-19 of the amplitude and taken as 0. As a ground acceleration it leaves the ground
+    where it was, at rest.
 
     Parameters
     ----------
@@ -219,8 +245,12 @@ class Ricker(Pulse):
         return 4.0 * RICKER_REACH / self.frequency
 
     def shape(self, since: Any, n: int) -> Any:
-        """-(amplitude / 2) (2 / frequency)^2 times the derivative of order n + 2 of exp(-u^2) by s, in Hermite polynomials."""
-        u, below, hermite = 0.5 * self.frequency * since - RICKER_REACH, 0.0, 1.0
+        """-(amplitude / 2) (2 / frequency)^2 times the derivative of order n + 2 of exp(-u^2) by s,
+        in Hermite polynomials.
+        """
+        u = 0.5 * self.frequency * since - RICKER_REACH
+        below = 0.0
+        hermite = 1.0
         for m in range(n + 2):
             below, hermite = hermite, 2.0 * u * hermite - 2.0 * m * below
         factor = -0.5 * (-1.0) ** n * self.amplitude * (0.5 * self.frequency) ** n
@@ -267,10 +297,11 @@ class Ramp(Pulse):
 
 @dataclass(frozen=True, kw_only=True)
 class Chirp(Pulse):
-    """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <= duration: a linear sweep.
+    """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <=
+    duration: a linear sweep.
 
-    As a ground acceleration its velocity and its displacement are no elementary functions; models and impact laws that read these
-    are refused.
+    As a ground acceleration its velocity and its displacement are no elementary functions; models
+    and impact laws that read these are refused.
 
     Parameters
     ----------
@@ -307,10 +338,12 @@ class Chirp(Pulse):
     def shape(self, since: Any, n: int) -> Any:
         """The sine of the swept phase, or its first two derivatives."""
         growth = (self.end_frequency - self.frequency) / self.duration
-        phase, rate = (self.frequency + 0.5 * growth * since) * since, self.frequency + growth * since
+        phase = (self.frequency + 0.5 * growth * since) * since
+        rate = self.frequency + growth * since
         if n < 0:
             raise ParameterError(
-                "the velocity of a ground with the acceleration of a Chirp is no elementary function; use a Record"
+                "the velocity of a ground with the acceleration of a Chirp is no elementary "
+                "function; use a Record"
             )
         if n == 2:
             return self.amplitude * (growth * np.cos(phase) - rate * rate * np.sin(phase))

@@ -1,11 +1,13 @@
 """The same system with time running backward: the exact flow of its past.
 
-With s = -t and theta(s) its velocity is -theta'(t), and the acceleration is the same function of the state as before:
+With s = -t and theta(s) its velocity is -theta'(t), and the acceleration is the same function of
+the state as before:
 
     d2 theta / ds2 = a(-s, theta, -d theta / ds),
 
-so damping becomes anti-damping. A load F(t) becomes F(-s): its harmonics mean + A sin(n W t + phi) become
-mean + A sin(n W s + pi - phi). An impact v- -> v+ = e v- is reversed: -v+ is the velocity before and -v- = -v+ / e after it.
+so damping becomes anti-damping. A load F(t) becomes F(-s): its harmonics mean + A sin(n W t + phi)
+become mean + A sin(n W s + pi - phi). An impact v- -> v+ = e v- is reversed: -v+ is the velocity
+before and -v- = -v+ / e after it.
 """
 
 from __future__ import annotations
@@ -36,17 +38,21 @@ class VelocityGain(ImpactLaw):
     def __post_init__(self) -> None:
         settle_numbers(self, "e", above=0.0, at_most=1.0)
 
-    def velocity_after(self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load) -> Any:
+    def velocity_after(
+        self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
+    ) -> Any:
         """v- / e."""
         return velocity / self.e
 
 
 def reversed_system(system: System) -> System:
-    """The system whose motions are those of `system` run backward, with the same parameters by the same paths.
+    """The system whose motions are those of `system` run backward, with the same parameters by the
+    same paths.
 
-    `simulate(reversed_system(system), theta=q, velocity=-v, time=-t, duration=T)` ends at the state that the forward motion had
-    a time T before it came to (q, v) at t, with the other sign of the velocity. Rest at the contact has no past: motions come to
-    it from many states in a finite time, and a backward motion never reaches it.
+    `simulate(reversed_system(system), theta=q, velocity=-v, time=-t, duration=T)` ends at the state
+    that the forward motion had a time T before it came to (q, v) at t, with the other sign of the
+    velocity. Rest at the contact has no past: motions come to it from many states in a finite time,
+    and a backward motion never reaches it.
 
     Parameters
     ----------
@@ -56,8 +62,8 @@ def reversed_system(system: System) -> System:
     Raises
     ------
     ParameterError
-        An impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the model that
-        this law does not undo.
+        An impact law without an inverse (`VelocityReduction` with e > 0 has one), or a reset of the
+        model that this law does not undo.
 
     Examples
     --------
@@ -67,9 +73,14 @@ def reversed_system(system: System) -> System:
     check_system(system, "reversed_system")
     impact = system.impact
     if not isinstance(impact, VelocityReduction) or impact.e <= 0.0:
-        raise ParameterError(f"{impact!r} cannot be followed backward; only VelocityReduction(e) with e > 0 can", "impact")
+        raise ParameterError(
+            f"{impact!r} cannot be followed backward; only VelocityReduction(e) with e > 0 can",
+            "impact",
+        )
     backward = VelocityReduction(1.0) if impact.e == 1.0 else VelocityGain(impact.e)
-    result = System(model=reversed_model(system.model), load=reversed_load(system.load), impact=backward)
+    result = System(
+        model=reversed_model(system.model), load=reversed_load(system.load), impact=backward
+    )
     _check_resets(system, result)
     return result
 
@@ -83,7 +94,10 @@ def reversed_model(model: Model) -> Model:
 
 def reversed_load(load: Load) -> Load:
     """The load F(-t)."""
-    return Load(frequency=load.frequency, **{name: _reversed_signal(signal) for name, signal in load.channels.items()})
+    return Load(
+        frequency=load.frequency,
+        **{name: _reversed_signal(signal) for name, signal in load.channels.items()},
+    )
 
 
 def _reversed_signal(signal: Signal) -> Signal:
@@ -95,12 +109,20 @@ def _reversed_signal(signal: Signal) -> Signal:
         return Sum(tuple(_reversed_signal(term) for term in signal.terms))
     if isinstance(signal, Record):
         sign = -1.0 if signal.quantity == "velocity" else 1.0
-        return Record(-signal.time[::-1], sign * signal.value[::-1], signal.quantity, signal.scale, signal.source)
+        return Record(
+            -signal.time[::-1],
+            sign * signal.value[::-1],
+            signal.quantity,
+            signal.scale,
+            signal.source,
+        )
     raise ParameterError(f"a {type(signal).__name__} cannot be run backward")
 
 
 class _BackwardLoad:
-    """A load that is reversed in time, as the forward model reads it: with first derivatives of the original sign."""
+    """A load that is reversed in time, as the forward model reads it: with first derivatives of the
+    original sign.
+    """
 
     def __init__(self, load: Any) -> None:
         self._load = load
@@ -131,11 +153,17 @@ def _reversed_class(cls: type[Model]) -> Any:
     def acceleration(self: Any, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         return cls.acceleration(self, t, theta, _turned(velocity), side, _BackwardLoad(load))
 
-    def margins(self: Any, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any) -> Any:
-        return cls.margins(self, t, theta, _turned(velocity), acceleration, side, _BackwardLoad(load))
+    def margins(
+        self: Any, t: Any, theta: Any, velocity: Any, acceleration: Any, side: Any, load: Any
+    ) -> Any:
+        return cls.margins(
+            self, t, theta, _turned(velocity), acceleration, side, _BackwardLoad(load)
+        )
 
     def reduce(self: Any) -> Any:
-        return reversed_model, (cls(**{f.name: getattr(self, f.name) for f in dataclasses.fields(self)}),)
+        return reversed_model, (
+            cls(**{f.name: getattr(self, f.name) for f in dataclasses.fields(self)}),
+        )
 
     body = {
         "__slots__": (),
@@ -157,8 +185,12 @@ def _check_resets(system: System, backward: System) -> None:
     for side in system.model.sides:
         for speed in RESET_SPEEDS:
             before = -speed * system.one_contact.inward(side)
-            following, after = system.one_contact.reset(0.0, before, side, system.load, system.impact)
-            back, again = backward.one_contact.reset(0.0, -after, following, backward.load, backward.impact)
+            following, after = system.one_contact.reset(
+                0.0, before, side, system.load, system.impact
+            )
+            back, again = backward.one_contact.reset(
+                0.0, -after, following, backward.load, backward.impact
+            )
             if back != side or not math.isclose(float(again), -before, rel_tol=1e-12):
                 raise ParameterError(
                     f"the reset of {type(system.model).__name__} cannot be followed backward: v+ = {float(after):g} on side "

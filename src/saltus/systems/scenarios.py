@@ -1,4 +1,6 @@
-"""Impact scenarios: an impact classified by the states before and after it (paper, Table 1, erratum 16)."""
+"""Impact scenarios: an impact classified by the states before and after it (paper, Table 1, erratum
+16).
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,10 @@ class Scenario(Enum):
     """
 
     NO_BOUNCING = "no bouncing"  #: it stops
-    BOUNCING = "bouncing"  #: it turns back, and is the only one to move, or the other one was open already
-    PARTIAL_BOUNCING = "partial bouncing"  #: it turns back, and the other one, closed until then, opens
+    # : it turns back, and is the only one to move, or the other one was open already
+    BOUNCING = "bouncing"
+    # : it turns back, and the other one, closed until then, opens
+    PARTIAL_BOUNCING = "partial bouncing"
 
 
 class LayerState(NamedTuple):
@@ -50,7 +54,9 @@ class LayerState(NamedTuple):
 
 
 class NamedImpact(NamedTuple):
-    """A classified impact: the scenario, the impacting layer s (1 lower, 2 upper) and the numbers of deformed layers."""
+    """A classified impact: the scenario, the impacting layer s (1 lower, 2 upper) and the numbers
+    of deformed layers.
+    """
 
     scenario: Scenario
     layer: int
@@ -70,15 +76,18 @@ class TableRow:
 
 
 def table_1() -> tuple[TableRow, ...]:
-    """Table 1 as erratum 16 corrects it: s the impacting layer, j the other one; angles are those at the impact.
+    """Table 1 as erratum 16 corrects it: s the impacting layer, j the other one; angles are those
+    at the impact.
 
     Examples
     --------
     >>> [(row.before, row.after) for row in saltus.systems.table_1()][0]
     ("theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s'(+) = 0, theta_j'(+) != 0")
     """
-    one, two = "theta_s = 0, theta_j = 0, theta_j'(-) = 0", "theta_s = 0, theta_j != 0"
-    stops, turns = "theta_s'(+) = 0", "theta_s'(-) theta_s'(+) < 0"
+    one = "theta_s = 0, theta_j = 0, theta_j'(-) = 0"
+    two = "theta_s = 0, theta_j != 0"
+    stops = "theta_s'(+) = 0"
+    turns = "theta_s'(-) theta_s'(+) < 0"
     balance = "M_sj [theta_s'] + M_jj [theta_j'] = 0"
     return (
         TableRow(1, one, 1, f"{stops}, theta_j'(+) != 0", Scenario.NO_BOUNCING),
@@ -89,12 +98,16 @@ def table_1() -> tuple[TableRow, ...]:
     )
 
 
-def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None = None, tolerance: float = 1e-9) -> NamedImpact:
-    """The scenario of Table 1 that leads from the state just before an impact to the one just after it.
+def name_impact(
+    before: LayerState, after: LayerState, *, model: TwoLayer | None = None, tolerance: float = 1e-9
+) -> NamedImpact:
+    """The scenario of Table 1 that leads from the state just before an impact to the one just after
+    it.
 
-    A velocity below `tolerance` times the largest one counts as zero, an angle below `tolerance` rad as closed. With a
-    `model`, an impact on one layer while the other is open must keep the balance of `other_impulse`. An impact that
-    stops everything, as in errata 25 outside 45 to 135 degrees, is no bouncing with no deformed layer after it.
+    A velocity below `tolerance` times the largest one counts as zero, an angle below `tolerance`
+    rad as closed. With a `model`, an impact on one layer while the other is open must keep the
+    balance of `other_impulse`. An impact that stops everything, as in errata 25 outside 45 to 135
+    degrees, is no bouncing with no deformed layer after it.
 
     Parameters
     ----------
@@ -121,13 +134,21 @@ def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None
     speed = tolerance * max(1e-300, *map(abs, before.velocity), *map(abs, after.velocity))
     closing = [abs(before.theta[i]) <= tolerance and _opening(before, i) < -speed for i in (0, 1)]
     if closing[0] == closing[1]:
-        which = "both layers impact at once" if closing[0] else "no layer that is closed moves towards its contact"
-        raise ParameterError(f"not an impact of Table 1: {which}, at angles {before.theta} with velocities {before.velocity}")
+        which = (
+            "both layers impact at once"
+            if closing[0]
+            else "no layer that is closed moves towards its contact"
+        )
+        raise ParameterError(
+            f"not an impact of Table 1: {which}, at angles {before.theta} with velocities {before.velocity}"
+        )
     s = closing.index(True)
     j = 1 - s
     for i in (0, 1):
         if abs(after.theta[i]) <= tolerance and _opening(after, i) < -speed:
-            raise ParameterError(f"layer {i + 1} would close further after the impact, with velocity {after.velocity[i]!r}")
+            raise ParameterError(
+                f"layer {i + 1} would close further after the impact, with velocity {after.velocity[i]!r}"
+            )
     other_open = abs(before.theta[j]) > tolerance or _opening(before, j) > speed
     if other_open and model is not None:
         _check_balance(model, before, after, s, tolerance)
@@ -140,10 +161,12 @@ def name_impact(before: LayerState, after: LayerState, *, model: TwoLayer | None
 
 
 def other_impulse(model: TwoLayer, before: LayerState, after: LayerState, layer: int) -> float:
-    """The impulse on the layer j that is not hit, M_js [[theta_s']] + M_jj [[theta_j']], with s = `layer` (from `eomnl`).
+    """The impulse on the layer j that is not hit, M_js [[theta_s']] + M_jj [[theta_j']], with s =
+    `layer` (from `eomnl`).
 
-    It is zero while layer j is open, so its velocity jumps whenever that of layer s does (M_12 is not zero, erratum 16); on
-    a closed layer its contact may act too, with an impulse that opens it: >= 0 for j = 1, <= 0 for j = 2.
+    It is zero while layer j is open, so its velocity jumps whenever that of layer s does (M_12 is
+    not zero, erratum 16); on a closed layer its contact may act too, with an impulse that opens it:
+    >= 0 for j = 1, <= 0 for j = 2.
 
     Parameters
     ----------
@@ -161,7 +184,8 @@ def other_impulse(model: TwoLayer, before: LayerState, after: LayerState, layer:
     >>> round(saltus.systems.other_impulse(saltus.TwoLayer(beta0=np.pi / 4), before, after, 1), 12)  # M_12 = 0
     0.0
     """
-    s, j = layer - 1, 2 - layer
+    s = layer - 1
+    j = 2 - layer
     jump = np.subtract(after.velocity, before.velocity)
     row = model.mass_matrix(before.theta)[j]
     return float(row[s] * jump[s] + row[j] * jump[j])
@@ -177,14 +201,22 @@ def _check_states(before: LayerState, after: LayerState, tolerance: float) -> No
         if not all(math.isfinite(value) for pair in state for value in pair):
             raise ParameterError(f"the state {name} the impact must be finite, got {state}")
         if state.theta[0] < -tolerance or state.theta[1] > tolerance:
-            raise ParameterError(f"the state {name} the impact needs theta_1 >= 0 and theta_2 <= 0, got {state.theta}")
+            raise ParameterError(
+                f"the state {name} the impact needs theta_1 >= 0 and theta_2 <= 0, got {state.theta}"
+            )
     if any(abs(a - b) > tolerance for a, b in zip(before.theta, after.theta, strict=True)):
-        raise ParameterError(f"angles are continuous at an impact, got {before.theta} before and {after.theta} after")
+        raise ParameterError(
+            f"angles are continuous at an impact, got {before.theta} before and {after.theta} after"
+        )
 
 
-def _check_balance(model: TwoLayer, before: LayerState, after: LayerState, s: int, tolerance: float) -> None:
+def _check_balance(
+    model: TwoLayer, before: LayerState, after: LayerState, s: int, tolerance: float
+) -> None:
     impulse = other_impulse(model, before, after, s + 1)
-    scale = max(1e-300, *map(abs, before.velocity), *map(abs, after.velocity)) * (1 + model.mass_ratio)
+    scale = max(1e-300, *map(abs, before.velocity), *map(abs, after.velocity)) * (
+        1 + model.mass_ratio
+    )
     if abs(impulse) > 10 * tolerance * scale:
         raise ParameterError(
             f"layer {2 - s} is open and not hit, but its momentum changes by {impulse:.3g} (per M2 l^2 / T); "

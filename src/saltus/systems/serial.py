@@ -1,6 +1,8 @@
-"""Systems as plain dictionaries, and back: the form in which they are written to files; and the types that a file may name.
+"""Systems as plain dictionaries, and back: the form in which they are written to files; and the
+types that a file may name.
 
-A new model, impact law or pulse is one new file, one line in the door of this room and one name here.
+A new model, impact law or pulse is one new file, one line in the door of this room and one name
+here.
 """
 
 from __future__ import annotations
@@ -22,13 +24,17 @@ from saltus.systems.signals import Constant, Harmonic, Pulse, Record, Signal, Su
 
 
 def children(node: Any) -> dict[str, Any]:
-    """The named parts of a part of a system: fields of a dataclass, channels of a load, terms of a sum, factors of a law."""
+    """The named parts of a part of a system: fields of a dataclass, channels of a load, terms of a
+    sum, factors of a law.
+    """
     if isinstance(node, Load):
         return {"frequency": node.frequency, **node.channels}
     if isinstance(node, NamedParts):
         return {part.name: part for part in node}
     if isinstance(node, (Sum, Factors)):
-        return {str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)}
+        return {
+            str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)
+        }
     kind: Any = type(node)
     return {name: getattr(node, name) for name in fields_of(kind)}
 
@@ -39,19 +45,21 @@ def is_number(value: Any) -> bool:
 
 
 def is_fixed(node: Any) -> bool:
-    """Whether nothing below `node` can change: frozen classes, arrays that cannot be written, and what can be the key of a
-    dictionary."""
+    """Whether nothing below `node` can change: frozen classes, arrays that cannot be written, and
+    what can be the key of a dictionary."""
     if isinstance(node, np.ndarray):
         return not node.flags.writeable
     settings = getattr(type(node), "__dataclass_params__", None)
     if settings is None or isinstance(node, Factors):
         return type(node).__hash__ is not None
-    return settings.frozen and all(type(part) is float or is_fixed(part) for part in children(node).values())
+    return settings.frozen and all(
+        type(part) is float or is_fixed(part) for part in children(node).values()
+    )
 
 
 def numbers(node: Any, prefix: str = "", given: bool = False) -> Iterator[tuple[str, float]]:
-    """Every number below `node` with its dotted path, or all but those that follow from others; a `Constant` is the path of its
-    channel."""
+    """Every number below `node` with its dotted path, or all but those that follow from others; a
+    `Constant` is the path of its channel."""
     if given and isinstance(node, Coefficients):
         return
     if isinstance(node, Constant):
@@ -68,22 +76,27 @@ def numbers(node: Any, prefix: str = "", given: bool = False) -> Iterator[tuple[
 
 
 def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
-    """A copy of `node` with the parts at the given dotted paths replaced, all at once, so that their order does not matter.
+    """A copy of `node` with the parts at the given dotted paths replaced, all at once, so that
+    their order does not matter.
 
-    Where a part and something below it are both given, the part is replaced first. Numbers become constant signals where
-    signals stand.
+    Where a part and something below it are both given, the part is replaced first. Numbers become
+    constant signals where signals stand.
 
     Raises
     ------
     ParameterError
-        A path that leads nowhere; the error names similar ones. A value that the new system refuses.
+        A path that leads nowhere; the error names similar ones. A value that the new system
+        refuses.
     """
-    parts, below = children(node), defaultdict[str, dict[str, Any]](dict)
+    parts = children(node)
+    below = defaultdict[str, dict[str, Any]](dict)
     for path, value in changes.items():
         head, _, rest = str(path).partition(".")
         if head not in parts and not (isinstance(node, Load) and head.isidentifier() and not rest):
             hint = f"{type(node).__name__} has no {shown(head)}; {near(head, children(node))}"
-            raise ParameterError(f"no parameter {shown(where + str(path))}: {hint}", where + str(path))
+            raise ParameterError(
+                f"no parameter {shown(where + str(path))}: {hint}", where + str(path)
+            )
         if rest:
             below[head][rest] = value
         else:
@@ -99,29 +112,42 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     try:
         return dataclasses.replace(node, **parts)
     except SaltusError as error:
-        raise (error.inside(where[:-1]) if where and isinstance(error, ParameterError) else error) from None
+        raise (
+            error.inside(where[:-1]) if where and isinstance(error, ParameterError) else error
+        ) from None
     except REFUSALS as error:
-        refused = refusal(error, {str(path).partition(".")[0]: parts[str(path).partition(".")[0]] for path in changes})
+        refused = refusal(
+            error,
+            {str(path).partition(".")[0]: parts[str(path).partition(".")[0]] for path in changes},
+        )
         raise (refused.inside(where[:-1]) if where else refused) from error
 
 
-REFUSALS = (ValueError, TypeError, ArithmeticError)  # what the checks of a user's own class raise where a number has no meaning
+# what the checks of a user's own class raise where a number has no meaning
+REFUSALS = (ValueError, TypeError, ArithmeticError)
 
 
 def refusal(error: Exception, given: Mapping[str, Any]) -> ParameterError:
-    """The error of a user's own class as a ParameterError, with the name and value of the field that it is about.
+    """The error of a user's own class as a ParameterError, with the name and value of the field
+    that it is about.
 
-    That is the field of those `given` with which its sentence begins, or the only one that is given.
+    That is the field of those `given` with which its sentence begins, or the only one that is
+    given.
     """
     sentence = str(error) or type(error).__name__
-    name = next((name for name in given if sentence.startswith(f"{name} ")), next(iter(given)) if len(given) == 1 else None)
+    name = next(
+        (name for name in given if sentence.startswith(f"{name} ")),
+        next(iter(given)) if len(given) == 1 else None,
+    )
     if name is not None and shown(given[name]) not in sentence:
         sentence += f", got {shown(given[name])}"
     return ParameterError(sentence, name)
 
 
 def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -> Any:
-    """A copy of `node` with every number replaced by `leaf(path, number)`, made without checks: for tracing."""
+    """A copy of `node` with every number replaced by `leaf(path, number)`, made without checks: for
+    tracing.
+    """
     twin: Any
     if isinstance(node, Constant):
         twin = object.__new__(Constant)
@@ -130,7 +156,9 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
     parts = {}
     for name, child in children(node).items():
         path = f"{prefix}.{name}" if prefix else name
-        parts[name] = leaf(path, float(child)) if is_number(child) else substitute(child, leaf, path)
+        parts[name] = (
+            leaf(path, float(child)) if is_number(child) else substitute(child, leaf, path)
+        )
     if isinstance(node, Load):
         twin = object.__new__(Load)
         object.__setattr__(twin, "frequency", parts.pop("frequency"))
@@ -151,7 +179,10 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
 
 
 class NamedTypes(UserDict[str, Any]):
-    """Classes by their names. One of saltus is imported when it is first asked for: a motion needs one model, not all."""
+    """Classes by their names.
+
+    One of saltus is imported when it is first asked for: a motion needs one model, not all.
+    """
 
     def __getitem__(self, name: str) -> Any:
         if self.data[name] is None:
@@ -160,19 +191,42 @@ class NamedTypes(UserDict[str, Any]):
 
 
 MODELS = NamedTypes(
-    dict.fromkeys(("Metainterface", "RockingBlock", "TwoLayer", "WallOscillator", "TwoStops", "ImpactPair", "BeltOscillator"))
+    dict.fromkeys(
+        (
+            "Metainterface",
+            "RockingBlock",
+            "TwoLayer",
+            "WallOscillator",
+            "TwoStops",
+            "ImpactPair",
+            "BeltOscillator",
+        )
+    )
     | {"CellChain": None, "Structure": None}
 )
 IMPACTS = NamedTypes(
-    dict.fromkeys(("VelocityReduction", "EnergyRestitution", "InelasticImpact", "NewtonImpact", "PoissonImpact"))
+    dict.fromkeys(
+        (
+            "VelocityReduction",
+            "EnergyRestitution",
+            "InelasticImpact",
+            "NewtonImpact",
+            "PoissonImpact",
+        )
+    )
 )
-PULSES = NamedTypes(dict.fromkeys(("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")))
+PULSES = NamedTypes(
+    dict.fromkeys(
+        ("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")
+    )
+)
 
 T = TypeVar("T", type[Model], type[ImpactLaw])
 
 
 def register(cls: T) -> T:
-    """Make a model or an impact law of your own known by its class name, so that files can name it; use as a decorator.
+    """Make a model or an impact law of your own known by its class name, so that files can name it;
+    use as a decorator.
 
     Raises
     ------
@@ -217,14 +271,22 @@ def to_dict(part: Any) -> Any:
     if isinstance(part, Sum):
         return [to_dict(term) for term in part.terms]
     if isinstance(part, Record):
-        fields = {"time": part.time.tolist(), "value": part.value.tolist(), "quantity": part.quantity}
+        fields = {
+            "time": part.time.tolist(),
+            "value": part.value.tolist(),
+            "quantity": part.quantity,
+        }
         return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
     kind: Any = type(part)
     if hasattr(part, "to_table"):
         return {"type": kind.__name__, **part.to_table()}
     fields = {name: getattr(part, name) for name in fields_of(kind)}
     fields = {name: value for name, value in fields.items() if value is not None}
-    return fields if isinstance(part, Signal) and not isinstance(part, Pulse) else {"type": kind.__name__, **fields}
+    return (
+        fields
+        if isinstance(part, Signal) and not isinstance(part, Pulse)
+        else {"type": kind.__name__, **fields}
+    )
 
 
 def from_dict(kind: str, data: Any) -> Any:
@@ -235,29 +297,48 @@ def from_dict(kind: str, data: Any) -> Any:
         for name in data:
             if not isinstance(name, str) or not name.isidentifier() or name == "self":
                 raise ParameterError(f"load has no channel {shown(name)}", f"load.{shown(name)}")
-        channels = {name: read_signal(value, f"load.{name}") for name, value in data.items() if name != "frequency"}
+        channels = {
+            name: read_signal(value, f"load.{name}")
+            for name, value in data.items()
+            if name != "frequency"
+        }
         return Load(frequency=data.get("frequency"), **channels)
     fields = dict(data)
     if "type" not in fields:
-        raise ParameterError(f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or 'VelocityReduction'", kind)
+        raise ParameterError(
+            (
+                f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or "
+                "'VelocityReduction'"
+            ),
+            kind,
+        )
     name = fields.pop("type")
     if not isinstance(name, str):
-        raise ParameterError(f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type")
+        raise ParameterError(
+            f"{kind}.type must be a name in quotes, got {shown(name)}", f"{kind}.type"
+        )
     made = build(find(kind, name.removesuffix(IN_GAPS)), fields, kind)
     return in_gap_coordinates(made) if name.endswith(IN_GAPS) else made
 
 
 def read_signal(data: Any, where: str) -> Any:
-    """A number, a table of a `Harmonic`, a `Record` or (with its `type`) a pulse, or a list of them (their sum)."""
+    """A number, a table of a `Harmonic`, a `Record` or (with its `type`) a pulse, or a list of them
+    (their sum).
+    """
     if isinstance(data, (list, tuple)):
         return as_signal([read_signal(item, f"{where}.{i}") for i, item in enumerate(data)], where)
     if isinstance(data, Mapping):
-        return build(signal_class(data, where), {key: value for key, value in data.items() if key != "type"}, where)
+        return build(
+            signal_class(data, where),
+            {key: value for key, value in data.items() if key != "type"},
+            where,
+        )
     return data
 
 
 def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
-    """The class of a signal's table: the pulse that its `type` names or, without one, `Record` if it has samples, or `Harmonic`.
+    """The class of a signal's table: the pulse that its `type` names or, without one, `Record` if
+    it has samples, or `Harmonic`.
 
     Raises
     ------
@@ -279,7 +360,9 @@ def build(cls: type, fields: dict[str, Any], where: str) -> Any:
     known = {f.name: f for f in dataclasses.fields(cls)}
     for name in fields:
         if name not in known:
-            raise ParameterError(f"unknown key {where}.{name:.60}; {near(name, known)}", f"{where}.{name}")
+            raise ParameterError(
+                f"unknown key {where}.{name:.60}; {near(name, known)}", f"{where}.{name}"
+            )
     for name, f in known.items():
         needed = f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
         if needed and name not in fields:

@@ -1,4 +1,6 @@
-"""SI data of a cell or a block, and the dimensionless numbers that follow (paper, `timeT` to `displ_ratio1`, `dim_less`)."""
+"""SI data of a cell or a block, and the dimensionless numbers that follow (paper, `timeT` to
+`displ_ratio1`, `dim_less`).
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,8 @@ class Physical:
         raise NotImplementedError
 
     def load(self, si: Load) -> Load:
-        """The dimensionless form of a load in SI units: rad/s, N, and for the ground m, m/s or m/s^2; times of records in s.
+        """The dimensionless form of a load in SI units: rad/s, N, and for the ground m, m/s or
+        m/s^2; times of records in s.
 
         Parameters
         ----------
@@ -53,47 +56,70 @@ class Physical:
         """
         return self._convert(load, mul, truediv, 1)
 
-    def _convert(self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int) -> Load:
-        """The load with times and rates converted by the unit of time, and values multiplied by the `power` of their unit."""
+    def _convert(
+        self, load: Load, by_time: Callable[..., Any], by_rate: Callable[..., Any], power: int
+    ) -> Load:
+        """The load with times and rates converted by the unit of time, and values multiplied by the
+        `power` of their unit.
+        """
         units = self.units
         forces = [name for name in load.channels if not name.startswith("ground")]
         if forces and "force" not in units:
-            raise ParameterError(f"a {type(self).__name__} has no unit of force for load.{forces[0]}", f"load.{forces[0]}")
+            raise ParameterError(
+                f"a {type(self).__name__} has no unit of force for load.{forces[0]}",
+                f"load.{forces[0]}",
+            )
 
         def convert(signal: Signal, quantity: str) -> Signal:
             if isinstance(signal, Sum):
                 return Sum(tuple(convert(term, quantity) for term in signal.terms))
             if isinstance(signal, Record):
                 scale = signal.scale * units[signal.quantity] ** power
-                return Record(by_time(signal.time, units["time"]), signal.value, signal.quantity, scale, signal.source)
+                return Record(
+                    by_time(signal.time, units["time"]),
+                    signal.value,
+                    signal.quantity,
+                    scale,
+                    signal.source,
+                )
             if isinstance(signal, Pulse):
-                return in_other_units(signal, by_time, by_rate, units["time"], units[signal.quantity] ** power)
+                return in_other_units(
+                    signal, by_time, by_rate, units["time"], units[signal.quantity] ** power
+                )
             return scaled(signal, units[quantity] ** power)
 
         channels = {
             name: convert(signal, "displacement" if name.startswith("ground") else "force")
             for name, signal in load.channels.items()
         }
-        return Load(frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]), **channels)
+        return Load(
+            frequency=None if load.frequency is None else by_rate(load.frequency, units["time"]),
+            **channels,
+        )
 
 
 def _notice_milliseconds(load: Load) -> None:
-    """Warn of long records whose samples are a second or more apart: instruments sample a hundred times a second, so that the
-    times may be in milliseconds."""
+    """Warn of long records whose samples are a second or more apart: instruments sample a hundred
+    times a second, so that the times may be in milliseconds."""
     for signal in load.channels.values():
         for term in getattr(signal, "terms", (signal,)):
-            if isinstance(term, Record) and term.time.size > 100 and term.time[-1] - term.time[0] >= term.time.size:
+            if (
+                isinstance(term, Record)
+                and term.time.size > 100
+                and term.time[-1] - term.time[0] >= term.time.size
+            ):
                 text = f"the samples of {term!r} are seconds apart, as times are in seconds; divide those in milliseconds by 1000"
                 warnings.warn(text, UserWarning, stacklevel=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalCell(Physical):
-    """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the lower one, 2 the upper one.
+    """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the
+    lower one, 2 the upper one.
 
-    The characteristic time is T = sqrt(M2 l^2 / K2) (`timeT`), so that tau = t / T; forces are H l / K2 (`dim_less`), ground
-    displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2), all three as corrected by erratum 13; energies are
-    per K2.
+    The characteristic time is T = sqrt(M2 l^2 / K2) (`timeT`), so that tau = t / T; forces are H l
+    / K2 (`dim_less`), ground displacements U / l (`displ_ratio1`), the damping C = C2 T / (M2 l^2),
+    all three as corrected by erratum 13; energies are per K2.
 
     Parameters
     ----------
@@ -115,7 +141,8 @@ class PhysicalCell(Physical):
     Raises
     ------
     ParameterError
-        A value out of range, or a lower damping without an upper one (c = C1 / C2 is then undefined).
+        A value out of range, or a lower damping without an upper one (c = C1 / C2 is then
+        undefined).
 
     Examples
     --------
@@ -133,10 +160,15 @@ class PhysicalCell(Physical):
     lower_damping: float | None = None
 
     def __post_init__(self) -> None:
-        for name, twin in (("lower_stiffness", "upper_stiffness"), ("lower_damping", "upper_damping")):
+        for name, twin in (
+            ("lower_stiffness", "upper_stiffness"),
+            ("lower_damping", "upper_damping"),
+        ):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(self, twin))
-        settle_numbers(self, "length", "upper_mass", "upper_stiffness", "lower_stiffness", above=0.0)
+        settle_numbers(
+            self, "length", "upper_mass", "upper_stiffness", "lower_stiffness", above=0.0
+        )
         settle_numbers(self, "lower_mass", "upper_damping", "lower_damping", at_least=0.0)
         if self.upper_damping == 0.0 and self.lower_damping != 0.0:
             raise ParameterError(
@@ -147,9 +179,15 @@ class PhysicalCell(Physical):
 
     @classmethod
     def from_model(
-        cls, model: Metainterface | TwoLayer, *, length: float, upper_mass: float, upper_stiffness: float
+        cls,
+        model: Metainterface | TwoLayer,
+        *,
+        length: float,
+        upper_mass: float,
+        upper_stiffness: float,
     ) -> PhysicalCell:
-        """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are those of `model`.
+        """The cell of this length, upper mass and upper stiffness whose dimensionless numbers are
+        those of `model`.
 
         Parameters
         ----------
@@ -162,7 +200,11 @@ class PhysicalCell(Physical):
         upper_stiffness
             K2, N m / rad.
         """
-        for name, value in (("length", length), ("upper_mass", upper_mass), ("upper_stiffness", upper_stiffness)):
+        for name, value in (
+            ("length", length),
+            ("upper_mass", upper_mass),
+            ("upper_stiffness", upper_stiffness),
+        ):
             check_number(name, value, above=0.0)
         upper_damping = model.damping * math.sqrt(upper_mass * length**2 * upper_stiffness)
         return cls(
@@ -177,9 +219,11 @@ class PhysicalCell(Physical):
 
     @property
     def units(self) -> dict[str, float]:
-        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], H = H_2 / units["force"] and so on.
+        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], H = H_2 /
+        units["force"] and so on.
 
-        T = sqrt(M2 l^2 / K2) (`timeT`), 1 / T rad/s, K2 / l (`dim_less`), l and its rates, and the energy K2.
+        T = sqrt(M2 l^2 / K2) (`timeT`), 1 / T rad/s, K2 / l (`dim_less`), l and its rates, and the
+        energy K2.
         """
         time = math.sqrt(self.upper_mass * self.length**2 / self.upper_stiffness)
         return {
@@ -194,12 +238,17 @@ class PhysicalCell(Physical):
 
     @property
     def ratios(self) -> dict[str, float]:
-        """C, k, m, c as the models name them (`m_k_ratio`, `disip_ratio`); c is 1 where nothing is damped."""
+        """C, k, m, c as the models name them (`m_k_ratio`, `disip_ratio`); c is 1 where nothing is
+        damped.
+        """
         return {
             "damping": self.upper_damping * self.units["time"] / (self.upper_mass * self.length**2),
-            "stiffness_ratio": (self.lower_stiffness or self.upper_stiffness) / self.upper_stiffness,
+            "stiffness_ratio": (self.lower_stiffness or self.upper_stiffness)
+            / self.upper_stiffness,
             "mass_ratio": self.lower_mass / self.upper_mass,
-            "dissipation_ratio": (self.lower_damping or 0.0) / self.upper_damping if self.upper_damping else 1.0,
+            "dissipation_ratio": (self.lower_damping or 0.0) / self.upper_damping
+            if self.upper_damping
+            else 1.0,
         }
 
     def metainterface(self, beta0: float) -> Metainterface:
@@ -225,10 +274,12 @@ class PhysicalCell(Physical):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalBlock(Physical):
-    """Width, height and gravity of a rigid rocking block in SI units; half of each, so that its half diagonal is R.
+    """Width, height and gravity of a rigid rocking block in SI units; half of each, so that its
+    half diagonal is R.
 
-    The block has the slenderness tan(alpha) = b / h and the frequency p = sqrt(3 g / (4 R)), so that tau = p t; a ground motion
-    is zeta = 3 U / (4 R), which makes 1 of a dimensionless acceleration the gravity g: the block begins to rock at tan(alpha).
+    The block has the slenderness tan(alpha) = b / h and the frequency p = sqrt(3 g / (4 R)), so
+    that tau = p t; a ground motion is zeta = 3 U / (4 R), which makes 1 of a dimensionless
+    acceleration the gravity g: the block begins to rock at tan(alpha).
 
     Parameters
     ----------
@@ -280,7 +331,8 @@ class PhysicalBlock(Physical):
 
     @property
     def units(self) -> dict[str, float]:
-        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], zeta = U / units["displacement"] and so on.
+        """The SI value of 1 of each dimensionless quantity: tau = t / units["time"], zeta = U /
+        units["displacement"] and so on.
 
         1 / p, p, 4 R / 3 and its rates, of which the acceleration is g.
         """
@@ -307,4 +359,8 @@ class PhysicalBlock(Physical):
         impact
             The impact law; by default Housner's, `InelasticImpact`.
         """
-        return System(model=self.rocking_block(), load=self.load(si), impact=impact or RockingBlock.usual_impact)
+        return System(
+            model=self.rocking_block(),
+            load=self.load(si),
+            impact=impact or RockingBlock.usual_impact,
+        )

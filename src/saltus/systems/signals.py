@@ -1,8 +1,9 @@
-"""Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a sum, or a
-pulse (whose shapes are in `pulses.py`).
+"""Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a
+sum, or a pulse (whose shapes are in `pulses.py`).
 
-A signal gives its value or its first or second derivative at a time `t`: a number, an array, or the symbolic time with
-which a model is traced (an object with the methods `phase`, `record` and `pulse`).
+A signal gives its value or its first or second derivative at a time `t`: a number, an array, or the
+symbolic time with which a model is traced (an object with the methods `phase`, `record` and
+`pulse`).
 """
 
 from __future__ import annotations
@@ -15,16 +16,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import LIMITS, RADIANS, check_count, check_number, check_size, notice_degrees, settle_numbers
+from saltus.checks import (
+    LIMITS,
+    RADIANS,
+    check_count,
+    check_number,
+    check_size,
+    notice_degrees,
+    settle_numbers,
+)
 from saltus.errors import ParameterError, shown
 
 
 class Signal:
     """The signal of a load channel.
 
-    Contract: `derivative(t, frequency, order)` returns the value (order 0), or its first or second derivative with
-    respect to the dimensionless time tau, at `t` (number, array or symbolic time); `frequency` is the base frequency
-    Omega of the load, or None.
+    Contract: `derivative(t, frequency, order)` returns the value (order 0), or its first or second
+    derivative with respect to the dimensionless time tau, at `t` (number, array or symbolic time);
+    `frequency` is the base frequency Omega of the load, or None.
     """
 
     __slots__ = ()
@@ -58,9 +67,11 @@ class Constant(Signal):
 
 @dataclass(frozen=True, slots=True)
 class Harmonic(Signal):
-    """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and an integer order.
+    """mean + amplitude sin(order Omega tau + phase), with the base frequency Omega of the load and
+    an integer order.
 
-    `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a cosine (`loadpathb`).
+    `Harmonic(amplitude=H)` is load (i) of the paper (`loadpatha`); a phase of pi/2 makes it a
+    cosine (`loadpathb`).
 
     Parameters
     ----------
@@ -95,7 +106,10 @@ class Harmonic(Signal):
         check_count("order", self.order, 1)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
-        """mean + amplitude sin(...), or -- differentiated -- amplitude (order Omega)^n sin(... + n pi/2)."""
+        """mean + amplitude sin(...), or -- differentiated -- amplitude (order Omega)^n sin(...
+
+        + n pi/2).
+        """
         rate = self.order * frequency
         argument = t.phase(rate, self.phase) if hasattr(t, "phase") else rate * t + self.phase
         if order == 0:
@@ -107,13 +121,17 @@ class Harmonic(Signal):
 
 @dataclass(frozen=True, slots=True)
 class Sum(Signal):
-    """The sum of several signals; written `Harmonic(...) + Harmonic(...) + 0.5`, or as a list of them."""
+    """The sum of several signals; written `Harmonic(...) + Harmonic(...) + 0.5`, or as a list of
+    them.
+    """
 
     terms: tuple[Signal, ...]
 
     def __post_init__(self) -> None:
         if not isinstance(self.terms, (tuple, list)) or not self.terms:
-            raise ParameterError(f"a Sum needs signals (Harmonic, Record, Constant), got {shown(self.terms)}")
+            raise ParameterError(
+                f"a Sum needs signals (Harmonic, Record, Constant), got {shown(self.terms)}"
+            )
         terms = (part for term in self.terms for part in _terms(term))
         object.__setattr__(self, "terms", tuple(terms))
 
@@ -136,7 +154,8 @@ class Sum(Signal):
 
 
 QUANTITIES = ("force", "displacement", "velocity", "acceleration")
-QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 2}  # which derivative of its channel it is
+# which derivative of its channel it is
+QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 def _samples(where: str, name: str, given: Any) -> np.ndarray:
@@ -146,20 +165,25 @@ def _samples(where: str, name: str, given: Any) -> np.ndarray:
         samples = np.array(given)
     except (TypeError, ValueError):
         samples = np.array(0.0)
-    if samples.ndim != 1 or samples.dtype.kind not in "fiub":  # complex numbers would lose their imaginary part
+    # complex numbers would lose their imaginary part
+    if samples.ndim != 1 or samples.dtype.kind not in "fiub":
         raise ParameterError(f"{where}: {name} must be a list of numbers, got {shown(given)}", name)
     return samples.astype(float)
 
 
 @dataclass(frozen=True, eq=False)
 class Record(Signal):
-    """Samples over time, uniform or not: `Record(time, value, quantity=...)`, dimensionless like every load.
+    """Samples over time, uniform or not: `Record(time, value, quantity=...)`, dimensionless like
+    every load.
 
     * `force`: linear between samples; 0 before the first and after the last one.
-    * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the first sample.
-    * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the acceleration is continuous.
+    * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the
+      first sample.
+    * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the
+      acceleration is continuous.
 
-    Outside its samples a ground record has no acceleration: the ground goes on with the velocity that it has there.
+    Outside its samples a ground record has no acceleration: the ground goes on with the velocity
+    that it has there.
 
     Parameters
     ----------
@@ -168,7 +192,8 @@ class Record(Signal):
     value
         The samples, (n,).
     quantity
-        The quantity of the samples: "force", or for a ground channel "displacement", "velocity" or "acceleration".
+        The quantity of the samples: "force", or for a ground channel "displacement", "velocity" or
+        "acceleration".
     scale
         The factor by which every sample is multiplied.
     source
@@ -195,25 +220,54 @@ class Record(Signal):
 
     def __post_init__(self) -> None:
         if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
-            raise ParameterError(f"quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}", "quantity")
+            raise ParameterError(
+                f"quantity must be one of {', '.join(QUANTITIES)}, got {self.quantity!r}",
+                "quantity",
+            )
         settle_numbers(self, "scale")
-        where = f"record {self.source!r}" if isinstance(self.source, str) and self.source else "record"
+        where = (
+            f"record {self.source!r}" if isinstance(self.source, str) and self.source else "record"
+        )
         time, value = (_samples(where, name, getattr(self, name)) for name in ("time", "value"))
         if time.shape != value.shape:
-            raise ParameterError(f"{where}: time and value must have one length, got {time.size} and {value.size}", "value")
+            raise ParameterError(
+                f"{where}: time and value must have one length, got {time.size} and {value.size}",
+                "value",
+            )
         least = 4 if self.quantity in ("velocity", "displacement") else 2
         if time.size < least:
-            raise ParameterError(f"{where}: a record of {self.quantity} needs at least {least} samples, got {time.size}", "time")
+            raise ParameterError(
+                (
+                    f"{where}: a record of {self.quantity} needs at least {least} samples, got "
+                    f"{time.size}"
+                ),
+                "time",
+            )
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
-            raise ParameterError(f"{where}: sample {bad} is not a finite number (time {time[bad]}, value {value[bad]})", "value")
+            raise ParameterError(
+                (
+                    f"{where}: sample {bad} is not a finite number (time {time[bad]}, value "
+                    f"{value[bad]})"
+                ),
+                "value",
+            )
         largest = max(np.abs(time).max(), np.abs(value).max())
         if largest > LIMITS.value:
-            raise ParameterError(f"{where}: times and values must be at most {LIMITS.value:g} in size, got {largest:g}", "time")
+            raise ParameterError(
+                (
+                    f"{where}: times and values must be at most {LIMITS.value:g} in size, got "
+                    f"{largest:g}"
+                ),
+                "time",
+            )
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(
-                f"{where}: times must increase, but sample {bad} has {time[bad]:g} after {time[bad - 1]:g}; sort the file",
+                (
+                    f"{where}: times must increase, but sample {bad} has {time[bad]:g} after "
+                    f"{time[bad - 1]:g}; sort the file"
+                ),
                 "time",
             )
         with np.errstate(over="ignore"):
@@ -221,7 +275,11 @@ class Record(Signal):
         if not (steep <= LIMITS.value).all():
             bad = int(np.argmax(steep))
             raise ParameterError(
-                f"{where}: samples {bad} and {bad + 1} are too near in time, {np.diff(time)[bad]:g} apart", "time"
+                (
+                    f"{where}: samples {bad} and {bad + 1} are too near in time, "
+                    f"{np.diff(time)[bad]:g} apart"
+                ),
+                "time",
             )
         time.setflags(write=False)
         value.setflags(write=False)
@@ -256,26 +314,28 @@ class Record(Signal):
         time_scale: float = 1.0,
         source: str | None = None,
     ) -> Record:
-        """The record in a file: AT2, VT2 or DT2 of PEER, V2 of CSMIP or COSMOS, or text with two columns, time and value.
+        """The record in a file: AT2, VT2 or DT2 of PEER, V2 of CSMIP or COSMOS, or text with two
+        columns, time and value.
 
-        Where the unit is known, times are s and values m/s^2, m/s, m or N; `PhysicalBlock.load` and `PhysicalCell.load` make a
-        load of such records dimensionless. The numbers in a text whose `units` are not given are taken as they are.
+        Where the unit is known, times are s and values m/s^2, m/s, m or N; `PhysicalBlock.load` and
+        `PhysicalCell.load` make a load of such records dimensionless. The numbers in a text whose
+        `units` are not given are taken as they are.
 
         Parameters
         ----------
         path
             The path of the file.
         quantity
-            The quantity of the samples. A V2 file has several, of which the acceleration is read unless another one is asked for;
-            of a text without `units` it is a force by default.
+            The quantity of the samples. A V2 file has several, of which the acceleration is read
+            unless another one is asked for; of a text without `units` it is a force by default.
         units
-            The unit of the samples in the file: g, m/s2, cm/s2 (gal), mm/s2, m/s, cm/s, mm/s, m, cm, mm, N or kN; by default the
-            one that the file names.
+            The unit of the samples in the file: g, m/s2, cm/s2 (gal), mm/s2, m/s, cm/s, mm/s, m,
+            cm, mm, N or kN; by default the one that the file names.
         scale
             The factor by which every sample is multiplied.
         baseline
-            The degree of a polynomial in time that is fitted to the samples by least squares and subtracted: 0 subtracts their
-            mean, 1 a straight line. By default nothing is subtracted.
+            The degree of a polynomial in time that is fitted to the samples by least squares and
+            subtracted: 0 subtracts their mean, 1 a straight line. By default nothing is subtracted.
         component
             Which of the components in a V2 file, from 1 on.
         time_scale
@@ -286,7 +346,8 @@ class Record(Signal):
         Raises
         ------
         ParameterError
-            No such file, a file of another format, a line that cannot be read, units that are not known or contradict the file.
+            No such file, a file of another format, a line that cannot be read, units that are not
+            known or contradict the file.
 
         Examples
         --------
@@ -299,7 +360,10 @@ class Record(Signal):
         """
         from saltus.systems.record_files import read_record
 
-        return cls(**read_record(path, quantity, units, baseline, component, time_scale, source), scale=scale)
+        return cls(
+            **read_record(path, quantity, units, baseline, component, time_scale, source),
+            scale=scale,
+        )
 
     @cached_property
     def polynomials(self) -> tuple[Any, Any, Any]:
@@ -311,7 +375,8 @@ class Record(Signal):
             base = PPoly(spline.c, spline.x)
         else:
             slope = np.diff(self.value) / np.diff(self.time)
-            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time.copy())  # older SciPy needs times that can be written
+            # older SciPy needs times that can be written
+            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time.copy())
         if self.quantity == "acceleration":
             return base.antiderivative(2), base.antiderivative(1), base
         if self.quantity == "velocity":
@@ -319,11 +384,14 @@ class Record(Signal):
         return base, base.derivative(1), base.derivative(2)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
-        """The interpolated record, or its derivative, at `t`; outside the samples as the class says."""
+        """The interpolated record, or its derivative, at `t`; outside the samples as the class
+        says.
+        """
         if hasattr(t, "record"):
             return t.record(self, order)
         t = np.asarray(t, dtype=float)
-        first, last = self.time[0], self.time[-1]
+        first = self.time[0]
+        last = self.time[-1]
         inside = self.polynomials[order](np.clip(t, first, last))
         beyond = (t < first) | (t > last)
         if self.quantity == "force" or order == 2:
@@ -332,17 +400,23 @@ class Record(Signal):
             result = inside
         else:
             drift = np.where(t < first, (t - first) * self.polynomials[1](first), 0.0)
-            result = inside + drift + np.where(t > last, (t - last) * self.polynomials[1](last), 0.0)
+            result = (
+                inside + drift + np.where(t > last, (t - last) * self.polynomials[1](last), 0.0)
+            )
         return self.scale * (result if result.ndim else float(result))
 
 
 def as_signal(value: Any, name: str) -> Signal:
-    """A signal from a number (a `Constant`), a signal (itself) or a list of them (their sum); anything else is refused."""
+    """A signal from a number (a `Constant`), a signal (itself) or a list of them (their sum);
+    anything else is refused.
+    """
     if isinstance(value, Signal):
         return value
     if isinstance(value, (tuple, list)):
         if not value:
-            raise ParameterError(f"{name} is an empty list; give at least one number, harmonic or record", name)
+            raise ParameterError(
+                f"{name} is an empty list; give at least one number, harmonic or record", name
+            )
         return Sum(tuple(as_signal(item, f"{name}.{i}") for i, item in enumerate(value)))
     check_number(name, value)
     return Constant(float(value))
@@ -363,7 +437,9 @@ def scaled(signal: Signal, factor: float) -> Signal:
     if isinstance(signal, Sum):
         return Sum(tuple(scaled(term, factor) for term in signal.terms))
     if isinstance(signal, Record):
-        return Record(signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source)
+        return Record(
+            signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source
+        )
     if signal.once:
         return dataclasses.replace(signal, amplitude=factor * signal.amplitude)  # type: ignore[type-var, attr-defined]
     raise ParameterError(f"a {type(signal).__name__} cannot be scaled")
@@ -378,18 +454,22 @@ def vanishes(signal: Signal) -> bool:
     return all(getattr(signal, name, 0.0) == 0.0 for name in ("value", "amplitude", "mean"))
 
 
-TIME, RATE = {"converts": "time"}, {"converts": "rate"}  # the metadata of fields that units of time convert
+# the metadata of fields that units of time convert
+TIME = {"converts": "time"}
+RATE = {"converts": "rate"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pulse(Signal):
-    """A load that begins at `start` and lasts for `length`; a pulse by itself is 0 before and after.
+    """A load that begins at `start` and lasts for `length`; a pulse by itself is 0 before and
+    after.
 
-    `quantity` says which quantity it is: a `force`, or an `acceleration` of the ground. The ground then moves from rest, and goes
-    on with the velocity that it has at the end of the pulse.
+    `quantity` says which quantity it is: a `force`, or an `acceleration` of the ground. The ground
+    then moves from rest, and goes on with the velocity that it has at the end of the pulse.
 
-    Contract: a subclass gives `length` and `shape(since, n)`, the n-th derivative of the quantity at `since` after the start,
-    or for n = -1 and -2 its integrals from the start; `moving` names the numbers on which the beginning or the end depends.
+    Contract: a subclass gives `length` and `shape(since, n)`, the n-th derivative of the quantity
+    at `since` after the start, or for n = -1 and -2 its integrals from the start; `moving` names
+    the numbers on which the beginning or the end depends.
     """
 
     amplitude: float
@@ -403,15 +483,26 @@ class Pulse(Signal):
     def __post_init__(self) -> None:
         if self.quantity not in self.quantities:
             raise ParameterError(
-                f"quantity of a {type(self).__name__} must be one of {', '.join(self.quantities)}, got {self.quantity!r}",
+                (
+                    f"quantity of a {type(self).__name__} must be one of "
+                    f"{', '.join(self.quantities)}, got {self.quantity!r}"
+                ),
                 "quantity",
             )
         settle_numbers(self, "amplitude", "start")
-        positive = [f.name for f in dataclasses.fields(self) if f.metadata in (TIME, RATE) and f.name != "start"]
+        positive = [
+            f.name
+            for f in dataclasses.fields(self)
+            if f.metadata in (TIME, RATE) and f.name != "start"
+        ]
         settle_numbers(self, *positive, above=0.0)
         if not (math.isfinite(self.length) and self.start + self.length > self.start):
             raise ParameterError(
-                f"a {type(self).__name__} of the duration {self.length:g} does not end after its start", positive[0]
+                (
+                    f"a {type(self).__name__} of the duration {self.length:g} does not end after its "
+                    "start"
+                ),
+                positive[0],
             )
 
     @property
@@ -420,13 +511,19 @@ class Pulse(Signal):
         raise NotImplementedError
 
     def shape(self, since: Any, n: int) -> Any:
-        """The n-th derivative of the quantity at `since` after the start; for n = -1 and -2 the integrals from the start."""
+        """The n-th derivative of the quantity at `since` after the start; for n = -1 and -2 the
+        integrals from the start.
+        """
         raise NotImplementedError
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
-        """The channel at `t`, or its derivative: the quantity, differentiated or integrated from rest."""
+        """The channel at `t`, or its derivative: the quantity, differentiated or integrated from
+        rest.
+        """
         n = order - QUANTITY_ORDER[self.quantity]
-        since, within, after = t.pulse(self) if hasattr(t, "pulse") else self._clocks(np.asarray(t, dtype=float))
+        since, within, after = (
+            t.pulse(self) if hasattr(t, "pulse") else self._clocks(np.asarray(t, dtype=float))
+        )
         if n > 0 or (n == 0 and not self.holds):
             return within * self.shape(since, n)
         value = self.shape(since, n)
@@ -437,6 +534,13 @@ class Pulse(Signal):
         return value
 
     def _clocks(self, t: Any) -> tuple[Any, Any, Any]:
-        """The time since the start, at most `length`; 1 within the span, else 0; the time since the end."""
-        since, end = np.clip(t - self.start, 0.0, self.length), self.start + self.length
-        return since[()], np.where((t >= self.start) & (t < end), 1.0, 0.0)[()], np.maximum(t - end, 0.0)[()]
+        """The time since the start, at most `length`; 1 within the span, else 0; the time since the
+        end.
+        """
+        since = np.clip(t - self.start, 0.0, self.length)
+        end = self.start + self.length
+        return (
+            since[()],
+            np.where((t >= self.start) & (t < end), 1.0, 0.0)[()],
+            np.maximum(t - end, 0.0)[()],
+        )

@@ -1,4 +1,6 @@
-"""States: read from arguments, spread evenly over windows, and those that a system can be in beside its contacts."""
+"""States: read from arguments, spread evenly over windows, and those that a system can be in beside
+its contacts.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,19 @@ from saltus.systems.system import System
 
 
 def read_start(
-    system: System, velocity: Any, coordinates: Mapping[str, Any], arguments: Iterable[str] = (), time: float = 0.0
+    system: System,
+    velocity: Any,
+    coordinates: Mapping[str, Any],
+    arguments: Iterable[str] = (),
+    time: float = 0.0,
 ) -> np.ndarray:
-    """A state, coordinates and then velocities, (d,), from `theta=0.3, velocity=0.1` as `simulate` takes them.
+    """A state, coordinates and then velocities, (d,), from `theta=0.3, velocity=0.1` as `simulate`
+    takes them.
 
-    Every coordinate must be given, by its name; those called theta_1, theta_2, ... may be given together, `theta=(0.3, 0.0)`. The
-    velocity is a number with one coordinate, or as many numbers as there are coordinates; 0, the default, is 0 for all. Those of
-    first order are left out, as their velocities follow from the state. For a system in coordinates of its gaps the coordinates
+    Every coordinate must be given, by its name; those called theta_1, theta_2, ... may be given
+    together, `theta=(0.3, 0.0)`. The velocity is a number with one coordinate, or as many numbers
+    as there are coordinates; 0, the default, is 0 for all. Those of first order are left out, as
+    their velocities follow from the state. For a system in coordinates of its gaps the coordinates
     of the model as it was given may be named instead, all of them.
 
     Parameters
@@ -34,23 +42,33 @@ def read_start(
     velocity, coordinates
         The state at the start.
     arguments
-        The names of the other arguments of the function that reads it: a misspelt one arrives among the coordinates.
+        The names of the other arguments of the function that reads it: a misspelt one arrives among
+        the coordinates.
     time
         The time at the start.
 
     Raises
     ------
     ParameterError
-        A name is no coordinate (the message has similar names), a coordinate is not given, or a value is no finite number.
+        A name is no coordinate (the message has similar names), a coordinate is not given, or a
+        value is no finite number.
     """
     model: Any = system.model
-    names, given = {*model.coordinates}, {*coordinates}
+    names = {*model.coordinates}
+    given = {*coordinates}
     own_names = {*model.own_class.coordinates} if isinstance(model, InGapCoordinates) else names
     if given & own_names - names or (own_names < names and given == own_names):
         own = system.with_(model=model.as_given())
-        return np.concatenate(own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2)))
-    most, in_order = LIMITS.value, model.coordinates
-    positions = coordinates.values() if tuple(coordinates) == in_order else _positions(system, coordinates, arguments)
+        return np.concatenate(
+            own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2))
+        )
+    most = LIMITS.value
+    in_order = model.coordinates
+    positions = (
+        coordinates.values()
+        if tuple(coordinates) == in_order
+        else _positions(system, coordinates, arguments)
+    )
     values = [*positions, *_speeds(velocity, model)]
     for i, value in enumerate(values):
         if not (type(value) is float and abs(value) <= most):
@@ -61,9 +79,11 @@ def read_start(
 def read_starts(
     system: System, velocity: Any, coordinates: Mapping[str, Any], arguments: Iterable[str] = ()
 ) -> tuple[list[Any], list[Any]]:
-    """The coordinates and the velocities of many states: `read_start`, of which each number may be an array.
+    """The coordinates and the velocities of many states: `read_start`, of which each number may be
+    an array.
 
-    With one coordinate `velocity` is a number or an array; with several it has one number or array for each of them.
+    With one coordinate `velocity` is a number or an array; with several it has one number or array
+    for each of them.
 
     Raises
     ------
@@ -73,25 +93,35 @@ def read_starts(
     names = system.model.coordinates
     positions = _positions(system, coordinates, arguments)
     speeds = _speeds(velocity, system.model, many=True)
-    for name, value in (*zip(names, positions, strict=True), *(("velocity", speed) for speed in speeds)):
+    for name, value in (
+        *zip(names, positions, strict=True),
+        *(("velocity", speed) for speed in speeds),
+    ):
         if not _is_sequence(value) and not hasattr(value, "dims"):
             check_number(name, _plain(value))
     return list(positions), list(speeds)
 
 
-def _positions(system: System, coordinates: Mapping[str, Any], arguments: Iterable[str]) -> list[Any]:
+def _positions(
+    system: System, coordinates: Mapping[str, Any], arguments: Iterable[str]
+) -> list[Any]:
     """The values of the coordinates in the model's order."""
-    names, given = system.model.coordinates, dict(coordinates)
+    names = system.model.coordinates
+    given = dict(coordinates)
     for together in [name for name in given if name not in names]:
         if names == tuple(f"{together}_{i + 1}" for i in range(len(names))):
             values = given.pop(together)
             if not _is_sequence(values) or len(values) != len(names):
-                raise ParameterError(f"{together} must have {len(names)} values, got {shown(values)}", together)
+                raise ParameterError(
+                    f"{together} must have {len(names)} values, got {shown(values)}", together
+                )
             given |= dict(zip(names, values, strict=True))
     for name in given:
         if name not in names:
             hint = near(name, names, {"velocity", *arguments} - {"coordinates"})
-            raise ParameterError(f"{type(system.model).__name__} has no coordinate {shown(name)}; {hint}", name)
+            raise ParameterError(
+                f"{type(system.model).__name__} has no coordinate {shown(name)}; {hint}", name
+            )
     for name in names:
         if name not in given:
             raise ParameterError(f"the state at the start needs {name}=...", name)
@@ -99,9 +129,10 @@ def _positions(system: System, coordinates: Mapping[str, Any], arguments: Iterab
 
 
 def _speeds(velocity: Any, model: Model, many: bool = False) -> tuple[Any, ...]:
-    """The velocities of all coordinates, of which each number may be an array if there are `many`; 0 for those of first order,
-    whose velocities may be given and are not read."""
-    count, none = len(model.moving), (0.0,) * len(model.first_order)
+    """The velocities of all coordinates, of which each number may be an array if there are `many`;
+    0 for those of first order, whose velocities may be given and are not read."""
+    count = len(model.moving)
+    none = (0.0,) * len(model.first_order)
     if type(velocity) is float and count == 1:
         return (velocity, *none)
     if count == 1 and (many or not _is_sequence(velocity)):
@@ -114,8 +145,12 @@ def _speeds(velocity: Any, model: Model, many: bool = False) -> tuple[Any, ...]:
 
 
 def _is_sequence(value: Any) -> bool:
-    """Whether a value has entries in an order; a DataArray has named dimensions, and is no sequence."""
-    return isinstance(value, (tuple, list)) or (not hasattr(value, "dims") and getattr(value, "ndim", 0) > 0)
+    """Whether a value has entries in an order; a DataArray has named dimensions, and is no
+    sequence.
+    """
+    return isinstance(value, (tuple, list)) or (
+        not hasattr(value, "dims") and getattr(value, "ndim", 0) > 0
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -125,9 +160,14 @@ def _plain(value: Any) -> Any:
 
 def arguments_of(system: System, state: Any) -> dict[str, Any]:
     """A state (coordinates, velocities) as `simulate` takes it."""
-    names, moving, numbers = system.model.coordinates, len(system.model.moving), [float(x) for x in state]
+    names = system.model.coordinates
+    moving = len(system.model.moving)
+    numbers = [float(x) for x in state]
     velocity = tuple(numbers[len(names) : len(names) + moving])
-    return {**dict(zip(names, numbers, strict=False)), "velocity": velocity[0] if moving == 1 else velocity}
+    return {
+        **dict(zip(names, numbers, strict=False)),
+        "velocity": velocity[0] if moving == 1 else velocity,
+    }
 
 
 def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
@@ -152,7 +192,9 @@ Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each
 
 
 class Window(Box):
-    """A box of the state space: the bounds of each coordinate, then of each velocity; a rectangle for one coordinate."""
+    """A box of the state space: the bounds of each coordinate, then of each velocity; a rectangle
+    for one coordinate.
+    """
 
     __slots__ = ()
 
@@ -172,28 +214,41 @@ class Window(Box):
 
 
 def check_window(window: Any, system: System) -> Window:
-    """A window of the states; for None the default window, with half widths 1.5 around the contact, or around 0 without one.
+    """A window of the states; for None the default window, with half widths 1.5 around the contact,
+    or around 0 without one.
 
-    With several contacts the default window ends at these. With several coordinates both bounds of a state variable may be equal;
-    it then has one value. Velocities of coordinates of first order are left out.
+    With several contacts the default window ends at these. With several coordinates both bounds of
+    a state variable may be equal; it then has one value. Velocities of coordinates of first order
+    are left out.
 
     Raises
     ------
     ParameterError
-        Anything but a pair of bounds for each coordinate and each velocity; a window beyond the contacts.
+        Anything but a pair of bounds for each coordinate and each velocity; a window beyond the
+        contacts.
     """
     names = system.model.coordinates
     if window is None:
         return _default_window(system)
-    bounds, moving, following = as_numbers(window, "window"), system.model.moving, len(system.model.first_order)
-    if following and bounds.shape == (2 * len(names) - following, 2):  # velocities that follow from the state may have any bounds
+    bounds = as_numbers(window, "window")
+    moving = system.model.moving
+    following = len(system.model.first_order)
+    # velocities that follow from the state may have any bounds
+    if following and bounds.shape == (2 * len(names) - following, 2):
         bounds = np.concatenate([bounds, [(-HALF_WIDTH, HALF_WIDTH)] * following])
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
-    if not sound or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all():
+    if (
+        not sound
+        or not ((bounds[:, 0] < bounds[:, 1]) if single else (bounds[:, 0] <= bounds[:, 1])).all()
+    ):
         meant = "((least, largest coordinate), (least, largest velocity))"
         if not single:
-            whose = "their velocities" if moving == names else f"the velocities of {', '.join(moving) or 'none'}"
+            whose = (
+                "their velocities"
+                if moving == names
+                else f"the velocities of {', '.join(moving) or 'none'}"
+            )
             meant = f"{len(names) + len(moving)} pairs (least, largest), of {', '.join(names)}, then of {whose},"
         raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
     for contact in (each for each in system.model.contacts if each.coordinate in names):
@@ -208,24 +263,32 @@ def check_window(window: Any, system: System) -> Window:
 
 
 def _default_window(system: System) -> Window:
-    """The window with half widths 1.5 around the contact, or around 0 without one, cut off at the contacts."""
+    """The window with half widths 1.5 around the contact, or around 0 without one, cut off at the
+    contacts.
+    """
     model = system.model
     if model.sides:
         middle = float(model.contact)
         return Window(((middle - HALF_WIDTH, middle + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH)))
     bounds = {name: [-HALF_WIDTH, HALF_WIDTH] for name in model.coordinates}
     for contact in (each for each in model.contacts if each.coordinate in model.coordinates):
-        at, pair = float(contact.position), bounds[contact.coordinate]
+        at = float(contact.position)
+        pair = bounds[contact.coordinate]
         alone = sum(other.coordinate == contact.coordinate for other in model.contacts) == 1
         pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
         pair[contact.sign < 0] = at
-    return Window([*((low, high) for low, high in bounds.values()), *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds)])
+    return Window(
+        [
+            *((low, high) for low, high in bounds.values()),
+            *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds),
+        ]
+    )
 
 
 @cache
 def even_steps(dimension: int) -> np.ndarray:
-    """The steps of a sequence that covers a cube of d dimensions evenly: x^-1, ..., x^-d, with the root x of x^(d + 1) = x +
-    1."""
+    """The steps of a sequence that covers a cube of d dimensions evenly: x^-1, ..., x^-d, with the
+    root x of x^(d + 1) = x + 1."""
     root = 2.0
     for _ in range(200):  # each halves the error at least
         root = (1.0 + root) ** (1.0 / (dimension + 1))
@@ -237,16 +300,22 @@ def initial_states(system: System, count: int, window: Window, seed: int) -> np.
     """Initial states spread evenly over a window, (count, d), placed by `within_window`."""
     offset = np.random.default_rng(int(seed)).random(len(window))
     steps = even_steps(len(window))
-    return within_window(system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * steps) % 1.0) - 1.0, window)
+    return within_window(
+        system, 2.0 * ((offset + np.arange(1, count + 1)[:, None] * steps) % 1.0) - 1.0, window
+    )
 
 
-def within_window(system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0) -> np.ndarray:
-    """The states (..., n, d) at points of the cube (-1, 1)^d, mapped to a window that is shrunk towards the contact by a factor.
+def within_window(
+    system: System, points: np.ndarray, window: Window, shrunk: Any = 1.0
+) -> np.ndarray:
+    """The states (..., n, d) at points of the cube (-1, 1)^d, mapped to a window that is shrunk
+    towards the contact by a factor.
 
-    States beyond a contact are reflected at it. For a model with several contacts the states alternate, in pairs, between those
-    with all contacts open and those with some, but not all, coordinates held at their nearest contacts, for each choice of
-    coordinates whose contacts lie in the window. Without this no motion would begin with a closed contact, because such states
-    have no share of the window's volume.
+    States beyond a contact are reflected at it. For a model with several contacts the states
+    alternate, in pairs, between those with all contacts open and those with some, but not all,
+    coordinates held at their nearest contacts, for each choice of coordinates whose contacts lie in
+    the window. Without this no motion would begin with a closed contact, because such states have
+    no share of the window's volume.
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
@@ -266,9 +335,11 @@ def within_window(system: System, points: np.ndarray, window: Window, shrunk: An
 
 
 def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
-    """The state at the contacts without speed, (d,); a coordinate is 0 without contacts, and in the middle between two of them.
-    With the last state of a motion, the state in which this motion rests, which may be any with several contacts or frictions."""
-    model, names = system.model, system.model.coordinates
+    """The state at the contacts without speed, (d,); a coordinate is 0 without contacts, and in the
+    middle between two of them. With the last state of a motion, the state in which this motion
+    rests, which may be any with several contacts or frictions."""
+    model = system.model
+    names = system.model.coordinates
     if last is not None and model.holds_coordinates:
         return last
     if (inner := system.in_gap_coordinates) is not system:
@@ -277,21 +348,37 @@ def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
     if model.sides:
         state[0] = float(model.contact)
     for i, name in enumerate(names):
-        positions = [float(contact.position) for contact in model.contacts if contact.coordinate == name]
+        positions = [
+            float(contact.position) for contact in model.contacts if contact.coordinate == name
+        ]
         state[i] = np.mean(positions) if positions else state[i]
     return state
 
 
 def is_still(system: System, highest: np.ndarray, lowest: np.ndarray, within: float) -> np.ndarray:
-    """Whether motions with these extrema stay within a distance of the position of one contact, or of 0 without contacts."""
+    """Whether motions with these extrema stay within a distance of the position of one contact, or
+    of 0 without contacts.
+    """
     model = system.model
-    places = [float(each.position) for each in model.contacts if each.coordinate in model.coordinates]
+    places = [
+        float(each.position) for each in model.contacts if each.coordinate in model.coordinates
+    ]
     places = places or [float(model.contact) if model.sides else 0.0]
-    return np.asarray(np.any([np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within for place in places], axis=0))
+    return np.asarray(
+        np.any(
+            [
+                np.maximum(np.abs(highest - place), np.abs(lowest - place)) <= within
+                for place in places
+            ],
+            axis=0,
+        )
+    )
 
 
 def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
-    """States (..., d), changed in place: those beyond a wall, or beyond one of several contacts, are reflected at it."""
+    """States (..., d), changed in place: those beyond a wall, or beyond one of several contacts,
+    are reflected at it.
+    """
     if (inner := system.in_gap_coordinates) is not system:
         states[...] = from_gaps(system, on_this_side(inner, in_gaps(system, states)))
         return states
@@ -299,31 +386,44 @@ def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
     if system.dependent:
         return reflected(system, states)
     if len(system.model.sides) == 1:
-        wall, inward = float(system.one_contact.contact), system.one_contact.inward(system.model.sides[0])
+        wall = float(system.one_contact.contact)
+        inward = system.one_contact.inward(system.model.sides[0])
         states[..., 0] = wall + inward * np.abs(states[..., 0] - wall)
     for contact in system.model.contacts:
-        place, position = names.index(contact.coordinate), float(contact.position)
+        place = names.index(contact.coordinate)
+        position = float(contact.position)
         states[..., place] = position + contact.sign * np.abs(states[..., place] - position)
     for contact in system.model.contacts:  # a reflection at one may lead beyond the opposite one
-        place, position = names.index(contact.coordinate), float(contact.position)
-        states[..., place] = position + contact.sign * np.maximum(contact.sign * (states[..., place] - position), 0.0)
+        place = names.index(contact.coordinate)
+        position = float(contact.position)
+        states[..., place] = position + contact.sign * np.maximum(
+            contact.sign * (states[..., place] - position), 0.0
+        )
     return states
 
 
 def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """States (..., d) moved by shifts, such that closed contacts stay closed and no coordinate goes beyond a contact.
+    """States (..., d) moved by shifts, such that closed contacts stay closed and no coordinate goes
+    beyond a contact.
 
     Contacts that are then open by no more than rounding are closed.
     """
     if (inner := system.in_gap_coordinates) is not system:
         begin = in_gaps(system, states)
-        return from_gaps(system, states_beside(inner, begin, in_gaps(system, states + shifts) - begin))
-    names, moved = system.model.coordinates, on_this_side(system, states + shifts)
+        return from_gaps(
+            system, states_beside(inner, begin, in_gaps(system, states + shifts) - begin)
+        )
+    names = system.model.coordinates
+    moved = on_this_side(system, states + shifts)
     held = held_by_contacts(system, states)
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
-        least = np.maximum(np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place]))
-        closed = held[..., place] & (np.asarray(contact.gap(states[..., place])) == 0.0) | (least < CLOSED_BELOW)
+        least = np.maximum(
+            np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place])
+        )
+        closed = held[..., place] & (np.asarray(contact.gap(states[..., place])) == 0.0) | (
+            least < CLOSED_BELOW
+        )
         moved[..., place] = np.where(closed, float(contact.position), moved[..., place])
         moved[..., len(names) + place] = np.where(closed, 0.0, moved[..., len(names) + place])
         held[..., [place, len(names) + place]] |= closed[..., None]
@@ -331,71 +431,108 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
 
 
 def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
-    """States (..., d) in which every coordinate that is at one of several contacts and moves into it is moved back from it by one
-    rounding: the state just before the impact, which then happens at once. Sums of coordinates are moved back by more than the
-    rounding within which they count as closed.
+    """States (..., d) in which every coordinate that is at one of several contacts and moves into
+    it is moved back from it by one rounding: the state just before the impact, which then happens
+    at once. Sums of coordinates are moved back by more than the rounding within which they count as
+    closed.
     """
-    inner, moved = system.in_gap_coordinates, in_gaps(system, states).copy()
+    inner = system.in_gap_coordinates
+    moved = in_gaps(system, states).copy()
     names = inner.model.coordinates
-    beside = 0.0 if inner is system else 4.0 * CLOSED_BELOW * (1.0 + np.abs(moved).max(axis=-1, initial=0.0))
+    beside = (
+        0.0
+        if inner is system
+        else 4.0 * CLOSED_BELOW * (1.0 + np.abs(moved).max(axis=-1, initial=0.0))
+    )
     for contact in inner.model.contacts:
-        place, position = names.index(contact.coordinate), float(contact.position)
-        into = (np.asarray(contact.gap(moved[..., place])) == 0.0) & (contact.sign * moved[..., len(names) + place] < 0.0)
+        place = names.index(contact.coordinate)
+        position = float(contact.position)
+        into = (np.asarray(contact.gap(moved[..., place])) == 0.0) & (
+            contact.sign * moved[..., len(names) + place] < 0.0
+        )
         back = np.nextafter(position, position + contact.sign) + contact.sign * beside
         moved = pushed(inner, moved, place, np.where(into, back - moved[..., place], 0.0))
     return from_gaps(system, moved)
 
 
 def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
-    """Which variables of states (..., d) belong to coordinates that are at rest at a contact, (..., d)."""
-    names, held = system.model.coordinates, np.zeros(states.shape, dtype=bool)
+    """Which variables of states (..., d) belong to coordinates that are at rest at a contact, (...,
+    d).
+    """
+    names = system.model.coordinates
+    held = np.zeros(states.shape, dtype=bool)
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
-        closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (states[..., len(names) + place] == 0.0)
+        closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (
+            states[..., len(names) + place] == 0.0
+        )
         held[..., [place, len(names) + place]] |= closed[..., None]
     return held
 
 
-def held_values(system: System, state: np.ndarray, within: float, closed: int = 0) -> dict[int, float]:
-    """The variables of a state (d,) that are fixed, by their places, with their values: the coordinates and velocities that
-    contacts hold, and the velocities of coordinates that stick, up to rounding; those of the contacts in `closed`, a bit each, in
-    any case.
+def held_values(
+    system: System, state: np.ndarray, within: float, closed: int = 0
+) -> dict[int, float]:
+    """The variables of a state (d,) that are fixed, by their places, with their values: the
+    coordinates and velocities that contacts hold, and the velocities of coordinates that stick, up
+    to rounding; those of the contacts in `closed`, a bit each, in any case.
     """
-    found, names = dict[int, float](), system.model.coordinates
+    found = dict[int, float]()
+    names = system.model.coordinates
     for i, contact in enumerate(system.model.contacts):
-        place, speed = names.index(contact.coordinate), len(names) + names.index(contact.coordinate)
+        place = names.index(contact.coordinate)
+        speed = len(names) + names.index(contact.coordinate)
         if closed >> i & 1 or max(abs(contact.gap(state[place])), abs(state[speed])) < within:
             found |= {place: float(contact.position), speed: 0.0}
     for friction in system.model.frictions:
-        place, ground_speed = len(names) + names.index(friction.coordinate), float(friction.ground_speed)
-        touching = all(names.index(c.coordinate) in found for c in system.model.contacts if c.name == friction.contact)
-        found |= {place: ground_speed} if touching and abs(state[place] - ground_speed) < within else {}
+        place = len(names) + names.index(friction.coordinate)
+        ground_speed = float(friction.ground_speed)
+        touching = all(
+            names.index(c.coordinate) in found
+            for c in system.model.contacts
+            if c.name == friction.contact
+        )
+        found |= (
+            {place: ground_speed} if touching and abs(state[place] - ground_speed) < within else {}
+        )
     return found
 
 
 def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """States (..., n, d) in which some coordinates are held at contacts, alternating as `within_window` says; not those where
-    this leads beyond another contact, as it may with dependent sums."""
-    names, turn = system.model.coordinates, np.arange(states.shape[-2]) // 2
+    """States (..., n, d) in which some coordinates are held at contacts, alternating as
+    `within_window` says; not those where this leads beyond another contact, as it may with
+    dependent sums."""
+    names = system.model.coordinates
+    turn = np.arange(states.shape[-2]) // 2
     reached: dict[int, list[float]] = {}
     for contact in system.model.contacts:
-        place, position = names.index(contact.coordinate), float(contact.position)
-        (low, high), (slowest, fastest) = bounds[place], bounds[len(names) + place]
+        place = names.index(contact.coordinate)
+        position = float(contact.position)
+        (low, high) = bounds[place]
+        (slowest, fastest) = bounds[len(names) + place]
         if low <= position <= high and slowest <= 0.0 <= fastest:
             reached.setdefault(place, []).append(position)
     count = len(normal_of(system, 0))
-    choices = [chosen for n in range(count) for chosen in itertools.combinations(sorted(reached), n)]
-    found, held = states.copy(), np.zeros(states.shape, dtype=bool)
+    choices = [
+        chosen for n in range(count) for chosen in itertools.combinations(sorted(reached), n)
+    ]
+    found = states.copy()
+    held = np.zeros(states.shape, dtype=bool)
     for number, chosen in enumerate(choices):
         rows = turn % len(choices) == number
         for place in chosen:
-            at, positions = states[..., rows, place], np.array(reached[place])
+            at = states[..., rows, place]
+            positions = np.array(reached[place])
             found[..., rows, place] = positions[np.abs(at[..., None] - positions).argmin(axis=-1)]
-            found[..., rows, len(names) + place], held[..., rows, place] = 0.0, True
+            found[..., rows, len(names) + place] = 0.0
+            held[..., rows, place] = True
     if count == len(names):
         return found
     found = held_exactly(system, found, held)
-    gaps = [np.asarray(each.gap(found[..., names.index(each.coordinate)])) for each in system.model.contacts]
+    gaps = [
+        np.asarray(each.gap(found[..., names.index(each.coordinate)]))
+        for each in system.model.contacts
+    ]
     return np.where((np.min(gaps, axis=0) < -CLOSED_BELOW)[..., None], states, found)
 
 
@@ -408,10 +545,16 @@ def check_reached(model: Model, coordinate: str, values: Any, name: str) -> None
         The error is of the argument `name` and has the first such value and the contact.
     """
     given = np.atleast_1d(values)
-    gaps = {f"the contact {c.name!r}": (c.gap(given), c.position) for c in model.contacts if c.coordinate == coordinate}
+    gaps = {
+        f"the contact {c.name!r}": (c.gap(given), c.position)
+        for c in model.contacts
+        if c.coordinate == coordinate
+    }
     if model.has_one_contact and coordinate == model.coordinates[0]:
         gaps["the contact"] = np.where(model.reaches(coordinate, given), 0.0, -1.0), model.contact
     for contact, (gap, position) in gaps.items():
         if (beyond := given[np.asarray(gap) < 0.0]).size:
             where = f"{contact} at {coordinate} = {float(position):g}"
-            raise ParameterError(f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name)
+            raise ParameterError(
+                f"{coordinate} = {beyond[0]:g} lies beyond {where}; leave such values out", name
+            )

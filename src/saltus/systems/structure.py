@@ -1,16 +1,20 @@
-"""A linear structure given by its matrices, with contacts, surfaces and frictions at some of its points.
+"""A linear structure given by its matrices, with contacts, surfaces and frictions at some of its
+points.
 
-With the rows R of what is local (R u is what contacts keep on one side, surfaces pass and frictions rub), the displacements u are
+With the rows R of what is local (R u is what contacts keep on one side, surfaces pass and frictions
+rub), the displacements u are
 
     u = T_b b + T_z z,    b = R u,    T_b = M^-1 R' (R M^-1 R')^-1,
 
-where the columns of T_z are the modes of the structure whose local displacements b are held. Then T' M T is block-diagonal: an
-impact changes no velocity but those of b, and what contacts hold is held without touching the amplitudes z of the modes,
+where the columns of T_z are the modes of the structure whose local displacements b are held. Then
+T' M T is block-diagonal: an impact changes no velocity but those of b, and what contacts hold is
+held without touching the amplitudes z of the modes,
 
-    z'' = g_z f(t) - w^2 z - D_z z' - K_zb b - D_zb b',    M_b b'' = g_b f(t) - K_b b - D_b b' - K_bz z - D_bz z' + reactions.
+    z'' = g_z f(t) - w^2 z - D_z z' - K_zb b - D_zb b',    M_b b'' = g_b f(t) - K_b b - D_b b' -
+    K_bz z - D_bz z' + reactions.
 
-All numbers of these equations are data of the compiled code, none is part of it; neither is the number of modes, each of which
-has a record of its coefficients.
+All numbers of these equations are data of the compiled code, none is part of it; neither is the
+number of modes, each of which has a record of its coefficients.
 """
 
 from __future__ import annotations
@@ -29,16 +33,29 @@ from saltus.systems.contact_model import Contact, ContactModel, Friction, Surfac
 from saltus.systems.eigenmodes import eigenmodes_of
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
 from saltus.systems.model import Count, is_zero
-from saltus.systems.record_files import ConstantNumbers, check_independent, check_matrices, matrices_in, read_array
+from saltus.systems.record_files import (
+    ConstantNumbers,
+    check_independent,
+    check_matrices,
+    matrices_in,
+    read_array,
+)
 
 MODE = "mode_"  # begins the names of the amplitudes
 # The names of the arrays in files, and what they are called in papers.
-IN_FILES = {"mass": ("mass", "M"), "stiffness": ("stiffness", "K"), "damping": ("damping", "C", "D")}
+IN_FILES = {
+    "mass": ("mass", "M"),
+    "stiffness": ("stiffness", "K"),
+    "damping": ("damping", "C", "D"),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """A structure in local displacements and amplitudes of modes: the matrices T, T' M T, ... of the module's docstring."""
+    """A structure in local displacements and amplitudes of modes: the matrices T, T' M T, ...
+
+    of the module's docstring.
+    """
 
     basis: np.ndarray  # T, of which the first columns are T_b
     mass: np.ndarray  # M_b
@@ -49,15 +66,26 @@ class Modes:
     inverse: np.ndarray  # of T: R, and T_z' M
 
     def coefficients(self) -> list[float]:
-        """The numbers of the local equations, in the order in which `Equations` reads them; without any, those of the modes."""
+        """The numbers of the local equations, in the order in which `Equations` reads them; without
+        any, those of the modes.
+        """
         m = len(self.mass)
         damped = [] if self.damping is None else [self.damping[:m, :m]]
-        found = [self.mass, self.stiffness[:m, :m], *damped, self.forces[:m], *([] if m else [self.records()])]
+        found = [
+            self.mass,
+            self.stiffness[:m, :m],
+            *damped,
+            self.forces[:m],
+            *([] if m else [self.records()]),
+        ]
         return [float(x) for block in found for x in block.ravel()]
 
     def records(self) -> np.ndarray:
-        """The number of modes, a record for each of them in the order of `ModeRecord`, and D by rows where it couples them."""
-        m, damping = len(self.mass), self.damping
+        """The number of modes, a record for each of them in the order of `ModeRecord`, and D by
+        rows where it couples them.
+        """
+        m = len(self.mass)
+        damping = self.damping
         found = [np.diag(self.stiffness)[m:, None], self.stiffness[m:, :m], self.forces[m:]]
         if damping is not None:
             found += [np.diag(damping)[m:, None], damping[:m, m:].T, damping[m:, :m]]
@@ -69,10 +97,13 @@ class ModeRecord:
     """The places in a mode's record, for m local displacements and some channels."""
 
     def __init__(self, m: int, channels: int, damped: bool) -> None:
-        self.square, self.stiffness, self.forces = 0, range(1, 1 + m), range(1 + m, 1 + m + channels)
+        self.square = 0
+        self.stiffness = range(1, 1 + m)
+        self.forces = range(1 + m, 1 + m + channels)
         at = 1 + m + channels
         self.damping = at if damped else None
-        self.local_damping, self.by_local = range(at + 1, at + 1 + m), range(at + 1 + m, at + 1 + 2 * m)
+        self.local_damping = range(at + 1, at + 1 + m)
+        self.by_local = range(at + 1 + m, at + 1 + 2 * m)
         self.size = at + (1 + 2 * m if damped else 0)
 
 
@@ -87,7 +118,9 @@ def modes_of(
     """The structure in local displacements and modes."""
     from scipy.linalg import eigh, null_space, solve
 
-    m, k, r = mass.array, stiffness.array, rows.array
+    m = mass.array
+    k = stiffness.array
+    r = rows.array
     inertial = solve(m, r.T, assume_a="pos") if len(r) else np.zeros((len(m), 0))
     local = np.linalg.inv(r @ inertial) if len(r) else np.zeros((0, 0))
     free = null_space(r) if len(r) else np.eye(len(m))
@@ -96,14 +129,20 @@ def modes_of(
         _, found = eigh(free.T @ k @ free, free.T @ m @ free)
         shapes = free @ found
         shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), range(shapes.shape[1])])
-    basis, count, rounding = np.hstack([inertial @ local, shapes]), len(r), 64.0 * len(m) * np.finfo(float).eps
+    basis = np.hstack([inertial @ local, shapes])
+    count = len(r)
+    rounding = 64.0 * len(m) * np.finfo(float).eps
     local = 0.5 * (local + local.T)
     local[np.abs(local) <= rounding * np.abs(local).max(initial=0.0)] = 0.0
     damped = None if damping is None else basis.T @ damping.array @ basis
     among = np.zeros((0, 0)) if damped is None else damped[count:, count:]
-    coupled = np.abs(among - np.diag(np.diag(among))).max(initial=0.0) > rounding * np.abs(among).max(initial=0.0)
+    coupled = np.abs(among - np.diag(np.diag(among))).max(initial=0.0) > rounding * np.abs(
+        among
+    ).max(initial=0.0)
     inverse = np.vstack([r, shapes.T @ m])  # as T' M T is block-diagonal
-    return Modes(basis, local, basis.T @ k @ basis, damped, bool(coupled), basis.T @ forces.array, inverse)
+    return Modes(
+        basis, local, basis.T @ k @ basis, damped, bool(coupled), basis.T @ forces.array, inverse
+    )
 
 
 class Equations:
@@ -111,14 +150,21 @@ class Equations:
 
     def __init__(self, structure: Structure) -> None:
         local, self.damped, self.coupled, _ = structure.form
-        self._numbers, self._at = structure.coefficients, 0
-        self.local, self.size = len(local), len(structure.names)
-        m, modes, channels = self.local, len(structure.names) - len(local), len(structure.forces)
-        self.mass, self.stiffness = self._block(m, m), self._block(m, m)
-        self.damping, self.forces = self._block(m, m) if self.damped else [], self._block(m, channels)
+        self._numbers = structure.coefficients
+        self._at = 0
+        self.local = len(local)
+        self.size = len(structure.names)
+        m = self.local
+        modes = len(structure.names) - len(local)
+        channels = len(structure.forces)
+        self.mass = self._block(m, m)
+        self.stiffness = self._block(m, m)
+        self.damping = self._block(m, m) if self.damped else []
+        self.forces = self._block(m, channels)
         self.record = ModeRecord(m, channels, self.damped)
         if m:
-            self._numbers, self._at = structure.records.array, 0
+            self._numbers = structure.records.array
+            self._at = 0
         self._at += 1
         self.records = self._block(modes, self.record.size)
         self.among = self._block(modes, modes) if self.coupled else []
@@ -130,38 +176,46 @@ class Equations:
 
 @dataclass(frozen=True, kw_only=True)
 class Structure(ContactModel):
-    """A linear structure of up to 200 coordinates u, with contacts, surfaces and frictions at some of its points:
+    """A linear structure of up to 200 coordinates u, with contacts, surfaces and frictions at some
+    of its points:
 
-        M u'' + C u' + K u = sum over channels of g f(t) + the forces of surfaces + reactions + frictions.
+        M u'' + C u' + K u = sum over channels of g f(t) + the forces of surfaces + reactions +
+        frictions.
 
-    Its coordinates are the displacements of contacts, surfaces and frictions, under their names, and behind them the amplitudes
-    `mode_1`, `mode_2`, ... of the modes, of mass 1, that it has while these are held, the slowest first. `start` makes a state of
-    displacements u, and `displacements` gives u.
+    Its coordinates are the displacements of contacts, surfaces and frictions, under their names,
+    and behind them the amplitudes `mode_1`, `mode_2`, ... of the modes, of mass 1, that it has
+    while these are held, the slowest first. `start` makes a state of displacements u, and
+    `displacements` gives u.
 
     Parameters
     ----------
     mass, stiffness, damping
         M, K and C, (n, n); or M and K alone. Arrays, rows of numbers, or sparse matrices of SciPy.
     file
-        Instead of them, the path of a `.npz` or `.mat` file in which they are called mass, stiffness and damping, or M, K and C.
+        Instead of them, the path of a `.npz` or `.mat` file in which they are called mass,
+        stiffness and damping, or M, K and C.
     contacts, surfaces, friction
-        `Contact`, `Surface` and `Friction`, whose `coordinate` is a row of the matrices, its number from 0 or its name, a point,
-        or coefficients as a point has them. On the side +1 of a surface its `stiffness` and its `damping` act. The normal force
-        of a friction is 1, so that its coefficients are forces.
+        `Contact`, `Surface` and `Friction`, whose `coordinate` is a row of the matrices, its number
+        from 0 or its name, a point, or coefficients as a point has them. On the side +1 of a
+        surface its `stiffness` and its `damping` act. The normal force of a friction is 1, so that
+        its coefficients are forces.
     forces
         The vector g of each channel of the load by its name, as points are given.
     points
-        Sums of displacements by their names: the coefficients of all rows, (n,), or of some, {0: 1.0, "x5": -1.0}; or one row.
+        Sums of displacements by their names: the coefficients of all rows, (n,), or of some, {0:
+        1.0, "x5": -1.0}; or one row.
     names
         The names of the rows, by default x0, x1, ...
     coefficients, records, form
-        Computed from the others and not to be given: the numbers of the equations, and which there are.
+        Computed from the others and not to be given: the numbers of the equations, and which there
+        are.
 
     Raises
     ------
     ParameterError
-        Matrices that are not square, of different sizes, or not finite; a mass that is not symmetric and positive definite; a
-        stiffness that is not symmetric; an unknown coordinate; local displacements that are not independent.
+        Matrices that are not square, of different sizes, or not finite; a mass that is not
+        symmetric and positive definite; a stiffness that is not symmetric; an unknown coordinate;
+        local displacements that are not independent.
 
     Examples
     --------
@@ -188,8 +242,9 @@ class Structure(ContactModel):
     forces: Any = None
     points: Any = None
     names: tuple[str, ...] = ()
-    # What follows from the others: numbers of the local equations; those of the modes, which without local displacements are
-    # among the first; and which blocks of numbers there are, with the names of the local displacements.
+    # What follows from the others: numbers of the local equations; those of the modes, which
+    # without local displacements are among the first; and which blocks of numbers there are, with
+    # the names of the local displacements.
     coefficients: Any = dataclasses.field(default=None, repr=False)
     records: Any = dataclasses.field(default=None, repr=False)
     form: Any = dataclasses.field(default=None, repr=False)
@@ -197,24 +252,66 @@ class Structure(ContactModel):
     eigenmodes = eigenmodes_of  # the table that the kernel reads
 
     def __post_init__(self) -> None:
-        given = matrices_in(self.file, IN_FILES) if self.file else {name: getattr(self, name) for name in IN_FILES}
+        given = (
+            matrices_in(self.file, IN_FILES)
+            if self.file
+            else {name: getattr(self, name) for name in IN_FILES}
+        )
         mass, stiffness, damping = (_matrix(given.get(name), name) for name in IN_FILES)
-        check_matrices({name: m.array for name, m in zip(IN_FILES, (mass, stiffness, damping), strict=True) if m is not None})
+        check_matrices(
+            {
+                name: m.array
+                for name, m in zip(IN_FILES, (mass, stiffness, damping), strict=True)
+                if m is not None
+            }
+        )
         names = _names_of(self.names, len(mass.array))
-        points = {name: _vector(row, names, f"points.{name}") for name, row in dict(self.points or {}).items()}
-        forces = {name: _vector(row, names, f"forces.{name}") for name, row in dict(self.forces or {}).items()}
+        points = {
+            name: _vector(row, names, f"points.{name}")
+            for name, row in dict(self.points or {}).items()
+        }
+        forces = {
+            name: _vector(row, names, f"forces.{name}")
+            for name, row in dict(self.forces or {}).items()
+        }
         parts = {
-            field: NamedParts(_part(part, kind, field, names, points) for part in _each(getattr(self, field), field))
-            for field, kind in (("contacts", Contact), ("surfaces", Surface), ("friction", Friction))
+            field: NamedParts(
+                _part(part, kind, field, names, points)
+                for part in _each(getattr(self, field), field)
+            )
+            for field, kind in (
+                ("contacts", Contact),
+                ("surfaces", Surface),
+                ("friction", Friction),
+            )
         }
         local = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
-        rows = np.array([points.get(name) or _vector(name, names, name) for name in local]).reshape(len(local), len(names))
+        rows = np.array([points.get(name) or _vector(name, names, name) for name in local]).reshape(
+            len(local), len(names)
+        )
         check_independent(rows, tuple(local))
         columns = np.array([*forces.values()]).reshape(len(forces), len(names)).T
-        modes = modes_of(mass, stiffness, damping, ConstantNumbers(rows, "points"), ConstantNumbers(columns, "forces"))
+        modes = modes_of(
+            mass,
+            stiffness,
+            damping,
+            ConstantNumbers(rows, "points"),
+            ConstantNumbers(columns, "forces"),
+        )
         pattern = tuple(tuple(bool(x) for x in row) for row in modes.mass)
-        made = {"mass": mass, "stiffness": stiffness, "damping": damping, "file": "", "names": names, **parts}
-        made |= {"forces": Vectors(forces), "points": Vectors(points), "coefficients": Coefficients(modes.coefficients())}
+        made = {
+            "mass": mass,
+            "stiffness": stiffness,
+            "damping": damping,
+            "file": "",
+            "names": names,
+            **parts,
+        }
+        made |= {
+            "forces": Vectors(forces),
+            "points": Vectors(points),
+            "coefficients": Coefficients(modes.coefficients()),
+        }
         made |= {"records": ConstantNumbers(modes.records(), "records")}
         made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
         vars(self).update(made, _modes=modes)
@@ -237,18 +334,24 @@ class Structure(ContactModel):
 
     def to_table(self) -> dict[str, Any]:
         """Plain tables and texts, of which `Structure(**table)` makes it again."""
-        table: dict[str, Any] = {name: m.packed() for name in IN_FILES if (m := getattr(self, name)) is not None}
+        table: dict[str, Any] = {
+            name: m.packed() for name in IN_FILES if (m := getattr(self, name)) is not None
+        }
         for field in ("contacts", "surfaces", "friction"):
             if parts := getattr(self, field):
                 table[field] = [_table_of(part) for part in parts]
         for field in ("forces", "points"):
             if rows := getattr(self, field):
                 table[field] = {name: list(row) for name, row in rows.items()}
-        return table | ({"names": list(self.names)} if self.names != _names_of((), len(self.names)) else {})
+        return table | (
+            {"names": list(self.names)} if self.names != _names_of((), len(self.names)) else {}
+        )
 
     @property
     def local_count(self) -> int:
-        """The number of coordinates whose equations are traced one by one, while those of the modes are loops."""
+        """The number of coordinates whose equations are traced one by one, while those of the modes
+        are loops.
+        """
         return len(self.form[0]) or len(self.names)
 
     def mass_matrix(self, theta: Any) -> Any:
@@ -256,7 +359,10 @@ class Structure(ContactModel):
         own = Equations(self)
         if isinstance(theta, tuple) and hasattr(theta, "sum_over_modes"):
             known = self.form[3]
-            return [[x if there else 0.0 for x, there in zip(*each, strict=True)] for each in zip(own.mass, known, strict=True)]
+            return [
+                [x if there else 0.0 for x, there in zip(*each, strict=True)]
+                for each in zip(own.mass, known, strict=True)
+            ]
         rows = [[float(i == j) for j in range(own.size)] for i in range(own.size)]
         for row, masses, known in zip(rows, own.mass, self.form[3], strict=False):
             row[: own.local] = [x if there else 0.0 for x, there in zip(masses, known, strict=True)]
@@ -266,7 +372,9 @@ class Structure(ContactModel):
         """The forces on the local displacements and on the modes, without reactions and frictions."""
         own = Equations(self)
         q, v = (list(x) if own.size > 1 else [x] for x in (theta, velocity))
-        m, places, records = own.local, own.record, own.records
+        m = own.local
+        places = own.record
+        records = own.records
         pushes = [getattr(load, name)(t) for name in self.forces]
         found = [_sum(own.forces[i], pushes) for i in range(m)]
         for i in range(m):
@@ -277,23 +385,37 @@ class Structure(ContactModel):
                 rates = places.local_damping[i] if own.damped else None
                 found[i] = found[i] - theta.sum_over_modes(places.size, places.stiffness[i], rates)
             else:
-                found[i] = found[i] - _sum([record[places.stiffness[i]] for record in records], q[m:])
+                found[i] = found[i] - _sum(
+                    [record[places.stiffness[i]] for record in records], q[m:]
+                )
                 if own.damped:
-                    found[i] = found[i] - _sum([record[places.local_damping[i]] for record in records], v[m:])
+                    found[i] = found[i] - _sum(
+                        [record[places.local_damping[i]] for record in records], v[m:]
+                    )
         for i, record in enumerate(records if len(q) == own.size else []):
             pushed = _sum([record[k] for k in places.forces], pushes)
-            found.append(pushed - record[places.square] * q[m + i] - _sum([record[k] for k in places.stiffness], q[:m]))
+            found.append(
+                pushed
+                - record[places.square] * q[m + i]
+                - _sum([record[k] for k in places.stiffness], q[:m])
+            )
             if own.damped:
-                slowed = _sum(own.among[i], v[m:]) if own.coupled else record[places.damping] * v[m + i]
+                slowed = (
+                    _sum(own.among[i], v[m:]) if own.coupled else record[places.damping] * v[m + i]
+                )
                 found[-1] = found[-1] - slowed - _sum([record[k] for k in places.by_local], v[:m])
         for surface in self.surfaces:
-            i, side = self.form[0].index(surface.coordinate), sides[0][surface.name]
+            i = self.form[0].index(surface.coordinate)
+            side = sides[0][surface.name]
             pressed = surface.stiffness * (q[i] - surface.position) + surface.damping * v[i]
             found[i] = found[i] - 0.5 * (1.0 + side) * pressed
         return found[0] if own.size == 1 else tuple(found)
 
-    def mode_equations(self, t: Any, theta: Any, velocity: Any, load: Any) -> tuple[ModeRecord, bool, list[Any]]:
-        """The places in a mode's record, whether D couples modes, and their inputs, each with its coefficient's place and a sign.
+    def mode_equations(
+        self, t: Any, theta: Any, velocity: Any, load: Any
+    ) -> tuple[ModeRecord, bool, list[Any]]:
+        """The places in a mode's record, whether D couples modes, and their inputs, each with its
+        coefficient's place and a sign.
 
         Parameters
         ----------
@@ -301,10 +423,14 @@ class Structure(ContactModel):
             The time, the local displacements, their rates, and the load, as `force` takes them.
         """
         own = Equations(self)
-        places, found = own.record, [(x, k, -1.0) for x, k in zip(theta, own.record.stiffness, strict=True)]
+        places = own.record
+        found = [(x, k, -1.0) for x, k in zip(theta, own.record.stiffness, strict=True)]
         if own.damped:
             found += [(x, k, -1.0) for x, k in zip(velocity, places.by_local, strict=True)]
-        found += [(getattr(load, name)(t), k, 1.0) for name, k in zip(self.forces, places.forces, strict=True)]
+        found += [
+            (getattr(load, name)(t), k, 1.0)
+            for name, k in zip(self.forces, places.forces, strict=True)
+        ]
         return places, own.coupled, found
 
     def kinetic_energy(self, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
@@ -315,7 +441,8 @@ class Structure(ContactModel):
         return 0.5 * (local + sum(x * x for x in v[own.local :]))
 
     def displacements(self, of: Any) -> np.ndarray:
-        """The displacements u, (n,) or (n, times), of coordinates of this model; velocities u' of their rates.
+        """The displacements u, (n,) or (n, times), of coordinates of this model; velocities u' of
+        their rates.
 
         Parameters
         ----------
@@ -324,11 +451,18 @@ class Structure(ContactModel):
         """
         given = np.asarray(of, dtype=float)
         if given.shape[:1] != (len(self.names),):
-            raise ParameterError(f"displacements takes {len(self.names)} coordinates along the first axis, got {shown(of)}", "of")
+            raise ParameterError(
+                (
+                    f"displacements takes {len(self.names)} coordinates along the first axis, got "
+                    f"{shown(of)}"
+                ),
+                "of",
+            )
         return np.asarray(vars(self)["_modes"].basis @ given)
 
     def start(self, displacement: Any = 0.0, velocity: Any = 0.0) -> dict[str, Any]:
-        """The state with these displacements u and velocities u', by the names of the arguments of `simulate`.
+        """The state with these displacements u and velocities u', by the names of the arguments of
+        `simulate`.
 
         Parameters
         ----------
@@ -337,13 +471,20 @@ class Structure(ContactModel):
         """
         found = []
         for name, given in (("displacement", displacement), ("velocity", velocity)):
-            vector = _vector(np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name)
+            vector = _vector(
+                np.full(len(self.names), given) if np.ndim(given) == 0 else given, self.names, name
+            )
             found.append([float(x) for x in vars(self)["_modes"].inverse @ vector])
-        local = [(i, self.names.index(name)) for i, name in enumerate(self.form[0]) if name in self.names]
+        local = [
+            (i, self.names.index(name)) for i, name in enumerate(self.form[0]) if name in self.names
+        ]
         for values, given in zip(found, (displacement, velocity), strict=True):
             for i, row in local:  # exactly as given, so that what is at a contact is there
                 values[i] = float(given if np.ndim(given) == 0 else given[row])
-        return {**dict(zip(self.coordinates, found[0], strict=True)), "velocity": found[1] if len(found[1]) > 1 else found[1][0]}
+        return {
+            **dict(zip(self.coordinates, found[0], strict=True)),
+            "velocity": found[1] if len(found[1]) > 1 else found[1][0],
+        }
 
 
 def _sum(factors: Sequence[Any], values: Sequence[Any]) -> Any:
@@ -355,21 +496,37 @@ def _sum(factors: Sequence[Any], values: Sequence[Any]) -> Any:
     return total
 
 
-# --- what is given ------------------------------------------------------------------------------------------------------------
+# --- what is given -----------------------------------------------------------
 
 
 def _matrix(given: Any, name: str) -> Any:
     """A matrix that was given, or None for a damping that was not."""
     if given is None and name != "damping":
-        raise ParameterError(f"{name} is missing: a structure is given by its mass and its stiffness, or by a file of them", name)
-    return given if given is None or isinstance(given, ConstantNumbers) else ConstantNumbers(given, name)
+        raise ParameterError(
+            (
+                f"{name} is missing: a structure is given by its mass and its stiffness, or by a "
+                "file of them"
+            ),
+            name,
+        )
+    return (
+        given
+        if given is None or isinstance(given, ConstantNumbers)
+        else ConstantNumbers(given, name)
+    )
 
 
 def _names_of(given: Any, size: int) -> tuple[str, ...]:
     """The names of the rows."""
     names = tuple(given) or tuple(f"x{i}" for i in range(size))
     if len(names) != size or len(set(names)) < size:
-        raise ParameterError(f"names must be {size} different names, one for each row of the mass, got {shown(given)}", "names")
+        raise ParameterError(
+            (
+                f"names must be {size} different names, one for each row of the mass, got "
+                f"{shown(given)}"
+            ),
+            "names",
+        )
     for name in names:
         _check_name(name, "names")
     return names
@@ -377,12 +534,25 @@ def _names_of(given: Any, size: int) -> tuple[str, ...]:
 
 def _check_name(name: Any, where: str) -> None:
     """Refuse a name that no coordinate can have."""
-    if not (isinstance(name, str) and name.isidentifier() and name != "velocity" and not name.startswith(MODE)):
-        raise ParameterError(f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not {MODE}1", where)
+    if not (
+        isinstance(name, str)
+        and name.isidentifier()
+        and name != "velocity"
+        and not name.startswith(MODE)
+    ):
+        raise ParameterError(
+            (
+                f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not "
+                f"{MODE}1"
+            ),
+            where,
+        )
 
 
 def _vector(given: Any, names: tuple[str, ...], where: str) -> Any:
-    """The coefficients of all rows, from themselves, from a row's name or number, or from a dictionary of some rows."""
+    """The coefficients of all rows, from themselves, from a row's name or number, or from a
+    dictionary of some rows.
+    """
     if isinstance(given, RowNumbers):
         return given
     if isinstance(given, (str, int, np.integer)) and not isinstance(given, bool):
@@ -394,7 +564,13 @@ def _vector(given: Any, names: tuple[str, ...], where: str) -> Any:
         given = row
     values = read_array(given, where)
     if values.shape != (len(names),):
-        raise ParameterError(f"{where} must have {len(names)} numbers, one for each row of the mass, got {shown(given)}", where)
+        raise ParameterError(
+            (
+                f"{where} must have {len(names)} numbers, one for each row of the mass, got "
+                f"{shown(given)}"
+            ),
+            where,
+        )
     return RowNumbers(values.tolist())
 
 
@@ -403,9 +579,13 @@ def _place(key: Any, names: tuple[str, ...], where: str) -> int:
     if isinstance(key, (int, np.integer)) and not isinstance(key, bool):
         if -len(names) <= key < len(names):
             return int(key) % len(names)
-        raise ParameterError(f"{where}: there is no row {key}; the rows are 0 to {len(names) - 1}", where)
+        raise ParameterError(
+            f"{where}: there is no row {key}; the rows are 0 to {len(names) - 1}", where
+        )
     if key not in names:
-        raise ParameterError(f"{where}: no row is called {shown(key)}; {near(str(key), names)}", where)
+        raise ParameterError(
+            f"{where}: no row is called {shown(key)}; {near(str(key), names)}", where
+        )
     return names.index(key)
 
 
@@ -416,18 +596,32 @@ def _each(given: Any, field: str) -> Sequence[Any]:
     raise ParameterError(f"{field} must be a list, got {shown(given)}", field)
 
 
-def _part(part: Any, kind: Any, field: str, names: tuple[str, ...], points: dict[str, RowNumbers]) -> Any:
-    """A contact, surface or friction whose coordinate is the name of a row or of a point; a sum becomes a point with its name."""
+def _part(
+    part: Any, kind: Any, field: str, names: tuple[str, ...], points: dict[str, RowNumbers]
+) -> Any:
+    """A contact, surface or friction whose coordinate is the name of a row or of a point; a sum
+    becomes a point with its name.
+    """
     if isinstance(part, Mapping):
         known = [each.name for each in fields(kind)]
         if unknown := [name for name in part if name not in known]:
-            raise ParameterError(f"{field}: {kind.__name__} has no {shown(unknown[0])}; {near(str(unknown[0]), known)}", field)
+            raise ParameterError(
+                (
+                    f"{field}: {kind.__name__} has no {shown(unknown[0])}; "
+                    f"{near(str(unknown[0]), known)}"
+                ),
+                field,
+            )
         if "name" not in part or "coordinate" not in part:
-            raise ParameterError(f"{field}: a {kind.__name__} needs a name and a coordinate, got {shown(part)}", field)
+            raise ParameterError(
+                f"{field}: a {kind.__name__} needs a name and a coordinate, got {shown(part)}",
+                field,
+            )
         part = kind(**part)
     if not isinstance(part, kind):
         raise ParameterError(f"{field} must be of class {kind.__name__}, got {shown(part)}", field)
-    where, on = f"{field}.{part.name}", part.coordinate
+    where = f"{field}.{part.name}"
+    on = part.coordinate
     _check_name(part.name, where)
     if isinstance(on, str) and (on in points or on in names):
         coordinate = on
@@ -435,7 +629,10 @@ def _part(part: Any, kind: Any, field: str, names: tuple[str, ...], points: dict
         coordinate = names[_place(on, (*names, *points) if isinstance(on, str) else names, where)]
     else:
         if part.name in names or part.name in points:
-            raise ParameterError(f"{where}: a row or a point is called {part.name} already; give the sum as a point", where)
+            raise ParameterError(
+                f"{where}: a row or a point is called {part.name} already; give the sum as a point",
+                where,
+            )
         points[part.name] = _vector(on, names, where)
         coordinate = part.name
     for each in fields(part):
@@ -450,5 +647,9 @@ def _part(part: Any, kind: Any, field: str, names: tuple[str, ...], points: dict
 
 def _table_of(part: Any) -> dict[str, Any]:
     """The fields of a contact, surface or friction that are not as they are by default."""
-    table = {each.name: getattr(part, each.name) for each in fields(part) if getattr(part, each.name) != each.default}
+    table = {
+        each.name: getattr(part, each.name)
+        for each in fields(part)
+        if getattr(part, each.name) != each.default
+    }
     return table | ({"sign": int(part.sign)} if hasattr(part, "sign") else {})

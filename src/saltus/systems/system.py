@@ -1,4 +1,6 @@
-"""A system: a model, a load and an impact law, frozen and complete; and its mirror symmetry, images of states and contacts."""
+"""A system: a model, a load and an impact law, frozen and complete; and its mirror symmetry, images
+of states and contacts.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,9 @@ from saltus.systems.serial import children, from_dict, is_fixed, numbers, replac
 class System:
     """A model, its load and its impact law: all that is needed to repeat a motion.
 
-    `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every number has a dotted path:
-    `model.damping`, `load.frequency`, `load.horizontal.amplitude`, `load.vertical`, `impact.e`.
+    `System(model=Metainterface(beta0=...), load=Load(...), impact=VelocityReduction(1.0))`. Every
+    number has a dotted path: `model.damping`, `load.frequency`, `load.horizontal.amplitude`,
+    `load.vertical`, `impact.e`.
 
     Parameters
     ----------
@@ -36,8 +39,8 @@ class System:
     load
         The load that acts on it; by default none.
     impact
-        The impact law; by default the model's `usual_impact`, which is Housner's for a rocking block, and else the velocity is
-        kept (e = 1).
+        The impact law; by default the model's `usual_impact`, which is Housner's for a rocking
+        block, and else the velocity is kept (e = 1).
 
     Raises
     ------
@@ -60,22 +63,28 @@ class System:
 
     def __post_init__(self) -> None:
         if self.impact is None:
-            object.__setattr__(self, "impact", getattr(self.model, "usual_impact", None) or VelocityReduction())
+            object.__setattr__(
+                self, "impact", getattr(self.model, "usual_impact", None) or VelocityReduction()
+            )
         _check_parts(self)
         for channel in self.load.channels:
             if channel not in self.model.channels:
                 hint = near(channel, [*self.model.channels, "frequency"])
-                raise ParameterError(f"{type(self.model).__name__} does not read load.{channel}; {hint}", f"load.{channel}")
+                raise ParameterError(
+                    f"{type(self.model).__name__} does not read load.{channel}; {hint}",
+                    f"load.{channel}",
+                )
         self.model.check_load(self.load)
         if _passes(self.model, self.impact):  # refuses sums that cannot be coordinates
             inner = System(model=in_gap_coordinates(self.model), load=self.load, impact=self.impact)
             object.__setattr__(self, "_in_gaps", inner)
 
     def _remembered(self, what: Any, make: Callable[[], Any]) -> Any:
-        """What follows from this system alone, made when it is first asked for; for those who make a motion of it.
+        """What follows from this system alone, made when it is first asked for; for those who make
+        a motion of it.
 
-        A copy makes it anew, and so does at every time a system of which a part may change, as an array or a class that is not
-        frozen does.
+        A copy makes it anew, and so does at every time a system of which a part may change, as an
+        array or a class that is not frozen does.
         """
         memory = vars(self).get("_memory")
         if memory is None:
@@ -93,7 +102,8 @@ class System:
         return html_table("System", parts | self.parameters)
 
     def with_(self, changes: Mapping[str, Any] | None = None, **more: Any) -> System:
-        """A copy with the parts at the given dotted paths replaced: `system.with_({"load.frequency": 1.1})`.
+        """A copy with the parts at the given dotted paths replaced:
+        `system.with_({"load.frequency": 1.1})`.
 
         Parameters
         ----------
@@ -105,13 +115,17 @@ class System:
         Raises
         ------
         ParameterError
-            A path that leads nowhere (the error names similar ones), or a value that is refused there.
+            A path that leads nowhere (the error names similar ones), or a value that is refused
+            there.
         """
         given = {**(changes or {}), **more}
         for path in given:
             if str(path).partition(".")[0] not in children(self):
                 hint = near(str(path), [*children(self), *self.parameters])
-                raise ParameterError(f"no parameter {shown(path)}; {hint} (as in with_({{'load.frequency': 1.1}}))", str(path))
+                raise ParameterError(
+                    f"no parameter {shown(path)}; {hint} (as in with_({{'load.frequency': 1.1}}))",
+                    str(path),
+                )
         system: System = replace(self, given)
         return system
 
@@ -124,12 +138,16 @@ class System:
             The dotted path, such as "load.horizontal.amplitude".
         """
         if not isinstance(path, str):
-            raise ParameterError(f"a path must be a text such as 'load.frequency', got {shown(path)}", "path")
+            raise ParameterError(
+                f"a path must be a text such as 'load.frequency', got {shown(path)}", "path"
+            )
         node: Any = self
         for name in path.split("."):
             parts = children(node)
             if name not in parts:
-                raise ParameterError(f"no parameter {shown(path)}; {near(path, self.parameters)}", path)
+                raise ParameterError(
+                    f"no parameter {shown(path)}; {near(path, self.parameters)}", path
+                )
             node = parts[name]
         return node.value if type(node).__name__ == "Constant" else node
 
@@ -145,20 +163,25 @@ class System:
 
     @property
     def in_gap_coordinates(self) -> System:
-        """This system in coordinates of which each contact of its model holds one; itself, if each does already.
+        """This system in coordinates of which each contact of its model holds one; itself, if each
+        does already.
 
-        A sum of coordinates that a contact keeps on one side then is a coordinate, in the place of one of its terms: y_minus_x in
-        the place of y. All other numbers are the same, under the same paths.
+        A sum of coordinates that a contact keeps on one side then is a coordinate, in the place of
+        one of its terms: y_minus_x in the place of y. All other numbers are the same, under the
+        same paths.
         """
         return self._in_gaps or self
 
     @property
     def dependent(self) -> int:
-        """How many coordinates of `in_gap_coordinates`, the last ones, are sums that follow from the others."""
+        """How many coordinates of `in_gap_coordinates`, the last ones, are sums that follow from
+        the others.
+        """
         return int(getattr(self.in_gap_coordinates.model, "dependent", 0))
 
     def from_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
-        """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same objects where that is itself.
+        """Coordinates and velocities of this system, for those of `in_gap_coordinates`; the same
+        objects where that is itself.
 
         Parameters
         ----------
@@ -173,7 +196,8 @@ class System:
         return model.own_states(time, position, velocity, self.load)
 
     def to_gaps(self, time: Any, position: Any, velocity: Numbers) -> tuple[Any, Any]:
-        """The inverse of `from_gaps`. Gaps of closed contacts, and their rates, are 0 if they are so up to rounding.
+        """The inverse of `from_gaps`. Gaps of closed contacts, and their rates, are 0 if they are
+        so up to rounding.
 
         Parameters
         ----------
@@ -188,29 +212,41 @@ class System:
         return model.gap_states(time, position, velocity, self.load)
 
     def _with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
-        """A state (d,), changed in place: velocities of coordinates of first order are those that follow from it at a time."""
+        """A state (d,), changed in place: velocities of coordinates of first order are those that
+        follow from it at a time.
+        """
         model = self.model
         if model.first_order:
             q, v = (x.item() if x.size == 1 else tuple(x.tolist()) for x in np.split(state, 2))
-            rates = np.atleast_1d(np.array(model.acceleration(time, q, v, 1, DeclaredLoad(self.load, model)), dtype=float))
+            rates = np.atleast_1d(
+                np.array(
+                    model.acceleration(time, q, v, 1, DeclaredLoad(self.load, model)), dtype=float
+                )
+            )
             state[len(state) - len(model.first_order) :] = rates[len(model.moving) :]
             getattr(model, "closed_exactly", lambda *given: given)(*np.split(state, 2))
         return state
 
     def mirrored(self) -> System | None:
-        """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None without the symmetry.
+        """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None
+        without the symmetry.
 
-        With several coordinates the mirror image may swap some (`Model.images`); contacts and frictions must be images of one
-        another, with the same laws.
+        With several coordinates the mirror image may swap some (`Model.images`); contacts and
+        frictions must be images of one another, with the same laws.
 
         Raises
         ------
         ParameterError
             A `mirror` of the model that is no such symmetry, as a test at one state shows.
         """
-        load, inner = self.model.mirror(self.load), self.in_gap_coordinates
+        load = self.model.mirror(self.load)
+        inner = self.in_gap_coordinates
         if inner is not self:
-            return None if inner.mirrored() is None else System(model=self.model, load=load, impact=self.impact)
+            return (
+                None
+                if inner.mirrored() is None
+                else System(model=self.model, load=load, impact=self.impact)
+            )
         if load is None or self.contact_images is None:
             return None
         mirrored = System(model=self.model, load=load, impact=self.impact)
@@ -220,7 +256,9 @@ class System:
 
     @property
     def contact_images(self) -> tuple[int, ...] | None:
-        """The number of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
+        """The number of the mirror image of each contact, then of each friction; None if one has no
+        image or the laws differ.
+        """
         return _contact_images(self.model, self.impact)
 
     @property
@@ -251,7 +289,11 @@ class System:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain nested dictionaries, as written to JSON and TOML."""
-        return {"model": to_dict(self.model), "load": to_dict(self.load), "impact": to_dict(self.impact)}
+        return {
+            "model": to_dict(self.model),
+            "load": to_dict(self.load),
+            "impact": to_dict(self.impact),
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> System:
@@ -263,13 +305,21 @@ class System:
             A dictionary as `to_dict` returns it.
         """
         if not isinstance(data, Mapping):
-            raise ParameterError(f"a system is a table with a model, a load and an impact law, got {shown(data)}", "data")
+            raise ParameterError(
+                f"a system is a table with a model, a load and an impact law, got {shown(data)}",
+                "data",
+            )
         unknown = set(data) - {"model", "load", "impact"}
         if unknown:
             name = min(map(str, unknown))
-            raise ParameterError(f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}", "data")
+            raise ParameterError(
+                f"unknown key {name!r} of a system; {near(name, ('model', 'load', 'impact'))}",
+                "data",
+            )
         if "model" not in data:
-            raise ParameterError("a system needs a model, such as {'type': 'Metainterface', 'beta0': 1.4}", "model")
+            raise ParameterError(
+                "a system needs a model, such as {'type': 'Metainterface', 'beta0': 1.4}", "model"
+            )
         parts: dict[str, Any] = {name: from_dict(name, value) for name, value in data.items()}
         return cls(**parts)
 
@@ -319,18 +369,23 @@ class System:
 
 
 class _CheckedParts(NamedTuple):
-    """A model and an impact law that have passed their checks, and whether the model has contacts of sums of coordinates."""
+    """A model and an impact law that have passed their checks, and whether the model has contacts
+    of sums of coordinates.
+    """
 
     model: Any = None
     impact: Any = None
     has_sums: bool = False
 
 
-_passed = _CheckedParts()  # the last ones: `with_` makes systems by the thousand whose loads alone differ
+# the last ones: `with_` makes systems by the thousand whose loads alone differ
+_passed = _CheckedParts()
 
 
 def _passes(model: Model, impact: ImpactLaw) -> bool:
-    """Refuse a model and an impact law that cannot be simulated; returns whether contacts of it are of sums of coordinates."""
+    """Refuse a model and an impact law that cannot be simulated; returns whether contacts of it are
+    of sums of coordinates.
+    """
     global _passed
     last = _passed
     if last.model is not model or last.impact is not impact or not is_fixed(model):
@@ -343,9 +398,15 @@ def _passes(model: Model, impact: ImpactLaw) -> bool:
 def _check_parts(system: System) -> None:
     """Refuse parts of a system that are of no class for their place."""
     if not isinstance(system.model, Model):
-        raise ParameterError(f"model must be a Model, such as Metainterface(beta0=1.4), got {shown(system.model)}", "model")
+        raise ParameterError(
+            f"model must be a Model, such as Metainterface(beta0=1.4), got {shown(system.model)}",
+            "model",
+        )
     if not isinstance(system.load, Load):
-        raise ParameterError(f"load must be a Load, such as Load(frequency=1.0, ...), got {shown(system.load)}", "load")
+        raise ParameterError(
+            f"load must be a Load, such as Load(frequency=1.0, ...), got {shown(system.load)}",
+            "load",
+        )
     if not isinstance(system.impact, ImpactLaw):
         raise ParameterError(
             "impact must be an ImpactLaw: VelocityReduction(e) where a motion passes the contact, NewtonImpact(e) where it "
@@ -362,16 +423,27 @@ def _check_impact(model: Model, impact: ImpactLaw) -> None:
         impact.check_one_contact(model)
         check_contact(model, impact)
     elif impact != VelocityReduction():
-        raise ParameterError(f"this {type(model).__name__} has no impacts, so {impact!r} cannot act; leave it out", "impact")
+        raise ParameterError(
+            f"this {type(model).__name__} has no impacts, so {impact!r} cannot act; leave it out",
+            "impact",
+        )
 
 
 def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
     try:
         return parse(text)
     except RecursionError:
-        raise ParameterError(f"this is not the {language} of a system: it is nested too deeply", "text") from None
-    except (TypeError, ValueError, AttributeError) as error:  # not a text, or not one of this format
-        raise ParameterError(f"this is not the {language} of a system: {error!s:.120}", "text") from None
+        raise ParameterError(
+            f"this is not the {language} of a system: it is nested too deeply", "text"
+        ) from None
+    except (
+        TypeError,
+        ValueError,
+        AttributeError,
+    ) as error:  # not a text, or not one of this format
+        raise ParameterError(
+            f"this is not the {language} of a system: {error!s:.120}", "text"
+        ) from None
 
 
 def check_system(
@@ -382,7 +454,8 @@ def check_system(
     several_contacts: bool = False,
     sums: bool = True,
 ) -> None:
-    """Refuse anything but a System whose model has the contacts and the number of coordinates that `asking` is for.
+    """Refuse anything but a System whose model has the contacts and the number of coordinates that
+    `asking` is for.
 
     Without `sums` each contact and surface must be of a single coordinate.
 
@@ -392,10 +465,14 @@ def check_system(
         The error says which systems `asking` takes.
     """
     if not isinstance(system, System):
-        raise ParameterError(f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}", "system")
+        raise ParameterError(
+            f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}",
+            "system",
+        )
     if several_contacts and sums and coordinates is None:
         return
-    inner, names = system.in_gap_coordinates, system.model.coordinates
+    inner = system.in_gap_coordinates
+    names = system.model.coordinates
     if inner is not system and not sums:
         raise ParameterError(
             f"{asking} works in coordinates that contacts hold one by one: give it system.in_gap_coordinates, which has "
@@ -405,11 +482,17 @@ def check_system(
     if coordinates is not None and (len(names) != coordinates or system.model.first_order):
         wanted = "one coordinate" if coordinates == 1 else f"{coordinates} coordinates"
         what = ", ".join(names) + " of first order" * (len(names) == coordinates)
-        raise ParameterError(f"{asking} is for models with {wanted}, and this one has {what}", "system")
+        raise ParameterError(
+            f"{asking} is for models with {wanted}, and this one has {what}", "system"
+        )
     if system.model.holds_coordinates and not several_contacts:
         model = system.model
         parts = ", ".join(
-            [*(c.name for c in model.contacts), *(f.name for f in model.frictions), *(s.name for s in model.surfaces)]
+            [
+                *(c.name for c in model.contacts),
+                *(f.name for f in model.frictions),
+                *(s.name for s in model.surfaces),
+            ]
         )
         raise ParameterError(
             f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
@@ -417,38 +500,69 @@ def check_system(
         )
 
 
-PROBE = (0.3711, 0.2931, 0.6173)  # An arbitrary time, gap and velocity, at which equations that differ have different values.
-MIRROR_ROUNDING = 1e-9  # Accelerations and velocities of mirror images may differ by this, relatively, through rounding.
+# An arbitrary time, gap and velocity, at which equations that differ have different values.
+PROBE = (0.3711, 0.2931, 0.6173)
+# Accelerations and velocities of mirror images may differ by this, relatively, through rounding.
+MIRROR_ROUNDING = 1e-9
 
 
 def image_places(model: Model) -> list[int]:
-    """For each coordinate of a mirror image, the index of the original coordinate whose negative it is."""
+    """For each coordinate of a mirror image, the index of the original coordinate whose negative it
+    is.
+    """
     return [model.coordinates.index(name) for name in model.images]
 
 
 def image_of(model: Model, states: np.ndarray) -> np.ndarray:
     """The mirror images of states (..., 2 coordinates), coordinates and then velocities."""
-    places, n = image_places(model), len(model.coordinates)
+    places = image_places(model)
+    n = len(model.coordinates)
     return np.asarray(-states[..., [*places, *(n + place for place in places)]])
 
 
 def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
-    """The index of the mirror image of each contact, then of each friction; None if one has no image or the laws differ."""
+    """The index of the mirror image of each contact, then of each friction; None if one has no
+    image or the laws differ.
+    """
     if model.surfaces or (isinstance(model, ContactModel) and model.jumps):
         return None  # those of surfaces and of jumps are not looked for
-    contacts, frictions, count = model.contacts, model.frictions, len(model.contacts)
-    found, names = [], [contact.name for contact in contacts]
+    contacts = model.contacts
+    frictions = model.frictions
+    count = len(model.contacts)
+    found = []
+    names = [contact.name for contact in contacts]
     for contact in contacts:
-        wanted = (model.images[model.coordinates.index(contact.coordinate)], -contact.sign, -float(contact.position))
-        same = [i for i, c in enumerate(contacts) if (c.coordinate, c.sign, float(c.position)) == wanted]
+        wanted = (
+            model.images[model.coordinates.index(contact.coordinate)],
+            -contact.sign,
+            -float(contact.position),
+        )
+        same = [
+            i for i, c in enumerate(contacts) if (c.coordinate, c.sign, float(c.position)) == wanted
+        ]
         found += same
     for friction in frictions:
-        numbers = (float(friction.kinetic), float(friction.most), friction.stribeck_speed, -float(friction.ground_speed))
+        numbers = (
+            float(friction.kinetic),
+            float(friction.most),
+            friction.stribeck_speed,
+            -float(friction.ground_speed),
+        )
         image = (model.images[model.coordinates.index(friction.coordinate)], *numbers)
         for i, f in enumerate(frictions):
-            own = (f.coordinate, float(f.kinetic), float(f.most), f.stribeck_speed, float(f.ground_speed))
-            pressed = [names.index(each.contact) if each.contact else None for each in (friction, f)]
-            image_of_its_own = None if pressed[0] is None else dict(enumerate(found)).get(pressed[0], -1)
+            own = (
+                f.coordinate,
+                float(f.kinetic),
+                float(f.most),
+                f.stribeck_speed,
+                float(f.ground_speed),
+            )
+            pressed = [
+                names.index(each.contact) if each.contact else None for each in (friction, f)
+            ]
+            image_of_its_own = (
+                None if pressed[0] is None else dict(enumerate(found)).get(pressed[0], -1)
+            )
             alike = image_of_its_own == pressed[1]
             found += [count + i] if own == image and alike else []
     if len(found) < count + len(frictions):
@@ -460,15 +574,18 @@ def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
 
 
 def check_mirror(system: Any, mirrored: Any, side: int) -> None:
-    """Refuse a mirrored system in which the mirror image of a state does not move as the mirror image of the state's motion.
+    """Refuse a mirrored system in which the mirror image of a state does not move as the mirror
+    image of the state's motion.
 
     Raises
     ------
     ParameterError
         The error names the class of the model.
     """
-    model, (t, distance, v) = system.model, PROBE
-    count, places = len(model.coordinates), image_places(model)
+    model = system.model
+    (t, distance, v) = PROBE
+    count = len(model.coordinates)
+    places = image_places(model)
     if count == 1:
         into = model.inward(side) if model.sides else 1.0
         at = [model.contact + into * distance]
@@ -476,12 +593,21 @@ def check_mirror(system: Any, mirrored: Any, side: int) -> None:
         at = [distance / (1 + i) for i in range(count)]
     rates = [v / (1 + i) for i in range(count)]
     there = _each(model.acceleration(t, _of(at), _of(rates), side, system.load))
-    image = _each(model.acceleration(t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), -side, mirrored.load))
+    image = _each(
+        model.acceleration(
+            t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), -side, mirrored.load
+        )
+    )
     pairs = [(there[i], x) for i, x in zip(places, image, strict=True)]
     names = [friction.coordinate for friction in model.frictions]
     pressing = normal_forces(model, t, _of(at), _of(rates), system.load)
-    pressed = normal_forces(model, t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), mirrored.load)
-    pairs += [(pressing[names.index(model.images[model.coordinates.index(c)])], -n) for c, n in zip(names, pressed, strict=True)]
+    pressed = normal_forces(
+        model, t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), mirrored.load
+    )
+    pairs += [
+        (pressing[names.index(model.images[model.coordinates.index(c)])], -n)
+        for c, n in zip(names, pressed, strict=True)
+    ]
     if model.sides:
         pairs.append((model.gap(at[0], side), -model.gap(-at[0], -side)))
         inward = -into * v

@@ -1,9 +1,11 @@
-"""Compiled code on disk: the folder that it is kept in, and files that are read only as they were written.
+"""Compiled code on disk: the folder that it is kept in, and files that are read only as they were
+written.
 
-A file's name has a digest of all that its content depends on, so that a change of it makes a new file. A file is put into its
-place in one step, and of processes that want the same one a single one makes it. Code from the cache is run only if the folder
-belongs to the user and the file is as it was written: compiled code, Python's, numba's and LLVM's, is compared with its digest.
-Damaged files are made again, with a remark. Within a process traces are known by the key of their structure.
+A file's name has a digest of all that its content depends on, so that a change of it makes a new
+file. A file is put into its place in one step, and of processes that want the same one a single one
+makes it. Code from the cache is run only if the folder belongs to the user and the file is as it
+was written: compiled code, Python's, numba's and LLVM's, is compared with its digest. Damaged files
+are made again, with a remark. Within a process traces are known by the key of their structure.
 """
 
 from __future__ import annotations
@@ -32,14 +34,17 @@ from saltus.systems import Record, System, children, is_number
 
 NOBODY = 65534  # the user to whom, inside a container, the files of the superuser outside belong
 DIGEST = hashlib.sha256().digest_size  # bytes
-loading = threading.RLock()  # Code is known while it is still being loaded or compiled: other threads wait for it.
+# Code is known while it is still being loaded or compiled: other threads wait for it.
+loading = threading.RLock()
 log = logging.getLogger("saltus.cache")
 
 
 def cache_directory() -> Path:
-    """The folder of compiled code: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary one if neither can be used.
+    """The folder of compiled code: SALTUS_CACHE_DIR, or the user's cache directory, or a temporary
+    one if neither can be used.
 
-    As code in it is run, it must be a real folder (no link) that belongs to the user, and to which nobody else can write.
+    As code in it is run, it must be a real folder (no link) that belongs to the user, and to which
+    nobody else can write.
     """
     wanted = Path(os.environ.get("SALTUS_CACHE_DIR") or _user_cache()) / "kernels"
     user = os.getuid() if hasattr(os, "getuid") else "user"
@@ -65,18 +70,22 @@ def _user_cache() -> str:
 @cache
 def _own_folder() -> Path:
     """A folder for this process alone, which is removed at its end."""
-    folder = tempfile.mkdtemp(prefix="saltus-kernels-")  # a new name, which nobody else can have prepared
+    # a new name, which nobody else can have prepared
+    folder = tempfile.mkdtemp(prefix="saltus-kernels-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
 
 
 def _problem(folder: Path) -> str | None:
-    """The reason why code must not be kept in a folder, or None; the folder is made if it does not exist."""
+    """The reason why code must not be kept in a folder, or None; the folder is made if it does not
+    exist.
+    """
     try:
         folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if any(_replaceable(above.stat()) for above in folder.resolve().parents):
             return "other users may put another folder in its place"
-        for part in (folder, folder / "__pycache__"):  # the second is numba's, which would let the user's group write to it
+        # the second is numba's, which would let the user's group write to it
+        for part in (folder, folder / "__pycache__"):
             with contextlib.suppress(FileExistsError):
                 part.mkdir(mode=0o700)
             found = _shared(part.lstat())
@@ -88,8 +97,8 @@ def _problem(folder: Path) -> str | None:
 
 
 def _replaceable(found: os.stat_result) -> bool:
-    """Whether others may rename files in a folder: by its owner, and by who may write to it unless it is a temporary
-    directory."""
+    """Whether others may rename files in a folder: by its owner, and by who may write to it unless
+    it is a temporary directory."""
     if not hasattr(os, "getuid"):
         return False
     if found.st_uid not in (0, os.getuid(), NOBODY):
@@ -104,7 +113,8 @@ def _is_own_group(number: int) -> bool:
     import pwd
 
     try:
-        group, name = grp.getgrgid(number), pwd.getpwuid(os.getuid()).pw_name
+        group = grp.getgrgid(number)
+        name = pwd.getpwuid(os.getuid()).pw_name
     except KeyError:  # the group has no name, and its members are unknown
         return False
     return (number == 0 or group.gr_name == name) and set(group.gr_mem) <= {name}
@@ -132,7 +142,7 @@ def digest(*texts: str) -> str:
     return hashlib.sha256("".join(texts).encode()).hexdigest()[:20]
 
 
-# --- files ---------------------------------------------------------------------------------------------------------------
+# --- files -------------------------------------------------------------------
 
 
 def kept_bytes(name: str, make: Callable[[], bytes]) -> bytes:
@@ -156,14 +166,17 @@ def with_digest(content: bytes) -> bytes:
 
 
 def undamaged(path: str) -> bytes | None:
-    """The code in a file, without its digest, or None; a damaged file, a link or another user's file is removed, with a remark.
+    """The code in a file, without its digest, or None; a damaged file, a link or another user's
+    file is removed, with a remark.
 
-    The owner is checked because anybody can compute a digest: a file of another user, or a link, was planted while others could
-    write to the folder.
+    The owner is checked because anybody can compute a digest: a file of another user, or a link,
+    was planted while others could write to the folder.
     """
     try:
         found = os.lstat(path)
-        own = stat.S_ISREG(found.st_mode) and (not hasattr(os, "getuid") or found.st_uid == os.getuid())
+        own = stat.S_ISREG(found.st_mode) and (
+            not hasattr(os, "getuid") or found.st_uid == os.getuid()
+        )
         content = Path(path).read_bytes() if own else b""
     except OSError:
         return None
@@ -177,16 +190,17 @@ def undamaged(path: str) -> bytes | None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Let other processes that need the same file wait and then load the code that this one has compiled; if files cannot be
-    locked, they compile it too. The lock is on a file beside it, because the file itself may be replaced."""
+    """Let other processes that need the same file wait and then load the code that this one has
+    compiled; if files cannot be locked, they compile it too. The lock is on a file beside it,
+    because the file itself may be replaced."""
     with path.with_suffix(".lock").open("ab") as file:
         lock(file, wait=True)
         yield
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file into its place in one step. All files get the same time, because numba uses code that it has kept only for a
-    source with the same time."""
+    """Write a file into its place in one step. All files get the same time, because numba uses code
+    that it has kept only for a source with the same time."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -199,13 +213,16 @@ def write(path: Path, content: bytes) -> None:
         raise
 
 
-# --- the key of a structure -----------------------------------------------------------------------------------------------------
+# --- the key of a structure --------------------------------------------------
 
 
 def structure_key(system: System) -> Any:
-    """A key of a system's structure, under which traces are kept: the types of its parts, the values that these read from their
-    modules, and all of their fields that are no numbers. If these values have changed, the system remembers nothing."""
-    spaces, read, key = system._remembered("structure", lambda: ((s := tuple(_spaces(system))), _values(s), _key(system)))
+    """A key of a system's structure, under which traces are kept: the types of its parts, the
+    values that these read from their modules, and all of their fields that are no numbers. If these
+    values have changed, the system remembers nothing."""
+    spaces, read, key = system._remembered(
+        "structure", lambda: ((s := tuple(_spaces(system))), _values(s), _key(system))
+    )
     if _values(spaces) == read:
         return key
     vars(system).pop("_memory", None)
@@ -228,35 +245,52 @@ def _values(spaces: tuple[tuple[Mapping[str, Any], str], ...]) -> tuple[Any, ...
 
 def _key(node: Any) -> Any:
     kind: Any
-    if isinstance(node, Record):  # its samples and its scale are numbers; the file that they came from does not matter
+    # its samples and its scale are numbers; the file that they came from does not matter
+    if isinstance(node, Record):
         return Record, node.quantity
-    parts, kind = children(node), type(node)
+    parts = children(node)
+    kind = type(node)
     if hasattr(kind, "structure_key"):  # of what holds numbers that are no fields
         return node.structure_key
     if parts:
-        named = [(name, float if type(part) is float else _key(part)) for name, part in parts.items()]
+        named = [
+            (name, float if type(part) is float else _key(part)) for name, part in parts.items()
+        ]
         return kind, _values(_outside(kind)), tuple(named)
     if is_number(node):
         return float
     if isinstance(node, np.ndarray):
         return node.shape, node.dtype.str, node.tobytes()
     if type(node).__hash__ is None:
-        raise ParameterError(f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an array or a tuple")
+        raise ParameterError(
+            f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an "
+            "array or a tuple"
+        )
     return node
 
 
 @cache
 def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """The names and namespaces of values that the methods of a user's class read from its module or class; a trace contains these
-    values."""
+    """The names and namespaces of values that the methods of a user's class read from its module or
+    class; a trace contains these values."""
     found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
-    owners = [owner for owner in cls.__mro__ if owner.__module__.partition(".")[0] not in ("saltus", "builtins")]
+    owners = [
+        owner
+        for owner in cls.__mro__
+        if owner.__module__.partition(".")[0] not in ("saltus", "builtins")
+    ]
     waiting = [value for owner in owners for value in vars(owner).values()]
     seen: set[int] = set()
     for owner in owners:
-        found |= {(id(owner), name): (vars(owner), name) for name, value in vars(owner).items() if is_number(value)}
+        found |= {
+            (id(owner), name): (vars(owner), name)
+            for name, value in vars(owner).items()
+            if is_number(value)
+        }
     while waiting:
-        function = getattr(waiting[-1], "fget", None) or getattr(waiting[-1], "__func__", waiting[-1])
+        function = getattr(waiting[-1], "fget", None) or getattr(
+            waiting[-1], "__func__", waiting[-1]
+        )
         waiting.pop()
         if not isinstance(function, FunctionType) or id(function) in seen:
             continue

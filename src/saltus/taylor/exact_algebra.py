@@ -1,8 +1,10 @@
-"""Proofs that two traced expressions are the same function, in exact arithmetic on their graphs, never by values.
+"""Proofs that two traced expressions are the same function, in exact arithmetic on their graphs,
+never by values.
 
-An expression is written as a polynomial with rational coefficients in its atoms, which are leaves and functions of such
-polynomials. Two expressions with the same normal form are equal wherever both have a value. The converse does not hold: the
-normal form of sin(x)^2 + cos(x)^2 is not 1. Equality is thus proved; different normal forms prove nothing.
+An expression is written as a polynomial with rational coefficients in its atoms, which are leaves
+and functions of such polynomials. Two expressions with the same normal form are equal wherever both
+have a value. The converse does not hold: the normal form of sin(x)^2 + cos(x)^2 is not 1. Equality
+is thus proved; different normal forms prove nothing.
 """
 
 from __future__ import annotations
@@ -21,15 +23,20 @@ Monomial = tuple[tuple[int, int], ...]  # (number of the atom, its power), by ri
 Form = dict[Monomial, Fraction]
 
 ONE: Monomial = ()
-MOST_TERMS = 1000  # A longer polynomial is not written out: models have a few dozen terms, and products of sums grow fast.
-ODD, EVEN = ("sin", "sinh", "tanh", "atan"), ("cos", "cosh")
+# A longer polynomial is not written out: models have a few dozen terms, and products of sums grow
+# fast.
+MOST_TERMS = 1000
+ODD = ("sin", "sinh", "tanh", "atan")
+EVEN = ("cos", "cosh")
 
 _atoms: dict[Hashable, int] = {}
 _numbers = itertools.count()  # which gives no two threads the same number
 
 
 class NoNormalForm(Exception):
-    """An expression has no normal form, because it is not finite or too long, so that nothing is proved about it."""
+    """An expression has no normal form, because it is not finite or too long, so that nothing is
+    proved about it.
+    """
 
 
 def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
@@ -38,7 +45,8 @@ def normal_form(root: Expr, leaves: Mapping[Expr, Form] | None = None) -> Form:
     Raises
     ------
     NoNormalForm
-        The expression has a number that is not finite or a division by 0, or its polynomial is too long.
+        The expression has a number that is not finite or a division by 0, or its polynomial is too
+        long.
     """
     forms: dict[int, Form] = {id(leaf): form for leaf, form in (leaves or {}).items()}
     for node in ordered([root]):
@@ -103,8 +111,8 @@ def _times(one: Monomial, other: Monomial) -> Monomial:
 
 
 def _inverse(a: Form) -> Form:
-    """1 / a: for a single term, the term with negative powers; for a sum, an atom of the sum scaled to a first coefficient of
-    1."""
+    """1 / a: for a single term, the term with negative powers; for a sum, an atom of the sum scaled
+    to a first coefficient of 1."""
     if not a:
         raise NoNormalForm
     first, factor = min(a.items())
@@ -114,7 +122,9 @@ def _inverse(a: Form) -> Form:
 
 
 def _function(op: str, args: list[Form]) -> Form:
-    """An atom for a function of normal forms; odd and even functions have arguments whose first coefficient is positive."""
+    """An atom for a function of normal forms; odd and even functions have arguments whose first
+    coefficient is positive.
+    """
     sign = 1
     if op in FUNCTIONS and not args[0]:
         at_zero = float(FUNCTIONS[op].numpy(np.float64(0.0))) if op != "log" else math.nan

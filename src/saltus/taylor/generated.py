@@ -1,10 +1,12 @@
-"""The functions of a structure: their tapes, LLVM's text that is written for them, and their machine code, from the disk or made.
+"""The functions of a structure: their tapes, LLVM's text that is written for them, and their
+machine code, from the disk or made.
 
-A structure is everything except a system's numbers; a digest of each of its parts is what results carry, so that changed models
-are noticed (`equations_of`).
+A structure is everything except a system's numbers; a digest of each of its parts is what results
+carry, so that changed models are noticed (`equations_of`).
 
-The text is written by `series.py` and by `instant` here. numba has no part in it: it would need seconds to infer the types of a
-structure's recurrences, and its cache is slower to read than an object file.
+The text is written by `series.py` and by `instant` here. numba has no part in it: it would need
+seconds to infer the types of a structure's recurrences, and its cache is slower to read than an
+object file.
 """
 
 from __future__ import annotations
@@ -26,19 +28,42 @@ from saltus.taylor.cache import digest, kept_bytes, loading, source_of, structur
 from saltus.taylor.graph import LEAVES, Expr
 from saltus.taylor.kernels import told_before
 from saltus.taylor.memory import ColumnSum, Constants, Memory, Node, Place, Places, Tape, tape
-from saltus.taylor.numba_types import Pointer, given_arguments, result_count, written_function, written_type
+from saltus.taylor.numba_types import (
+    Pointer,
+    given_arguments,
+    result_count,
+    written_function,
+    written_type,
+)
 from saltus.taylor.rules import FUNCTIONS
 from saltus.taylor.series import Rows, Series
 from saltus.taylor.tracing import Trace, trace
-from saltus.taylor.vectors import CACHE_LINE, LONG, Arithmetic, ColumnInputs, Vec, add, loop, multiply, subtract
+from saltus.taylor.vectors import (
+    CACHE_LINE,
+    LONG,
+    Arithmetic,
+    ColumnInputs,
+    Vec,
+    add,
+    loop,
+    multiply,
+    subtract,
+)
 
-ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {"add": add, "sub": subtract, "mul": multiply, "div": lambda a, b: a / b}
+ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+    "add": add,
+    "sub": subtract,
+    "mul": multiply,
+    "div": lambda a, b: a / b,
+}
 SIGNS = {"greater": ">", "less": "<", "greater_equal": ">=", "less_equal": "<="}
 MIRRORED = str.maketrans("<>", "><")
 
 
 class ColumnNumber(NamedTuple):
-    """A number of each column of a tangent: a `ColumnSum` whose parts are values of the nodes of a tape."""
+    """A number of each column of a tangent: a `ColumnSum` whose parts are values of the nodes of a
+    tape.
+    """
 
     target: Place  # of the first column's, behind which those of the others lie `stride` apart
     stride: int
@@ -57,11 +82,12 @@ class ColumnNumbers(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """What a function of an instant computes if its arguments named in `when` have the given values: the roots of a tape, or
-    numbers of the columns of a tangent from its nodes."""
+    """What a function of an instant computes if its arguments named in `when` have the given
+    values: the roots of a tape, or numbers of the columns of a tangent from its nodes."""
 
     tape: Tape
-    targets: Sequence[Place | None]  # where each root is stored; None: it is returned by the function
+    # where each root is stored; None: it is returned by the function
+    targets: Sequence[Place | None]
     when: Sequence[tuple[str, int]] = ()
     numbers: ColumnNumbers | None = None
 
@@ -69,20 +95,35 @@ class Case:
     def leaves(self) -> set[str]:
         """The kinds of leaves that it reads."""
         numbers = () if self.numbers is None else self.numbers.numbers
-        return {node[0] for node in self.tape.nodes} | {leaf[0] for each in numbers for leaf, _ in each.terms}
+        return {node[0] for node in self.tape.nodes} | {
+            leaf[0] for each in numbers for leaf, _ in each.terms
+        }
 
     @classmethod
     def of_columns(
-        cls, trace: Trace, sums: Mapping[tuple[Place, int], ColumnSum], known: Constants, when: Sequence[tuple[str, int]] = ()
+        cls,
+        trace: Trace,
+        sums: Mapping[tuple[Place, int], ColumnSum],
+        known: Constants,
+        when: Sequence[tuple[str, int]] = (),
     ) -> Case:
-        """The case that fills numbers of all columns, each from the place of the first column's on, and so far apart."""
+        """The case that fills numbers of all columns, each from the place of the first column's on,
+        and so far apart.
+        """
         written = tape([x for each in sums.values() for x in each.expressions], known)
-        roots, numbers = iter(written.roots), list[ColumnNumber]()
+        roots = iter(written.roots)
+        numbers = list[ColumnNumber]()
         for (target, stride), each in sums.items():
             terms = [((leaf.op, leaf.value), next(roots)) for leaf, _ in each.terms]
             pushes = [None if push is None else next(roots) for push in each.pushes]
-            numbers.append(ColumnNumber(target, stride, terms, pushes, None if each.over is None else next(roots)))
-        return cls(replace(written, roots=[]), [], when, ColumnNumbers(trace.dof, trace.columns, numbers))
+            numbers.append(
+                ColumnNumber(
+                    target, stride, terms, pushes, None if each.over is None else next(roots)
+                )
+            )
+        return cls(
+            replace(written, roots=[]), [], when, ColumnNumbers(trace.dof, trace.columns, numbers)
+        )
 
 
 class SeriesOf(NamedTuple):
@@ -94,7 +135,8 @@ class SeriesOf(NamedTuple):
 
 @dataclass(frozen=True)
 class WrittenFunction:
-    """A function of a structure: the series of a tape, or cases of an instant, of which only one that always holds has results.
+    """A function of a structure: the series of a tape, or cases of an instant, of which only one
+    that always holds has results.
 
     An instant is computed without fused multiply-adds.
     """
@@ -108,16 +150,20 @@ class WrittenFunction:
     def write(self, module: Any) -> None:
         """Append the function to LLVM's module."""
         function = ir.Function(module, written_function(self.signature), self.name)
-        builder, results = ir.IRBuilder(function.append_basic_block("entry")), list[Any]()
+        builder = ir.IRBuilder(function.append_basic_block("entry"))
+        results = list[Any]()
         arguments = given_arguments(self.signature, function)
         if isinstance(self.content, SeriesOf):
             rows, tape = self.content
             if self.arithmetic.width > 1:
                 stack_of_cache_lines(function, CACHE_LINE)
-            Series(Memory(builder, self.arithmetic, self.places, arguments), tape, rows).write_motion(tape.roots)
+            Series(
+                Memory(builder, self.arithmetic, self.places, arguments), tape, rows
+            ).write_motion(tape.roots)
         else:
             if any(node[0] == "form" for case in self.content for node in case.tape.nodes):
-                function.attributes.update(("noinline", "optnone"))  # many sums over modes, at events only, without LLVM's passes
+                # many sums over modes, at events only, without LLVM's passes
+                function.attributes.update(("noinline", "optnone"))
             memory = Memory(builder, self.arithmetic.unfused(), self.places, arguments)
             results = [value for case in self.content for value in _write_case(memory, case)]
         self._return(builder, function, results)
@@ -135,7 +181,9 @@ class WrittenFunction:
 def _write_case(memory: Memory, case: Case) -> list[Any]:
     """A case of an instant, and LLVM's values of its results."""
     builder = memory.builder
-    conditions = [builder.icmp_signed("==", memory.arguments[name], LONG(value)) for name, value in case.when]
+    conditions = [
+        builder.icmp_signed("==", memory.arguments[name], LONG(value)) for name, value in case.when
+    ]
     if not conditions:
         return _store(memory, case)
     holds = conditions[0]
@@ -147,7 +195,9 @@ def _write_case(memory: Memory, case: Case) -> list[Any]:
 
 
 def _store(memory: Memory, case: Case) -> list[Any]:
-    """Compute a case's roots, put them into memory, and return LLVM's values of those that are results."""
+    """Compute a case's roots, put them into memory, and return LLVM's values of those that are
+    results.
+    """
     nodes = _instant(memory, case.tape)
     if case.numbers is not None:
         _store_numbers(memory, nodes, case.numbers)
@@ -160,15 +210,20 @@ def _store(memory: Memory, case: Case) -> list[Any]:
 
 def _store_numbers(memory: Memory, nodes: list[Any], given: ColumnNumbers) -> None:
     """Compute the numbers of all columns, in a loop over them, and put them into memory."""
-    b, pushes = memory.builder, ColumnInputs(memory, given.columns, [each.pushes for each in given.numbers])
+    b = memory.builder
+    pushes = ColumnInputs(memory, given.columns, [each.pushes for each in given.numbers])
     pushes.store(nodes.__getitem__)
     with loop(b, 0, given.columns) as column:
         for i, each in enumerate(given.numbers):
             total: Any = pushes.of(i, column)
             for leaf, slope in each.terms:
-                total = add(total, multiply(nodes[slope], memory.of_column(leaf, given.dof, column)))
+                total = add(
+                    total, multiply(nodes[slope], memory.of_column(leaf, given.dof, column))
+                )
             place = b.gep(memory.pointer(each.target), [b.mul(column, LONG(each.stride))])
-            b.store(memory.value(total if each.over is None else total / nodes[each.over]), place).align = 8
+            b.store(
+                memory.value(total if each.over is None else total / nodes[each.over]), place
+            ).align = 8
 
 
 def instant(memory: Memory, tape: Tape) -> list[Vec | float]:
@@ -194,11 +249,16 @@ def _operation(memory: Memory, op: str, args: list[Any]) -> Any:
     def lifted(x: Any) -> Vec:
         return x if isinstance(x, Vec) else memory.arithmetic.number(memory.builder, x)
 
-    a, b = args[0], args[-1]
+    a = args[0]
+    b = args[-1]
     if op in ARITHMETIC:
         return ARITHMETIC[op](a, b)
     if op in SIGNS:
-        return a.compare(SIGNS[op], b) if isinstance(a, Vec) else b.compare(SIGNS[op].translate(MIRRORED), a)
+        return (
+            a.compare(SIGNS[op], b)
+            if isinstance(a, Vec)
+            else b.compare(SIGNS[op].translate(MIRRORED), a)
+        )
     if op == "where":
         return lifted(args[1]).select(a, b)
     if op in ("maximum", "minimum"):
@@ -208,12 +268,13 @@ def _operation(memory: Memory, op: str, args: list[Any]) -> Any:
 
 
 def stack_of_cache_lines(function: Any, line: int) -> None:
-    """Align the stack such that each vector on it lies within one cache line; otherwise every use would touch two.
-    LLVM aligns the stack for variables, but not for values that it moves out of registers later."""
+    """Align the stack such that each vector on it lies within one cache line; otherwise every use
+    would touch two. LLVM aligns the stack for variables, but not for values that it moves out of
+    registers later."""
     function.attributes.alignstack = line
 
 
-# --- text and machine code ---------------------------------------------------------------------------------------------------
+# --- text and machine code ---------------------------------------------------
 
 
 def functions_text(functions: Sequence[WrittenFunction]) -> str:
@@ -224,7 +285,16 @@ def functions_text(functions: Sequence[WrittenFunction]) -> str:
 @cache
 def written_by() -> str:
     """A digest of the sources that write code, and of what LLVM makes of it on this machine."""
-    writers = (graph, load_tables, memory, numba_types, rules, series, vectors, sys.modules[__name__])
+    writers = (
+        graph,
+        load_tables,
+        memory,
+        numba_types,
+        rules,
+        series,
+        vectors,
+        sys.modules[__name__],
+    )
     return digest(*(source_of(module) for module in writers), made_for())
 
 
@@ -237,24 +307,38 @@ def llvm_text(functions: Sequence[WrittenFunction]) -> str:
     return str(module)
 
 
-def load_functions(kind: str, functions: Sequence[WrittenFunction], traced: Trace) -> dict[str, Pointer]:
-    """Pointers to functions of a trace by their names: loaded from the disk, or written and compiled first."""
+def load_functions(
+    kind: str, functions: Sequence[WrittenFunction], traced: Trace
+) -> dict[str, Pointer]:
+    """Pointers to functions of a trace by their names: loaded from the disk, or written and
+    compiled first.
+    """
     is_long = kind == "structure" and graph.is_long(traced)
     name = f"{kind}_{digest(functions_text(functions), written_by(), str(is_long))}"
-    with loading:  # a second thread must not load them again: the code that is replaced would be freed while pointers lead to it
+    # a second thread must not load them again: the code that is replaced would be freed while
+    # pointers lead to it
+    with loading:
         if name not in _loaded:
-            code = kept_bytes(f"{name}.o", lambda: object_code(told_before(traced, kind, llvm_text(functions)), is_long))
+            code = kept_bytes(
+                f"{name}.o",
+                lambda: object_code(told_before(traced, kind, llvm_text(functions)), is_long),
+            )
             _loaded[name] = Loaded(code, [function.name for function in functions])
     addresses = _loaded[name].addresses
-    return {each.name: Pointer.to(addresses[each.name], written_type(each.signature)) for each in functions}
+    return {
+        each.name: Pointer.to(addresses[each.name], written_type(each.signature))
+        for each in functions
+    }
 
 
 _loaded: dict[str, Loaded] = {}  # as long as the process, as pointers may be anywhere
 
 
-# As numba, and for the whole of LLVM: its passes are not safe to run from two threads of one target machine.
+# As numba, and for the whole of LLVM: its passes are not safe to run from two threads of one target
+# machine.
 _LLVM = threading.RLock()
-_ENGINES: list[Any] = []  # All code stays in memory as long as the process: pointers to it may be anywhere.
+# All code stays in memory as long as the process: pointers to it may be anywhere.
+_ENGINES: list[Any] = []
 
 
 @cache
@@ -264,7 +348,10 @@ def processor() -> tuple[str, str]:
 
     settings: Any = config
     given = settings.CPU_FEATURES
-    return settings.CPU_NAME or binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten() if given is None else given
+    return (
+        settings.CPU_NAME or binding.get_host_cpu_name(),
+        binding.get_host_cpu_features().flatten() if given is None else given,
+    )
 
 
 @cache
@@ -279,13 +366,16 @@ def _target_machine() -> Any:
     binding.initialize_native_asmprinter()
     name, features = processor()
     target = binding.Target.from_triple(binding.get_process_triple())
-    static = target.name.startswith("x86")  # code that is loaded where it stays needs no tables of addresses
+    # code that is loaded where it stays needs no tables of addresses
+    static = target.name.startswith("x86")
     options = {"reloc": "static" if static else "default", "codemodel": "jitdefault", "jit": True}
     return target.create_target_machine(cpu=name, features=features, opt=3, **options)
 
 
 def object_code(text: str, is_long: bool = False) -> bytes:
-    """The object file of LLVM's text, optimised; a long text goes without LLVM's passes, whose time grows faster than it."""
+    """The object file of LLVM's text, optimised; a long text goes without LLVM's passes, whose time
+    grows faster than it.
+    """
     with _LLVM:
         machine = _target_machine()
         module = binding.parse_assembly(text)
@@ -321,22 +411,29 @@ class Loaded:
 
     def __init__(self, code: bytes, names: Iterable[str]) -> None:
         with _LLVM:
-            self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target_machine())
+            self._engine = binding.create_mcjit_compiler(
+                binding.parse_assembly(""), _target_machine()
+            )
             self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
             self._engine.finalize_object()
             _ENGINES.append(self._engine)
-            self.addresses: dict[str, int] = {name: self._engine.get_function_address(name) for name in names}
+            self.addresses: dict[str, int] = {
+                name: self._engine.get_function_address(name) for name in names
+            }
 
 
-MOST_KNOWN = 64  # the most systems whose digests are kept, as a study asks for the same ones many times
+# the most systems whose digests are kept, as a study asks for the same ones many times
+MOST_KNOWN = 64
 
 
 def equations_of(system: System) -> dict[str, str]:
-    """A digest of each part of a system's equations, without its numbers, which are in `System.to_json`.
+    """A digest of each part of a system's equations, without its numbers, which are in
+    `System.to_json`.
 
-    The parts are `acceleration` (including the load's channels), `gap`, `contact` (its position), `reset` (including the impact
-    law), `contacts` (of a model with several), `signs` (of its contacts), `margins`, `mirror` (the load of the mirror image) and
-    `names` (of coordinates, units, channels, sides and stops). Values that a model's Python reads from elsewhere, such as
+    The parts are `acceleration` (including the load's channels), `gap`, `contact` (its position),
+    `reset` (including the impact law), `contacts` (of a model with several), `signs` (of its
+    contacts), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates,
+    units, channels, sides and stops). Values that a model's Python reads from elsewhere, such as
     constants of its module, are numbers in the expressions.
 
     Raises
@@ -356,14 +453,19 @@ def equations_of(system: System) -> dict[str, str]:
 
 
 _digests: dict[Any, dict[str, str]] = {}  # of structures, as their compiled code is kept
-_known: dict[Any, dict[str, str]] = {}  # of systems with their numbers, on which the mirror image may depend
+# of systems with their numbers, on which the mirror image may depend
+_known: dict[Any, dict[str, str]] = {}
 
 
 def _other_parts(system: System) -> dict[str, str]:
     """The digests of the parts that are not traced."""
-    mirrored, model = system.mirrored(), system.model
+    mirrored = system.mirrored()
+    model = system.model
     names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
-    return {"mirror": digest(repr(mirrored and mirrored.to_dict()["load"])), "names": digest(repr(names))}
+    return {
+        "mirror": digest(repr(mirrored and mirrored.to_dict()["load"])),
+        "names": digest(repr(names)),
+    }
 
 
 def _traced_parts(system: System) -> dict[str, str]:
@@ -376,14 +478,24 @@ def _traced_parts(system: System) -> dict[str, str]:
         "reset": [traced.next_side, traced.velocity_after],
         "contacts": [*traced.reactions, *traced.contact_numbers],
     }
-    texts = {name: _text(traced, [root for root in parts if root is not None]) for name, parts in roots.items()}
-    signs = (traced.signs, traced.contact_coordinates, traced.friction_coordinates, *traced.friction_contacts)
+    texts = {
+        name: _text(traced, [root for root in parts if root is not None])
+        for name, parts in roots.items()
+    }
+    signs = (
+        traced.signs,
+        traced.contact_coordinates,
+        traced.friction_coordinates,
+        *traced.friction_contacts,
+    )
     texts |= {"margins": _margins(system), "signs": repr(signs)}
     return {name: digest(text) for name, text in texts.items()}
 
 
 def _margins(system: System) -> str:
-    """The margins as text; if they cannot be traced, and so cannot end a motion, their names take the place of expressions."""
+    """The margins as text; if they cannot be traced, and so cannot end a motion, their names take
+    the place of expressions.
+    """
     names = system.model.margin_names(system.load)
     try:
         traced = trace(system, names)
@@ -393,8 +505,12 @@ def _margins(system: System) -> str:
 
 
 def _text(traced: Trace, roots: list[Expr]) -> str:
-    """Expressions as text, in which parameters and records are given by their paths, not by their numbers in the trace."""
+    """Expressions as text, in which parameters and records are given by their paths, not by their
+    numbers in the trace.
+    """
     paths: dict[str, list[Any]] = {"parameter": traced.parameters, "record": traced.records}
     written = tape(roots)
-    nodes = [(node[0], paths[node[0]][node[1]]) if node[0] in paths else node for node in written.nodes]
+    nodes = [
+        (node[0], paths[node[0]][node[1]]) if node[0] in paths else node for node in written.nodes
+    ]
     return repr((nodes, written.roots))

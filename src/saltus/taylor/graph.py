@@ -1,7 +1,9 @@
-"""Expressions traced from a model: a graph of arithmetic on the time, the state, the side and the parameters.
+"""Expressions traced from a model: a graph of arithmetic on the time, the state, the side and the
+parameters.
 
-Python's operators and NumPy's functions build the graph; whatever cannot be expanded in a Taylor series is refused by
-name. Nodes are shared: equal expressions are one object, so that nothing is computed twice.
+Python's operators and NumPy's functions build the graph; whatever cannot be expanded in a Taylor
+series is refused by name. Nodes are shared: equal expressions are one object, so that nothing is
+computed twice.
 """
 
 from __future__ import annotations
@@ -15,13 +17,28 @@ from saltus.checks import LIMITS
 from saltus.errors import SaltusError, TraceError
 from saltus.taylor.rules import FUNCTIONS
 
-# The operations without Taylor recurrence that a reset may use, because it is evaluated at one instant only.
+# The operations without Taylor recurrence that a reset may use, because it is evaluated at one
+# instant only.
 POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
 LEAVES = (
-    *("number", "parameter", "time", "origin", "side", "free", "slide", "coordinate", "velocity", "acceleration", "record"),
-    *("form", "mode", "datum", "shift"),  # sums over modes, accelerations of modes, coefficients of both (`memory.py`), shifts
+    *(
+        "number",
+        "parameter",
+        "time",
+        "origin",
+        "side",
+        "free",
+        "slide",
+        "coordinate",
+        "velocity",
+        "acceleration",
+        "record",
+    ),
+    # sums over modes, accelerations of modes, coefficients of both (`memory.py`), shifts
+    *("form", "mode", "datum", "shift"),
 )
-RECORD_WIDTH = 5  # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
+# coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
+RECORD_WIDTH = 5
 
 ALLOWED = (
     f"+ - * /, powers, NumPy's {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the "
@@ -35,13 +52,21 @@ FRICTION = (
     "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced: give the model a Friction; a "
     "smooth one, such as -tanh(velocity / w), can be"
 )
-ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}  # NumPy's names, and ours
+# NumPy's names, and ours
+ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
 _AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)
-UFUNCS = ARITHMETIC | {name: name for name in _AS_THEY_ARE} | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
+UFUNCS = (
+    ARITHMETIC
+    | {name: name for name in _AS_THEY_ARE}
+    | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
+)
 
 
 class Expr:
-    """One node: an operation on other nodes, or a leaf with a value. `degree` bounds its degree in the time (None: no bound)."""
+    """One node: an operation on other nodes, or a leaf with a value.
+
+    `degree` bounds its degree in the time (None: no bound).
+    """
 
     __slots__ = ("args", "degree", "op", "value")
     __array_priority__ = 1000
@@ -57,8 +82,12 @@ class Expr:
         node = cls._shared.get(key)
         if node is None:
             node = super().__new__(cls)
-            node.op, node.args, node.value, node.degree = op, args, value, _degree(op, args)
-            node = cls._shared.setdefault(key, node)  # another thread may have made it in the meantime
+            node.op = op
+            node.args = args
+            node.value = value
+            node.degree = _degree(op, args)
+            # another thread may have made it in the meantime
+            node = cls._shared.setdefault(key, node)
         return node
 
     def __add__(self, other: Any) -> Expr:
@@ -99,7 +128,9 @@ class Expr:
 
     def __abs__(self) -> Expr:
         if self.op != "coordinate":
-            raise TraceError(f"abs of an expression that is not a coordinate cannot be traced; {_what_is_allowed(self)}")
+            raise TraceError(
+                f"abs of an expression that is not a coordinate cannot be traced; {_what_is_allowed(self)}"
+            )
         return Expr("side") * self
 
     def __gt__(self, other: Any) -> Expr:
@@ -116,17 +147,23 @@ class Expr:
 
     def __bool__(self) -> bool:
         hint = FRICTION if uses_velocity(self) else "use `side`"
-        raise TraceError(f"a traced model may not branch on its state or parameters (if, and, or, min, max); {hint}")
+        raise TraceError(
+            f"a traced model may not branch on its state or parameters (if, and, or, min, max); {hint}"
+        )
 
     def __float__(self) -> float:
-        raise TraceError(f"a traced quantity has no number yet: use NumPy's functions, not math's; allowed are {ALLOWED}")
+        raise TraceError(
+            f"a traced quantity has no number yet: use NumPy's functions, not math's; allowed are {ALLOWED}"
+        )
 
     __int__ = __index__ = __complex__ = __float__
 
     def _refuse(self, *_: Any) -> Any:
         raise TraceError(f"%, //, @ and round cannot be traced; allowed are {ALLOWED}")
 
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = __rmatmul__ = __round__ = _refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = (
+        __rmatmul__
+    ) = __round__ = _refuse
 
     def __iter__(self) -> Any:
         raise TraceError("a traced quantity is a scalar: it cannot be unpacked or looped over")
@@ -156,13 +193,17 @@ class Expr:
 
 
 def _what_is_allowed(*operands: Any) -> str:
-    """A sentence that says what may be traced, and, for operands that depend on a velocity, that its sign may not be used."""
+    """A sentence that says what may be traced, and, for operands that depend on a velocity, that
+    its sign may not be used.
+    """
     return FRICTION if uses_velocity(*operands) else f"allowed are {ALLOWED}"
 
 
 def uses_velocity(*operands: Any) -> bool:
     """Whether any of the operands depends on a velocity."""
-    return any(node.op == "velocity" for node in ordered([x for x in operands if isinstance(x, Expr)]))
+    return any(
+        node.op == "velocity" for node in ordered([x for x in operands if isinstance(x, Expr)])
+    )
 
 
 def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
@@ -175,10 +216,13 @@ def _degree(op: str, args: tuple[Expr, ...]) -> int | None:
 
 
 def degree(op: str, degrees: list[int | None]) -> int | None:
-    """The degree of the result of an operation on series of these degrees, or None if the resulting series does not end."""
+    """The degree of the result of an operation on series of these degrees, or None if the resulting
+    series does not end.
+    """
     if all(d == 0 for d in degrees):
         return 0
-    a, b = degrees[0], degrees[-1]
+    a = degrees[0]
+    b = degrees[-1]
     if a is None or b is None or op not in ("add", "sub", "mul", "div") or (op == "div" and b > 0):
         return None
     return a + b if op == "mul" else max(a, b)
@@ -193,15 +237,21 @@ def as_expr(value: Any) -> Expr:
     """A node for a number; a node stays itself."""
     if isinstance(value, Expr):
         return value
-    if isinstance(value, (int, float, np.integer, np.floating, np.bool_)) or (isinstance(value, np.ndarray) and value.ndim == 0):
+    if isinstance(value, (int, float, np.integer, np.floating, np.bool_)) or (
+        isinstance(value, np.ndarray) and value.ndim == 0
+    ):
         return number(float(value))
     if hasattr(value, "refuse"):  # the time
         value.refuse()
-    raise TraceError(f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}")
+    raise TraceError(
+        f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}"
+    )
 
 
 def _holds_expressions(operands: Iterable[Any]) -> bool:
-    """Whether one of the operands may hold expressions itself, and so knows what the operation gives: one with derivatives."""
+    """Whether one of the operands may hold expressions itself, and so knows what the operation
+    gives: one with derivatives.
+    """
     return any(getattr(x, "__array_priority__", 0) > Expr.__array_priority__ for x in operands)
 
 
@@ -232,7 +282,9 @@ def combine(op: str, *operands: Any) -> Expr:
 
 
 def power(base: Any, exponent: Any) -> Expr:
-    """base ** exponent: products for small whole exponents, a recurrence for constant ones, exp(exponent log(base)) else."""
+    """base ** exponent: products for small whole exponents, a recurrence for constant ones,
+    exp(exponent log(base)) else.
+    """
     if _holds_expressions((base, exponent)):
         return NotImplemented  # type: ignore[no-any-return]
     base, exponent = as_expr(base), as_expr(exponent)
@@ -250,7 +302,8 @@ def power(base: Any, exponent: Any) -> Expr:
 def _whole_power(base: Expr, exponent: int) -> Expr:
     if exponent < 0:
         return 1.0 / _whole_power(base, -exponent)
-    result, square = number(1.0), base
+    result = number(1.0)
+    square = base
     while exponent:
         if exponent & 1:
             result = result * square
@@ -304,14 +357,24 @@ def ordered(roots: list[Expr]) -> list[Expr]:
 
 
 def is_steep(roots: list[Expr]) -> bool:
-    """Whether the roots have a function that may bend sharply where a series from farther away does not show it."""
-    return any(node.op in FUNCTIONS and FUNCTIONS[node.op].steep and node.degree is None for node in ordered(roots))
+    """Whether the roots have a function that may bend sharply where a series from farther away does
+    not show it.
+    """
+    return any(
+        node.op in FUNCTIONS and FUNCTIONS[node.op].steep and node.degree is None
+        for node in ordered(roots)
+    )
 
 
 def loop_count(roots: list[Expr]) -> int:
-    """How many operations have a loop over their Taylor coefficients: functions, and products and quotients of two series."""
+    """How many operations have a loop over their Taylor coefficients: functions, and products and
+    quotients of two series.
+    """
     nodes = [node for node in ordered(roots) if node.degree is None and node.args]
-    return sum(n.op not in ("add", "sub") and (n.op in FUNCTIONS or all(a.degree != 0 for a in n.args)) for n in nodes)
+    return sum(
+        n.op not in ("add", "sub") and (n.op in FUNCTIONS or all(a.degree != 0 for a in n.args))
+        for n in nodes
+    )
 
 
 def substitute(root: Expr, leaves: dict[Expr, Any]) -> Expr:
@@ -319,7 +382,9 @@ def substitute(root: Expr, leaves: dict[Expr, Any]) -> Expr:
     made: dict[int, Expr] = {id(old): as_expr(new) for old, new in leaves.items()}
     for node in ordered([root]):
         if id(node) not in made:
-            made[id(node)] = combine(node.op, *(made[id(a)] for a in node.args)) if node.args else node
+            made[id(node)] = (
+                combine(node.op, *(made[id(a)] for a in node.args)) if node.args else node
+            )
     return made[id(root)]
 
 
@@ -338,7 +403,8 @@ def differentiate(root: Expr, leaf: Expr) -> Expr:
 
 def _chain(node: Expr, d: list[Expr]) -> Expr:
     """The derivative of a node from those of its operands."""
-    a, b = node.args[0], node.args[-1]
+    a = node.args[0]
+    b = node.args[-1]
     if node.op.startswith(("greater", "less")) or all(x is number(0.0) for x in d):
         return number(0.0)
     if node.op in FUNCTIONS:
@@ -348,7 +414,9 @@ def _chain(node: Expr, d: list[Expr]) -> Expr:
         "sub": lambda: d[0] - d[1],
         "mul": lambda: d[0] * b + a * d[1],
         "div": lambda: (d[0] - node * d[1]) / b,
-        "pow": lambda: b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * np.log(a) * d[1]),
+        "pow": lambda: (
+            b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * np.log(a) * d[1])
+        ),
         "where": lambda: combine("where", a, d[1], d[2]),
         "maximum": lambda: combine("where", combine("greater", a, b), d[0], d[1]),
         "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),
@@ -362,7 +430,8 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
     Raises
     ------
     TraceError
-        The method raised an exception that is not saltus's own; the message has its type and text, and it is the cause.
+        The method raised an exception that is not saltus's own; the message has its type and text,
+        and it is the cause.
     """
     try:
         return getattr(model, method)(*arguments)
@@ -370,40 +439,59 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
         raise
     except BaseException as error:  # a user's own code may call exit
         name = f"{type(model).__name__}.{method}"
-        raise TraceError(f"{name} failed while it was traced: {type(error).__name__}: {error}") from error
+        raise TraceError(
+            f"{name} failed while it was traced: {type(error).__name__}: {error}"
+        ) from error
 
 
 def is_long(traced: Any) -> bool:
-    """Whether the equations of many coordinates, or their derivatives, have so many loops that LLVM's passes are left out."""
+    """Whether the equations of many coordinates, or their derivatives, have so many loops that
+    LLVM's passes are left out.
+    """
     if traced.dof <= LIMITS.optimised and not traced.columns:
         return False
-    return loop_count(_expanded(traced)) > (traced.dof if traced.dof > LIMITS.optimised else LIMITS.operations)
+    return loop_count(_expanded(traced)) > (
+        traced.dof if traced.dof > LIMITS.optimised else LIMITS.operations
+    )
 
 
 def _expanded(traced: Any) -> list[Expr]:
     """The expressions of a trace that are expanded in series."""
     gap = [] if traced.gap is None else [traced.gap]
-    return [*traced.acceleration, *traced.reactions, *traced.margins.values(), *gap, *traced.inputs_of_loops]
+    return [
+        *traced.acceleration,
+        *traced.reactions,
+        *traced.margins.values(),
+        *gap,
+        *traced.inputs_of_loops,
+    ]
 
 
 def check_size(traced: Any, lanes: bool = False) -> None:
-    """Refuse equations whose compilation would take minutes or hours; the time grows as the square of the number of loops, and
-    without LLVM's passes (`is_long`) with its power 1.5: 581 took 13 s, 1181 took 40 s.
+    """Refuse equations whose compilation would take minutes or hours; the time grows as the square
+    of the number of loops, and without LLVM's passes (`is_long`) with its power 1.5: 581 took 13 s,
+    1181 took 40 s.
 
     Raises
     ------
     TraceError
-        The message has the estimate for one motion, for its derivatives if they are traced, or for vector `lanes`.
+        The message has the estimate for one motion, for its derivatives if they are traced, or for
+        vector `lanes`.
     """
     expanded = _expanded(traced)
-    loops, nodes = loop_count(expanded), len(ordered(expanded))
+    loops = loop_count(expanded)
+    nodes = len(ordered(expanded))
     size = max(loops / LIMITS.operations, nodes / LIMITS.nodes)
     without_passes = is_long(traced) and not lanes
     minutes = 0.25 * size**1.5 if without_passes else size**2
     minutes *= LIMITS.lanes if lanes else 1.0
     most = LIMITS.compiling if traced.columns or lanes else 1.0
     if minutes > most:
-        what = f"{traced.model} with {traced.columns} columns of derivatives" if traced.columns else traced.model
+        what = (
+            f"{traced.model} with {traced.columns} columns of derivatives"
+            if traced.columns
+            else traced.model
+        )
         raise TraceError(
             f"the equations of {what} have {nodes} operations, {loops} of them functions, products and quotients, which would "
             f"take about {minutes:.2g} minutes to compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"

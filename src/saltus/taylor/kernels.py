@@ -1,9 +1,11 @@
-"""Kernels: functions that numba compiles, from the text of several files, into modules that are kept on disk.
+"""Kernels: functions that numba compiles, from the text of several files, into modules that are
+kept on disk.
 
-A file that contains functions of a kernel has a line `MARKER`, below which it is compiled. The text there becomes a part of
-generated modules (`compiled_part`), because numba's cache does not see changes of functions in other files. Their header imports
-the decorators from `private_numba.py`, which compile. The decorators here, which such a file imports itself, have the same names
-and compile nothing: imported directly, the file gives its constants, and its functions in plain Python.
+A file that contains functions of a kernel has a line `MARKER`, below which it is compiled. The text
+there becomes a part of generated modules (`compiled_part`), because numba's cache does not see
+changes of functions in other files. Their header imports the decorators from `private_numba.py`,
+which compile. The decorators here, which such a file imports itself, have the same names and
+compile nothing: imported directly, the file gives its constants, and its functions in plain Python.
 """
 
 from __future__ import annotations
@@ -24,7 +26,16 @@ from typing import Any
 from saltus.checks import LIMITS
 from saltus.progress import say
 from saltus.taylor import numba_types, private_numba
-from saltus.taylor.cache import alone, cache_directory, digest, loading, source_of, undamaged, with_digest, write
+from saltus.taylor.cache import (
+    alone,
+    cache_directory,
+    digest,
+    loading,
+    source_of,
+    undamaged,
+    with_digest,
+    write,
+)
 
 MARKER = "# --- compiled from here on"
 log = logging.getLogger("saltus.cache")
@@ -50,7 +61,9 @@ def by_reference(given: Any) -> Any:
 
 @cache
 def compiled_part(module: ModuleType) -> str:
-    """The compiled part of a source file: the text below its marker, with members of `IntEnum`s replaced by their numbers."""
+    """The compiled part of a source file: the text below its marker, with members of `IntEnum`s
+    replaced by their numbers.
+    """
     numbers = {
         f"{name}.{member.name}": str(int(member))
         for name, kind in vars(module).items()
@@ -62,7 +75,9 @@ def compiled_part(module: ModuleType) -> str:
 
 
 def module_name(kind: str, text: str) -> str:
-    """The name of a generated source's module, with a digest of all that its compiled code depends on."""
+    """The name of a generated source's module, with a digest of all that its compiled code depends
+    on.
+    """
     way = "plain" if private_numba.is_plain() else "quick"
     return f"saltus_{kind}_{digest(text, source_of(private_numba), source_of(numba_types), way)}"
 
@@ -76,7 +91,8 @@ def is_compiled(name: str) -> bool:
 def load_module(kind: str, text: str) -> ModuleType:
     """The module of a generated source: loaded, or written and compiled first.
 
-    If a private part of numba is another than expected, everything is compiled in numba's plain way from then on.
+    If a private part of numba is another than expected, everything is compiled in numba's plain way
+    from then on.
     """
     with loading:
         try:
@@ -91,7 +107,10 @@ def load_module(kind: str, text: str) -> ModuleType:
                 made = _loaded(module_name(kind, text), text)
             except Exception:
                 raise error from None  # which has another reason, then
-            log.warning("numba is used in its plain way, which compiles for longer: %s", str(error).splitlines()[0])
+            log.warning(
+                "numba is used in its plain way, which compiles for longer: %s",
+                str(error).splitlines()[0],
+            )
             return made
 
 
@@ -112,10 +131,14 @@ def _loaded(name: str, text: str) -> ModuleType:
 
 def told_before(traced: Any, kind: str, text: str) -> str:
     """LLVM's text of a trace, which is said to be compiled if that takes more than a moment."""
-    seconds, columns = len(text) / LIMITS.letters, "the sensitivities of " * bool(traced.columns)
+    seconds = len(text) / LIMITS.letters
+    columns = "the sensitivities of " * bool(traced.columns)
     if seconds > LIMITS.unsaid:
         model = f"{traced.model}, a model of {traced.dof} coordinate{'s' * (traced.dof > 1)}"
-        say(f"compiling {'ensembles of ' * (kind == 'lane')}{columns}{model} (some {seconds:.0f} s, once)")
+        say(
+            f"compiling {'ensembles of ' * (kind == 'lane')}{columns}{model} (some {seconds:.0f} "
+            "s, once)"
+        )
     return text
 
 
@@ -140,7 +163,9 @@ def _execute(name: str, path: Path, text: str) -> None:
 
 
 def _bytecode(path: Path, text: str) -> CodeType:
-    """A source's bytecode, which is kept beside numba's code: parsing the text would take longer than loading numba's code."""
+    """A source's bytecode, which is kept beside numba's code: parsing the text would take longer
+    than loading numba's code.
+    """
     file = path.parent / "__pycache__" / f"{path.stem}.{MAGIC_NUMBER.hex()}.bytecode"
     content = undamaged(str(file))
     if content is not None:

@@ -1,14 +1,19 @@
-"""The memory of a group of lanes in words, in numba's extension interface: `lanes.now` is a vector, `lane.now` is a number.
+"""The memory of a group of lanes in words, in numba's extension interface: `lanes.now` is a vector,
+`lane.now` is a number.
 
-A group is a named tuple that is passed by its address (`shared`). Its first two fields are `memory`, an array of slots of one
-vector, and `places`, an array of the first slot of each part of it. `LanesType` says which names stand for slots, for parts, and
-for numbers of the group or of each lane that are no doubles:
+A group is a named tuple that is passed by its address (`shared`). Its first two fields are
+`memory`, an array of slots of one vector, and `places`, an array of the first slot of each part of
+it. `LanesType` says which names stand for slots, for parts, and for numbers of the group or of each
+lane that are no doubles:
 
-* `lanes.NAME` is the vector in a slot, and can be set. Of a part it is its slots, `lanes.NAME[row]`; of a part with a series in
+* `lanes.NAME` is the vector in a slot, and can be set. Of a part it is its slots,
+  `lanes.NAME[row]`; of a part with a series in
   each row it is `lanes.NAME[row][k]`.
-* `lane = one(lanes, i)` is lane number i. The same names are its own numbers there, and so are the names of `rows`, which has a
+* `lane = one(lanes, i)` is lane number i. The same names are its own numbers there, and so are the
+  names of `rows`, which has a
   record for each lane; `lane.index` is i, and `lane.lanes` the group.
-* The fields of the named tuple have their names in both; a named tuple among them is given by its address, too.
+* The fields of the named tuple have their names in both; a named tuple among them is given by its
+  address, too.
 """
 
 from __future__ import annotations
@@ -40,19 +45,29 @@ POINTER = DOUBLE.as_pointer()
 class LanesType(types.Type):
     """The type of a group of lanes.
 
-    `slots` and `parts` are the names of slots and parts in their order, `series` the length of a series by the names of parts
-    that have them, `rows` and `flags` the fields of the named tuple that have a record for each lane, and a record for the group.
+    `slots` and `parts` are the names of slots and parts in their order, `series` the length of a
+    series by the names of parts that have them, `rows` and `flags` the fields of the named tuple
+    that have a record for each lane, and a record for the group.
     """
 
-    tuples: ClassVar[dict[str, Any]] = {}  # the types of the named tuples, by the names of the types of their groups
+    # the types of the named tuples, by the names of the types of their groups
+    tuples: ClassVar[dict[str, Any]] = {}
 
-    def __init__(self, name: str, slots: Any, parts: Any, series: dict[str, int], rows: str, flags: str) -> None:
+    def __init__(
+        self, name: str, slots: Any, parts: Any, series: dict[str, int], rows: str, flags: str
+    ) -> None:
         super().__init__(name=name)
-        self.slots, self.parts, self.series, self.rows, self.flags = slots, parts, series, rows, flags
+        self.slots = slots
+        self.parts = parts
+        self.series = series
+        self.rows = rows
+        self.flags = flags
 
     @property
     def of(self) -> Any:
-        """The type of the named tuple; it may have pointers to functions of these lanes, so that it is known later."""
+        """The type of the named tuple; it may have pointers to functions of these lanes, so that it
+        is known later.
+        """
         return self.tuples[self.name]
 
     def record(self, field: str) -> dict[str, Any]:
@@ -70,11 +85,15 @@ class LaneType(types.Type):
 
 
 class SlotsType(types.Type):
-    """The type of slots that follow one another: `slots[i]` is a vector, or a number where they are those of one lane."""
+    """The type of slots that follow one another: `slots[i]` is a vector, or a number where they are
+    those of one lane.
+    """
 
     def __init__(self, one: bool, length: int = 0) -> None:
         super().__init__(name=f"Slots({one}, {length})")
-        self.one, self.length = one, length  # `length` of the series in each row, or 0
+        # `length` of the series in each row, or 0
+        self.one = one
+        self.length = length
 
 
 register_type(SlotsType, POINTER)
@@ -83,7 +102,8 @@ register_type(SlotsType, POINTER)
 @register_model(LanesType)
 class _LanesModel(models.StructModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        number, place = types.CPointer(types.float64), types.CPointer(types.int64)
+        number = types.CPointer(types.float64)
+        place = types.CPointer(types.int64)
         members = [("memory", number), ("places", place), ("tuple", Reference(kind.of))]
         super().__init__(manager, kind, members)  # type: ignore[no-untyped-call]
 
@@ -94,7 +114,7 @@ class _LaneModel(models.StructModel):
         super().__init__(manager, kind, [("lanes", kind.group), ("index", types.int64)])  # type: ignore[no-untyped-call]
 
 
-# --- attributes ------------------------------------------------------------------------------------------------------------
+# --- attributes --------------------------------------------------------------
 
 
 def _field(of: Any, name: str) -> Any:
@@ -106,7 +126,9 @@ def _field(of: Any, name: str) -> Any:
 
 
 def _meaning(group: LanesType, name: str, one: bool) -> Any:
-    """The type of an attribute of a group, or of one lane of it; None if there is none of this name."""
+    """The type of an attribute of a group, or of one lane of it; None if there is none of this
+    name.
+    """
     if name in group.slots:
         return types.float64 if one else vector_type
     if name in group.parts:
@@ -133,8 +155,11 @@ def _field_place(builder: Any, of: Any, address: Any, name: str) -> Any:
 
 
 def _field_value(context: Any, builder: Any, of: Any, address: Any, name: str) -> Any:
-    """A field of a named tuple, or its address if it is one, too; an array is counted where arrays are."""
-    place, kind = _field_place(builder, of, address, name), of.types[of.fields.index(name)]
+    """A field of a named tuple, or its address if it is one, too; an array is counted where arrays
+    are.
+    """
+    place = _field_place(builder, of, address, name)
+    kind = of.types[of.fields.index(name)]
     if isinstance(kind, types.BaseNamedTuple):
         return place
     value = builder.load(place)
@@ -147,17 +172,26 @@ class _Group:
     """A group of lanes, or one of them, in code that is written for LLVM."""
 
     def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
-        self.context, self.builder, self.one = context, builder, isinstance(kind, LaneType)
+        self.context = context
+        self.builder = builder
+        self.one = isinstance(kind, LaneType)
         self.group = kind.group if self.one else kind
         self.value = builder.extract_value(value, 0) if self.one else value
         self.index = builder.extract_value(value, 1) if self.one else LONG(0)
-        self.memory, self.places, self.tuple = (builder.extract_value(self.value, i) for i in range(3))
+        self.memory, self.places, self.tuple = (
+            builder.extract_value(self.value, i) for i in range(3)
+        )
 
     def place(self, name: str) -> Any:
-        """LLVM's pointer to a number or a vector, to the first one of a part, or None if the name is that of a field."""
-        b, group = self.builder, self.group
+        """LLVM's pointer to a number or a vector, to the first one of a part, or None if the name
+        is that of a field.
+        """
+        b = self.builder
+        group = self.group
         if name in group.slots:
-            return self._typed(b.gep(self.memory, [b.add(LONG(group.slots.index(name) * WIDTH), self.index)]))
+            return self._typed(
+                b.gep(self.memory, [b.add(LONG(group.slots.index(name) * WIDTH), self.index)])
+            )
         if name in group.parts:
             first = b.load(b.gep(self.places, [LONG(group.parts.index(name))]))
             return b.gep(self.memory, [b.add(b.mul(first, LONG(WIDTH)), self.index)])
@@ -170,8 +204,11 @@ class _Group:
         return place if self.one else self.builder.bitcast(place, LANES.of(DOUBLE).as_pointer())
 
     def _of_record(self, field: str, name: str, index: Any) -> Any:
-        b, kind = self.builder, self.group.of.types[self.group.of.fields.index(field)]
-        array = self.context.make_array(kind)(self.context, b, b.load(_field_place(b, self.group.of, self.tuple, field)))
+        b = self.builder
+        kind = self.group.of.types[self.group.of.fields.index(field)]
+        array = self.context.make_array(kind)(
+            self.context, b, b.load(_field_place(b, self.group.of, self.tuple, field))
+        )
         found = kind.dtype.fields[name]
         first = b.bitcast(array.data, ir.IntType(8).as_pointer())
         place = b.gep(first, [b.add(b.mul(index, LONG(kind.dtype.size)), LONG(found.offset))])
@@ -203,7 +240,7 @@ for _kind in (LanesType, LaneType):
     lower_setattr_generic(_kind)(_write)
 
 
-# --- slots ------------------------------------------------------------------------------------------------------------------
+# --- slots -------------------------------------------------------------------
 
 
 @type_callable(operator.getitem)
@@ -221,7 +258,9 @@ def _type_of_slot(context: Any) -> Callable[..., Any]:
 @type_callable(operator.setitem)
 def _type_of_set_slot(context: Any) -> Callable[..., Any]:
     def typer(slots: Any, index: Any, value: Any) -> Any:
-        fits = isinstance(slots, SlotsType) and not slots.length and isinstance(index, types.Integer)
+        fits = (
+            isinstance(slots, SlotsType) and not slots.length and isinstance(index, types.Integer)
+        )
         wanted = types.Number if fits and slots.one else VectorType
         return types.void if fits and isinstance(value, wanted) else None
 
@@ -232,7 +271,9 @@ def _slot(context: Any, builder: Any, kind: Any, slots: Any, index_type: Any, in
     """LLVM's pointer to a slot."""
     index = context.cast(builder, index, index_type, types.int64)
     place = builder.gep(slots, [builder.mul(index, LONG(WIDTH * max(1, kind.length)))])
-    return place if kind.one or kind.length else builder.bitcast(place, LANES.of(DOUBLE).as_pointer())
+    return (
+        place if kind.one or kind.length else builder.bitcast(place, LANES.of(DOUBLE).as_pointer())
+    )
 
 
 @lower_builtin(operator.getitem, SlotsType, types.Integer)  # type: ignore[untyped-decorator]
@@ -253,7 +294,7 @@ def _set_slot(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-# --- groups and lanes -------------------------------------------------------------------------------------------------------
+# --- groups and lanes --------------------------------------------------------
 
 
 def named_tuple(cls: Any, *kinds: Any) -> Any:
@@ -263,14 +304,19 @@ def named_tuple(cls: Any, *kinds: Any) -> Any:
 
 
 def shared_as(kind: LanesType) -> Any:
-    """A function of compiled code that gives a group's named tuple as its lanes, valid until the function that calls it returns;
-    the caller of that one owns the arrays."""
+    """A function of compiled code that gives a group's named tuple as its lanes, valid until the
+    function that calls it returns; the caller of that one owns the arrays."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         with builder.goto_entry_block():
             place = builder.alloca(args[0].type)
         builder.store(args[0], place)
-        arrays = [context.make_array(kind.of.types[i])(context, builder, builder.extract_value(args[0], i)) for i in range(2)]
+        arrays = [
+            context.make_array(kind.of.types[i])(
+                context, builder, builder.extract_value(args[0], i)
+            )
+            for i in range(2)
+        ]
         value = ir.Constant(context.get_value_type(kind), ir.Undefined)
         for i, part in enumerate((*(array.data for array in arrays), place)):
             value = builder.insert_value(value, part, i)
@@ -284,7 +330,11 @@ def one(typing: Any, lanes: Any, index: Any) -> Any:
     """One lane of a group."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        value = builder.insert_value(ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), args[0], 0)
-        return builder.insert_value(value, context.cast(builder, args[1], signature.args[1], types.int64), 1)
+        value = builder.insert_value(
+            ir.Constant(context.get_value_type(signature.return_type), ir.Undefined), args[0], 0
+        )
+        return builder.insert_value(
+            value, context.cast(builder, args[1], signature.args[1], types.int64), 1
+        )
 
     return LaneType(lanes)(lanes, index), code

@@ -1,7 +1,8 @@
-"""The lanes' vector as a type of numba: within compiled code `+ - * / < <= > >=` work on vectors, mixed with numbers.
+"""The lanes' vector as a type of numba: within compiled code `+ - * / < <= > >=` work on vectors,
+mixed with numbers.
 
-A comparison gives a mask; `bits` turns a mask into an integer with one bit for each lane, on which `& | ~` work, and `mask`
-turns it back. Memory is counted in slots of one vector.
+A comparison gives a mask; `bits` turns a mask into an integer with one bit for each lane, on which
+`& | ~` work, and `mask` turns it back. Memory is counted in slots of one vector.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ class MaskType(types.Type):
         super().__init__(name=f"truths{WIDTH}")
 
 
-vector_type, mask_type = VectorType(), MaskType()
+vector_type = VectorType()
+mask_type = MaskType()
 register_type(VectorType, LANES.of(DOUBLE))
 register_type(MaskType, LANES.of(BIT))
 
@@ -51,35 +53,47 @@ def _on_vectors(write: Callable[..., Any]) -> Callable[..., Any]:
     """`write` gets vectors, whether vectors or numbers are given, and gives a vector or a mask."""
 
     def code(builder: Any, kinds: Any, *args: Any) -> Any:
-        result = write(*(_lift(builder, kind, value) for kind, value in zip(kinds, args, strict=True)))
+        result = write(
+            *(_lift(builder, kind, value) for kind, value in zip(kinds, args, strict=True))
+        )
         return result.value if isinstance(result, Vec) else result
 
     return code
 
 
-# --- operators -------------------------------------------------------------------------------------------------------------
+# --- operators ---------------------------------------------------------------
 
 
 for _symbol in (operator.add, operator.sub, operator.mul, operator.truediv):
     operator_meaning(_symbol, VectorType, vector_type, _on_vectors(_symbol))
-for _symbol, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
+for _symbol, _sign in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+):
     _compare = _on_vectors(lambda a, b, sign=_sign: a.compare(sign, b))
     operator_meaning(_symbol, VectorType, mask_type, _compare)
 operator_meaning(operator.neg, VectorType, vector_type, _on_vectors(operator.neg), 1)
 
 
-# --- functions on vectors --------------------------------------------------------------------------------------------------
+# --- functions on vectors ----------------------------------------------------
 
 
 def _log2(a: Vec) -> Vec:
-    """log2 to 0.05, for a > 0: linear in every octave, as is the integer that has the same bits as the number."""
+    """log2 to 0.05, for a > 0: linear in every octave, as is the integer that has the same bits as
+    the number.
+    """
     bits = a.builder.bitcast(a.value, LANES.of(LONG))
-    return Vec(a.builder, a.builder.sitofp(bits, LANES.of(DOUBLE)), LANES) * 2.0**-52 - (1023.0 - 0.043)
+    return Vec(a.builder, a.builder.sitofp(bits, LANES.of(DOUBLE)), LANES) * 2.0**-52 - (
+        1023.0 - 0.043
+    )
 
 
 def _exp2(a: Vec) -> Vec:
     """2**a to 0.4 %, for -1000 < a < 1000: the exponent, and a parabola for the rest."""
-    b, whole = a.builder, a.intrinsic("llvm.floor")
+    b = a.builder
+    whole = a.intrinsic("llvm.floor")
     rest = a - whole
     exponent = b.add(b.fptosi(whole.value, LANES.of(LONG)), LANES.constant(1023, LONG))
     power = Vec(b, b.bitcast(b.shl(exponent, LANES.constant(52, LONG)), LANES.of(DOUBLE)), LANES)
@@ -88,18 +102,28 @@ def _exp2(a: Vec) -> Vec:
 
 def _inverse(a: Vec) -> Vec:
     """1/a to 1e-5: a line in every octave, and two of Newton's steps."""
-    b, bits = a.builder, a.builder.bitcast(a.value, LANES.of(LONG))
-    y = Vec(b, b.bitcast(b.sub(LANES.constant(0x7FDE623822FC16E6, LONG), bits), LANES.of(DOUBLE)), LANES)
+    b = a.builder
+    bits = a.builder.bitcast(a.value, LANES.of(LONG))
+    y = Vec(
+        b, b.bitcast(b.sub(LANES.constant(0x7FDE623822FC16E6, LONG), bits), LANES.of(DOUBLE)), LANES
+    )
     for _ in range(2):
         y = y * (2.0 - a * y)
     return y
 
 
 def _root(a: Vec) -> Vec:
-    """The square root to 0.2 %, for a >= 0, by that of 1/a: a line in every second octave, and one of Newton's steps."""
-    b, bits = a.builder, a.builder.bitcast(a.value, LANES.of(LONG))
+    """The square root to 0.2 %, for a >= 0, by that of 1/a: a line in every second octave, and one
+    of Newton's steps.
+    """
+    b = a.builder
+    bits = a.builder.bitcast(a.value, LANES.of(LONG))
     halved = b.lshr(bits, LANES.constant(1, LONG))
-    y = Vec(b, b.bitcast(b.sub(LANES.constant(0x5FE6EB50C7B537A9, LONG), halved), LANES.of(DOUBLE)), LANES)
+    y = Vec(
+        b,
+        b.bitcast(b.sub(LANES.constant(0x5FE6EB50C7B537A9, LONG), halved), LANES.of(DOUBLE)),
+        LANES,
+    )
     z = a * y
     return z * (1.5 - (0.5 * y) * z)
 
@@ -114,10 +138,12 @@ minimum = _function(lambda a, b: a.select(a.compare("<", b), b), 2)
 maximum = _function(lambda a, b: a.select(a.compare(">", b), b), 2)
 fma = _function(lambda a, b, c: a.fma(b, c), 3)
 splat = _function(lambda a: a)
-rough_inverse, rough_root, rough_log2, rough_exp2 = (_function(write) for write in (_inverse, _root, _log2, _exp2))
+rough_inverse, rough_root, rough_log2, rough_exp2 = (
+    _function(write) for write in (_inverse, _root, _log2, _exp2)
+)
 
 
-# --- memory, masks and lanes -----------------------------------------------------------------------------------------------
+# --- memory, masks and lanes -------------------------------------------------
 
 
 def _slot(builder: Any, array: Array, slot: Any) -> Any:
@@ -150,7 +176,8 @@ def _put(builder: Any, kinds: Any, array: Array, slot: Any, lane: Any, number: A
 
 
 def _replace(builder: Any, kinds: Any, array: Array, slot: Any, chosen: Any, value: Any) -> None:
-    new, old = Vec(builder, value, LANES), Vec(builder, _load(builder, kinds, array, slot), LANES)
+    new = Vec(builder, value, LANES)
+    old = Vec(builder, _load(builder, kinds, array, slot), LANES)
     _store(builder, kinds, array, slot, new.select(chosen, old).value)
 
 
@@ -171,19 +198,24 @@ def _vector_lane(builder: Any, kinds: Any, vector: Any, lane: Any) -> Any:
 
 
 def _with_lane(builder: Any, kinds: Any, vector: Any, lane: Any, number: Any) -> Any:
-    return number if WIDTH == 1 else builder.insert_element(vector, number, builder.trunc(lane, INDEX))
+    return (
+        number if WIDTH == 1 else builder.insert_element(vector, number, builder.trunc(lane, INDEX))
+    )
 
 
 load = inlined(vector_type, _load, 2)  # the vector in a slot of an array
 store = inlined(types.void, _store, 3)  # put a vector into a slot of an array
-replace = inlined(types.void, _replace, 4)  # put a vector into a slot of an array, in the lanes whose mask is set
+# put a vector into a slot of an array, in the lanes whose mask is set
+replace = inlined(types.void, _replace, 4)
 get = inlined(types.float64, _get, 3)  # the number of one lane in a slot of an array
 put = inlined(types.void, _put, 4)  # set the number of one lane in a slot of an array
-select = inlined(vector_type, _select, 3)  # of a mask and two vectors: the first where the mask is set, the other one elsewhere
+# of a mask and two vectors: the first where the mask is set, the other one elsewhere
+select = inlined(vector_type, _select, 3)
 bits = inlined(types.int64, _bits, 1)  # a mask as an integer: lane i is bit i
 mask = inlined(mask_type, _mask, 1)  # the mask of an integer's bits
 vector_lane = inlined(types.float64, _vector_lane, 2)  # the number in one lane
 with_lane = inlined(vector_type, _with_lane, 3)  # the vector with another number in one lane
-# The place of the lowest bit that is set in an integer (there must be one), and the number of bits that are set.
+# The place of the lowest bit that is set in an integer (there must be one), and the number of bits
+# that are set.
 first_lane = inlined(types.int64, lambda builder, kinds, integer: builder.cttz(integer, BIT(1)), 1)
 lane_count = inlined(types.int64, lambda builder, kinds, integer: builder.ctpop(integer), 1)

@@ -1,10 +1,13 @@
-"""Tables of a system's loads between their breakpoints: the polynomials of records, and the times that pulses depend on.
+"""Tables of a system's loads between their breakpoints: the polynomials of records, and the times
+that pulses depend on.
 
-A trace reads rows of such a table by (dotted path, order). For a record the order is that of the derivative. A pulse is a closed
-form in its own time; its rows are polynomials of degree 1: SINCE, the time since its start, at most its length; WITHIN, the
-derivative of SINCE, 1 within the pulse and else 0; AFTER, the time since its end; and the derivative of AFTER.
+A trace reads rows of such a table by (dotted path, order). For a record the order is that of the
+derivative. A pulse is a closed form in its own time; its rows are polynomials of degree 1: SINCE,
+the time since its start, at most its length; WITHIN, the derivative of SINCE, 1 within the pulse
+and else 0; AFTER, the time since its end; and the derivative of AFTER.
 
-The last part is compiled together with the lanes; `memory.py` runs the same functions while it writes the code of one motion.
+The last part is compiled together with the lanes; `memory.py` runs the same functions while it
+writes the code of one motion.
 """
 
 from __future__ import annotations
@@ -19,7 +22,9 @@ from saltus.systems import Pulse, Record, System, substitute
 from saltus.taylor.graph import RECORD_WIDTH, Expr, combine
 from saltus.taylor.kernels import jit
 
-SINCE, WITHIN, AFTER = 0, 1, 10
+SINCE = 0
+WITHIN = 1
+AFTER = 10
 
 
 def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
@@ -28,8 +33,9 @@ def record_table(system: System, rows: list[tuple[str, int]]) -> tuple[np.ndarra
     Returns
     -------
     tuple[np.ndarray, np.ndarray]
-        Breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds between the breakpoints i - 1 and
-        i, in ascending powers of the time since breakpoint i - 1 (the first piece: since breakpoint 0). Scales are left out.
+        Breakpoints (m,) and coefficients (rows, m + 1, RECORD_WIDTH): piece i of a row holds
+        between the breakpoints i - 1 and i, in ascending powers of the time since breakpoint i - 1
+        (the first piece: since breakpoint 0). Scales are left out.
     """
     breaks, tables = record_tables(system, rows, {})
     return breaks[0], tables[0]
@@ -43,13 +49,20 @@ def record_tables(
     Returns
     -------
     tuple[np.ndarray, np.ndarray]
-        Breakpoints (n, m) and coefficients (n, rows, m + 1, RECORD_WIDTH); n is 1 where no column moves a breakpoint.
+        Breakpoints (n, m) and coefficients (n, rows, m + 1, RECORD_WIDTH); n is 1 where no column
+        moves a breakpoint.
     """
     if not rows:
         return np.empty((1, 0)), np.empty((1, 0, 1, RECORD_WIDTH))
     signals = {path: system.get(path) for path, _ in rows}
-    moving = {f"{path}.{name}" for path, signal in signals.items() for name in getattr(signal, "moving", ())}
-    varied = {path: values[:, None] for path, values in columns.items() if path in moving and values.ndim}
+    moving = {
+        f"{path}.{name}"
+        for path, signal in signals.items()
+        for name in getattr(signal, "moving", ())
+    }
+    varied = {
+        path: values[:, None] for path, values in columns.items() if path in moving and values.ndim
+    }
     pulses = {path: substitute(signal, lambda at, value: varied.get(at, value), path) for path, signal in signals.items()
               if isinstance(signal, Pulse)}  # fmt: skip
     count = max((values.shape[0] for values in varied.values()), default=1)
@@ -70,15 +83,22 @@ def _edges(signal: Any, count: int) -> np.ndarray:
     """The breakpoints of a record or a pulse, (count, its breakpoints)."""
     if isinstance(signal, Record):
         return np.broadcast_to(signal.time, (count, signal.time.size))
-    return np.concatenate([np.broadcast_to(t, (count, 1)) for t in (signal.start, signal.start + signal.length)], axis=1)
+    return np.concatenate(
+        [np.broadcast_to(t, (count, 1)) for t in (signal.start, signal.start + signal.length)],
+        axis=1,
+    )
 
 
 def _fill_clock(table: np.ndarray, breaks: np.ndarray, pulse: Any, order: int) -> None:
     """One row of a pulse, (n, m + 1, RECORD_WIDTH); before the first breakpoint it has not begun."""
     end = pulse.start + pulse.length
-    within, past, pieces = (breaks >= pulse.start) & (breaks < end), breaks >= end, table[:, 1:]
+    within = (breaks >= pulse.start) & (breaks < end)
+    past = breaks >= end
+    pieces = table[:, 1:]
     if order == SINCE:
-        pieces[..., 0] = np.where(past, end - pulse.start, np.where(within, breaks - pulse.start, 0.0))
+        pieces[..., 0] = np.where(
+            past, end - pulse.start, np.where(within, breaks - pulse.start, 0.0)
+        )
     if order == AFTER:
         pieces[..., 0] = np.where(past, breaks - end, 0.0)
     slope = {SINCE: within, WITHIN: within, AFTER: past, AFTER + 1: past}.get(order)
@@ -89,8 +109,11 @@ def _fill_clock(table: np.ndarray, breaks: np.ndarray, pulse: Any, order: int) -
 def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> None:
     from scipy.special import factorial
 
-    polynomial = record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
-    first, last = record.time[0], record.time[-1]
+    polynomial = (
+        record.polynomials[order] if order < 3 else record.polynomials[2].derivative(order - 2)
+    )
+    first = record.time[0]
+    last = record.time[-1]
     inside = (breaks >= first) & (breaks < last)
     anchors = breaks[inside]
     for power in range(polynomial.c.shape[0]):
@@ -102,15 +125,17 @@ def _fill(row: np.ndarray, breaks: np.ndarray, record: Record, order: int) -> No
         where = np.append(False, breaks >= last) if after else np.append(True, breaks < first)
         anchor = np.append(breaks[0], breaks)[where]
         velocity = record.polynomials[1](edge)
-        row[where, 0] = velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
+        row[where, 0] = (
+            velocity if order == 1 else record.polynomials[0](edge) + velocity * (anchor - edge)
+        )
         row[where, 1] = 0.0 if order == 1 else velocity
 
 
 class LoadTime:
     """The time in a traced model, which may be passed to load channels only.
 
-    The flow counts whole forcing periods and keeps a local time within them. A model may therefore depend on the time only
-    through its load, for which this representation is exact.
+    The flow counts whole forcing periods and keeps a local time within them. A model may therefore
+    depend on the time only through its load, for which this representation is exact.
     """
 
     def __init__(self, trace: Any) -> None:
@@ -125,7 +150,9 @@ class LoadTime:
         return combine("mul", record.scale, self._row(record, order))
 
     def pulse(self, pulse: Pulse) -> tuple[Expr, Expr, Expr]:
-        """The time since the start of a pulse, at most its length; 1 within it, else 0; the time since its end."""
+        """The time since the start of a pulse, at most its length; 1 within it, else 0; the time
+        since its end.
+        """
         return self._row(pulse, SINCE), self._row(pulse, WITHIN), self._row(pulse, AFTER)
 
     def _row(self, signal: Any, order: int) -> Expr:
@@ -137,16 +164,23 @@ class LoadTime:
     def refuse(self, *_: Any) -> Any:
         """Raise an error for every other use."""
         raise TraceError(
-            "the time may only be handed to a load channel, such as load.horizontal(t); give the model a channel for it"
+            "the time may only be handed to a load channel, such as load.horizontal(t); give the "
+            "model a channel for it"
         )
 
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = refuse
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = refuse
-    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __array__ = refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
+        refuse
+    )
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = __neg__ = __pos__ = (
+        __abs__
+    ) = refuse
+    __float__ = __int__ = __bool__ = __lt__ = __gt__ = __le__ = __ge__ = __eq__ = __ne__ = (
+        __array__
+    ) = refuse
     __hash__ = object.__hash__
 
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
@@ -157,7 +191,9 @@ def anchor(breaks, piece):
 
 @jit
 def own_records(tables, trajectory):
-    """The breakpoints and the table of one trajectory; all trajectories share one of each if no breakpoint depends on it."""
+    """The breakpoints and the table of one trajectory; all trajectories share one of each if no
+    breakpoint depends on it.
+    """
     breaks, table = tables
     i = min(trajectory, breaks.shape[0] - 1)
     return breaks[i], table[i]

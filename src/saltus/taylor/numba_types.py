@@ -1,14 +1,20 @@
 """What kernels work with beyond numba's own types, in numba's public extension interface.
 
-* Functions that are given by their addresses (`PointedFunction`): those of a structure, which are written for LLVM, and numba's
-  own. A call is one instruction; numba's first-class functions are first asked, by Python code, where they are.
-* Tuples that are given by their address (`Reference`): by value, a tuple of many arrays would be hundreds of arguments. The
-  fields of named tuples, and of the named tuples and records in them, are attributes; those of records can be set.
-* Functions and operators whose LLVM code is written here (`inlined`, `operator_meaning`), for the vectors of the lanes.
+* Functions that are given by their addresses (`PointedFunction`): those of a structure, which are
+  written for LLVM, and numba's
+  own. A call is one instruction; numba's first-class functions are first asked, by Python code,
+  where they are.
+* Tuples that are given by their address (`Reference`): by value, a tuple of many arrays would be
+  hundreds of arguments. The
+  fields of named tuples, and of the named tuples and records in them, are attributes; those of
+  records can be set.
+* Functions and operators whose LLVM code is written here (`inlined`, `operator_meaning`), for the
+  vectors of the lanes.
 
-A function that is written for LLVM is called with numbers and addresses alone, so that it can also be called from C, by `ctypes`
-or in a browser: an array is the address of its first element and all of its lengths but the first, a tuple is its parts one after
-the other, and two or more results are put where the last argument says.
+A function that is written for LLVM is called with numbers and addresses alone, so that it can also
+be called from C, by `ctypes` or in a browser: an array is the address of its first element and all
+of its lengths but the first, a tuple is its parts one after the other, and two or more results are
+put where the last argument says.
 """
 
 from __future__ import annotations
@@ -41,16 +47,20 @@ def _members(kind: Any) -> tuple[Any, ...]:
 
 
 def register_type(kind: type, llvm: Any) -> None:
-    """Let numba keep values of one of its types in an LLVM type, or in the one that a function of the type gives."""
+    """Let numba keep values of one of its types in an LLVM type, or in the one that a function of
+    the type gives.
+    """
 
     class Model(models.PrimitiveModel):
         def __init__(self, manager: Any, each: Any) -> None:
-            super().__init__(manager, each, llvm if isinstance(llvm, ir.Type) else llvm(manager, each))  # type: ignore[no-untyped-call]
+            super().__init__(
+                manager, each, llvm if isinstance(llvm, ir.Type) else llvm(manager, each)
+            )  # type: ignore[no-untyped-call]
 
     register_model(kind)(Model)
 
 
-# --- tuples by their address -------------------------------------------------------------------------------------------------
+# --- tuples by their address -------------------------------------------------
 
 
 class Reference(types.BaseTuple):
@@ -62,15 +72,22 @@ class Reference(types.BaseTuple):
 
     @property
     def mangling_args(self) -> Any:
-        """The names of compiled functions contain those of their arguments' types, which would be long."""
+        """The names of compiled functions contain those of their arguments' types, which would be
+        long.
+        """
         named = isinstance(self.of, types.BaseNamedTuple)
-        return f"{self.__class__.__name__}{self.of.instance_class.__name__ if named else ''}", () if named else (self.of,)
+        return (
+            f"{self.__class__.__name__}{self.of.instance_class.__name__ if named else ''}",
+            () if named else (self.of,),
+        )
 
     def __len__(self) -> int:
         return self.count
 
 
-register_type(Reference, lambda manager, kind: manager.lookup(kind.of).get_value_type().as_pointer())
+register_type(
+    Reference, lambda manager, kind: manager.lookup(kind.of).get_value_type().as_pointer()
+)
 
 
 @lower_builtin("static_getitem", Reference, types.IntegerLiteral)  # type: ignore[untyped-decorator]
@@ -88,7 +105,9 @@ def _element(context: Any, builder: Any, place: Any, index: int, kind: Any) -> A
 
 
 def path_to(kind: Any, name: str) -> tuple[Any, ...] | None:
-    """The way to a field of a named tuple, or of the named tuples and records within it: indices, then a record's field."""
+    """The way to a field of a named tuple, or of the named tuples and records within it: indices,
+    then a record's field.
+    """
     for i, (field, inner) in enumerate(zip(kind.fields, kind.types, strict=True)):
         if field == name:
             return (i,)
@@ -101,7 +120,9 @@ def path_to(kind: Any, name: str) -> tuple[Any, ...] | None:
 
 
 def field_type(reference: Reference, name: str) -> Any:
-    """The type of a field of a named tuple by its `Reference`, or None; a named tuple among the fields is a `Reference` too."""
+    """The type of a field of a named tuple by its `Reference`, or None; a named tuple among the
+    fields is a `Reference` too.
+    """
     path = path_to(reference.of, name) if isinstance(reference.of, types.BaseNamedTuple) else None
     if path is None:
         return None
@@ -112,7 +133,9 @@ def field_type(reference: Reference, name: str) -> Any:
 
 
 def _owner(builder: Any, kind: Any, value: Any, path: tuple[Any, ...]) -> tuple[Any, Any]:
-    """The type of what has the last field of a path, and LLVM's value of it: a tuple's address, or a record."""
+    """The type of what has the last field of a path, and LLVM's value of it: a tuple's address, or
+    a record.
+    """
     for step in path[:-1]:
         kind = kind.types[step]
         value = builder.gep(value, [INDEX(0), INDEX(step)], inbounds=True)
@@ -145,7 +168,9 @@ def _set_field(context: Any, builder: Any, signature: Any, args: Any, attr: str)
 
 @intrinsic
 def by_reference(typing: Any, given: Any) -> Any:
-    """A tuple as a `Reference`, valid until the function that makes it returns; the caller of that function owns the arrays."""
+    """A tuple as a `Reference`, valid until the function that makes it returns; the caller of that
+    function owns the arrays.
+    """
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         with builder.goto_entry_block():
@@ -156,22 +181,30 @@ def by_reference(typing: Any, given: Any) -> Any:
     return Reference(given)(given), code
 
 
-# --- functions by their address ------------------------------------------------------------------------------------------------
+# --- functions by their address ----------------------------------------------
 
 
 class PointedFunction(types.Callable):
-    """The type of a function of one signature that is given by its address: numba's, or one that is `written` for LLVM."""
+    """The type of a function of one signature that is given by its address: numba's, or one that is
+    `written` for LLVM.
+    """
 
     def __init__(self, signature: Any, written: bool) -> None:
-        self.signature, self.written = signature, written
+        self.signature = signature
+        self.written = written
         super().__init__(name=f"{'Written' if written else 'Compiled'}({signature})")
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """The signature, or None if the number of arguments is wrong; a tuple may be given as a `Reference`."""
+        """The signature, or None if the number of arguments is wrong; a tuple may be given as a
+        `Reference`.
+        """
         if len(args) != len(self.signature.args) or kws:
             return None
         pairs = zip(args, self.signature.args, strict=True)
-        wanted = tuple(given if isinstance(given, Reference) and given.of == own else own for given, own in pairs)
+        wanted = tuple(
+            given if isinstance(given, Reference) and given.of == own else own
+            for given, own in pairs
+        )
         return type(self.signature)(self.signature.return_type, wanted, self)
 
     def get_call_signatures(self) -> Any:
@@ -217,8 +250,12 @@ def _address(kind: PointedFunction, given: Any, boundary: Any) -> NativeValue:
 @lower_builtin(PointedFunction, types.VarArg(types.Any))  # type: ignore[untyped-decorator]
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     """A call through an address."""
-    (called, *kinds), (address, *values) = signature.args, args
-    values = [builder.load(value) if isinstance(kind, Reference) else value for kind, value in zip(kinds, values, strict=True)]
+    (called, *kinds) = signature.args
+    (address, *values) = args
+    values = [
+        builder.load(value) if isinstance(kind, Reference) else value
+        for kind, value in zip(kinds, values, strict=True)
+    ]
     if called.written:
         return _call_written(context, builder, called.signature, address, values)
     result = context.get_value_type(called.signature.return_type)
@@ -226,10 +263,17 @@ def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return builder.call(builder.inttoptr(address, function.as_pointer()), values)
 
 
-def _call_written(context: Any, builder: Any, signature: Any, address: Any, values: list[Any]) -> Any:
+def _call_written(
+    context: Any, builder: Any, signature: Any, address: Any, values: list[Any]
+) -> Any:
     """A call of a function that was written for LLVM."""
-    function, count = written_function(signature), result_count(signature)
-    given = [part for kind, value in zip(signature.args, values, strict=True) for part in _parts(context, builder, kind, value)]
+    function = written_function(signature)
+    count = result_count(signature)
+    given = [
+        part
+        for kind, value in zip(signature.args, values, strict=True)
+        for part in _parts(context, builder, kind, value)
+    ]
     if count > 1:
         with builder.goto_entry_block():
             results = builder.alloca(DOUBLE, count)
@@ -282,7 +326,9 @@ def _llvm_types(kind: Any) -> list[Any]:
 
 
 def given_arguments(signature: Any, function: Any) -> tuple[Any, ...]:
-    """The arguments of a function that is being written for LLVM: numbers, `Array`s, and tuples of them."""
+    """The arguments of a function that is being written for LLVM: numbers, `Array`s, and tuples of
+    them.
+    """
     waiting = iter(function.args)
     return tuple(_assembled(kind, waiting) for kind in signature.args)
 
@@ -296,32 +342,45 @@ def _assembled(kind: Any, waiting: Iterator[Any]) -> Any:
     return first
 
 
-# --- functions whose code is written here --------------------------------------------------------------------------------------
+# --- functions whose code is written here ------------------------------------
 
 
 class Array:
-    """A C-contiguous array in code that is written for LLVM: where its first element is, and its lengths as far as they count."""
+    """A C-contiguous array in code that is written for LLVM: where its first element is, and its
+    lengths as far as they count.
+    """
 
     def __init__(self, data: Any, shape: tuple[Any, ...]) -> None:
-        self.data, self.shape = data, shape
+        self.data = data
+        self.shape = shape
 
 
 def argument(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """An argument of numba's as LLVM's number, an `Array`, or a tuple of them."""
     if isinstance(kind, types.Array):
         made = context.make_array(kind)(context, builder, value)
-        return Array(made.data, tuple(builder.extract_value(made.shape, i) for i in range(kind.ndim)))
+        return Array(
+            made.data, tuple(builder.extract_value(made.shape, i) for i in range(kind.ndim))
+        )
     if isinstance(kind, types.BaseTuple):
         parts = [builder.extract_value(value, i) for i in range(len(kind))]
-        return tuple(argument(context, builder, each, part) for each, part in zip(_members(kind), parts, strict=True))
+        return tuple(
+            argument(context, builder, each, part)
+            for each, part in zip(_members(kind), parts, strict=True)
+        )
     return value
 
 
 def inlined(result: Any, write: Callable[..., Any], count: int) -> Any:
-    """A function of compiled code of `count` arguments; `write(builder, types, *arguments)` gives LLVM's value of its result."""
+    """A function of compiled code of `count` arguments; `write(builder, types, *arguments)` gives
+    LLVM's value of its result.
+    """
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        given = [argument(context, builder, kind, value) for kind, value in zip(signature.args, args, strict=True)]
+        given = [
+            argument(context, builder, kind, value)
+            for kind, value in zip(signature.args, args, strict=True)
+        ]
         value = write(builder, signature.args, *given)
         return context.get_dummy_value() if result == types.void else value
 
@@ -334,15 +393,20 @@ def inlined(result: Any, write: Callable[..., Any], count: int) -> Any:
     return intrinsic(lambda typing, a, b, c, d: (result(a, b, c, d), code))
 
 
-def operator_meaning(symbol: Any, kind: type, result: Any, write: Callable[..., Any], count: int = 2) -> None:
-    """Let Python's operator mean `write` where a value of this type is among its operands; the others may be numbers.
+def operator_meaning(
+    symbol: Any, kind: type, result: Any, write: Callable[..., Any], count: int = 2
+) -> None:
+    """Let Python's operator mean `write` where a value of this type is among its operands; the
+    others may be numbers.
 
     numba's `overload` would compile a function for every pair of types.
     """
 
     def fits(*given: Any) -> Any:
         own = [isinstance(each, kind) for each in given]
-        fit = any(own) and all(o or isinstance(each, types.Number) for o, each in zip(own, given, strict=True))
+        fit = any(own) and all(
+            o or isinstance(each, types.Number) for o, each in zip(own, given, strict=True)
+        )
         return result if fit else None
 
     @type_callable(symbol)

@@ -1,23 +1,33 @@
-"""The one way in which kernels are compiled, and the one file that uses parts of numba that are not public.
+"""The one way in which kernels are compiled, and the one file that uses parts of numba that are not
+public.
 
-Kernels are compiled with numba, without Python's exceptions for division and with fused multiply-adds. Of numba's public
-interface, `njit` with its documented options and `cfunc` are used here, and the extension interface in `numba_types.py`. The
-following parts are not public. If a version of numba lacks one, or has it with other arguments, everything is compiled in
-numba's plain way instead (`be_plain`), with the same results; tests change each of them. All are in numba 0.60 to 0.68.
-What each buys, in seconds of one slow core with numba 0.68.1:
+Kernels are compiled with numba, without Python's exceptions for division and with fused
+multiply-adds. Of numba's public interface, `njit` with its documented options and `cfunc` are used
+here, and the extension interface in `numba_types.py`. The following parts are not public. If a
+version of numba lacks one, or has it with other arguments, everything is compiled in numba's plain
+way instead (`be_plain`), with the same results; tests change each of them. All are in numba 0.60 to
+0.68. What each buys, in seconds of one slow core with numba 0.68.1:
 
-* A compiler for functions that others of a kernel call, which become parts of its machine code and get none of their own
-  (`_linked_only`). The kernel of one contact compiles in 11 s, not 19 s, that of several contacts in 33 s, not 80 s, and all
-  kernels together in 2 minutes, not 4. No method of numba is replaced for it.
-* A dispatcher's `get_call_template`, through which calls are typed without the literal numbers in them; a function would be
+* A compiler for functions that others of a kernel call, which become parts of its machine code and
+  get none of their own
+  (`_linked_only`). The kernel of one contact compiles in 11 s, not 19 s, that of several contacts
+  in 33 s, not 80 s, and all kernels together in 2 minutes, not 4. No method of numba is replaced
+  for it.
+* A dispatcher's `get_call_template`, through which calls are typed without the literal numbers in
+  them; a function would be
   compiled once more for each of these numbers. All kernels together compile in 124 s, not 147 s.
-* `FunctionCache`, its `_load_overload`, and `rtsys`, with which compiled code is loaded from disk without the registries of all
-  that numba could compile: 0.25 s, not 2.0 s, at every start. `IndexDataCacheFile`, whose files get a digest, buys safety.
+* `FunctionCache`, its `_load_overload`, and `rtsys`, with which compiled code is loaded from disk
+  without the registries of all
+  that numba could compile: 0.25 s, not 2.0 s, at every start. `IndexDataCacheFile`, whose files get
+  a digest, buys safety.
 * The option `_nrt`, which turns reference counting off where no array is made.
-* A compile result's `entry_point`: a call with five functions as arguments takes 0.2 us, not 11 us, and a Ctrl-C within it is not
-  lost. Its `library`, which gives a function's address; `cfunc` gives the same, but compiles once more.
+* A compile result's `entry_point`: a call with five functions as arguments takes 0.2 us, not 11 us,
+  and a Ctrl-C within it is not
+  lost. Its `library`, which gives a function's address; `cfunc` gives the same, but compiles once
+  more.
 
-One part is needed: `AttributeTemplate`, without which the fields of a named tuple cannot be attributes of its `Reference`.
+One part is needed: `AttributeTemplate`, without which the fields of a named tuple cannot be
+attributes of its `Reference`.
 """
 
 from __future__ import annotations
@@ -38,8 +48,8 @@ from saltus.taylor.cache import undamaged, with_digest
 from saltus.taylor.numba_types import Pointer, Reference, field_type, function_type
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
-# For functions that only compiled code calls: numba writes no wrappers. If they also make no arrays, it counts no references,
-# which would cost more than the work between two calls.
+# For functions that only compiled code calls: numba writes no wrappers. If they also make no
+# arrays, it counts no references, which would cost more than the work between two calls.
 WITHIN: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LEAN: dict[str, Any] = {"_nrt": False} | WITHIN
 
@@ -75,7 +85,10 @@ def _njit(within: bool = False, **options: Any) -> Callable[[Any], Any]:
 
     def decorated(function: Any) -> Any:
         if is_plain():
-            return njit(**OPTIONS | {name: value for name, value in options.items() if not name.startswith("_")})(function)
+            return njit(
+                **OPTIONS
+                | {name: value for name, value in options.items() if not name.startswith("_")}
+            )(function)
         more = {"pipeline_class": _linked_only()} if within else {}
         dispatcher = njit(**OPTIONS | options | more)(function)
         template = dispatcher.get_call_template
@@ -86,13 +99,18 @@ def _njit(within: bool = False, **options: Any) -> Callable[[Any], Any]:
 
 
 def _without_values(args: Any, kws: Any) -> tuple[Any, Any]:
-    """The types of a call's arguments with literal numbers made general: numba would compile anew for each literal."""
-    return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
+    """The types of a call's arguments with literal numbers made general: numba would compile anew
+    for each literal.
+    """
+    return tuple(map(types.unliteral, args)), {
+        name: types.unliteral(kind) for name, kind in kws.items()
+    }
 
 
 @cache
 def _linked_only() -> Any:
-    """numba's compiler for functions that others of a kernel call: they become parts of its machine code and get none.
+    """numba's compiler for functions that others of a kernel call: they become parts of its machine
+    code and get none.
 
     numba would optimise each by itself, with all that it calls, and make machine code of it.
     """
@@ -105,13 +123,21 @@ def _linked_only() -> Any:
         def _finalize_final_module(self) -> None:
             self._finalized = True
 
-    @_private("numba.core.compiler_machinery", "register_pass")(mutates_CFG=True, analysis_only=False)  # as `NativeLowering`
+    # as `NativeLowering`
+    @_private("numba.core.compiler_machinery", "register_pass")(
+        mutates_CFG=True, analysis_only=False
+    )
     class Linking(lowering):  # type: ignore[misc,valid-type]
         _name = "saltus_linking"
 
         def run_pass(self, state: Any) -> bool:
-            """Write the function into a library that is only linked; others find it by a key that nothing else has."""
-            state.library, state.flags.no_compile = Linked(state.targetctx.codegen(), state.func_id.func_qualname), True
+            """Write the function into a library that is only linked; others find it by a key that
+            nothing else has.
+            """
+            state.library, state.flags.no_compile = (
+                Linked(state.targetctx.codegen(), state.func_id.func_qualname),
+                True,
+            )
             mutated: bool = super().run_pass(state)
             key = list[None]().append
             state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
@@ -121,8 +147,13 @@ def _linked_only() -> Any:
     class Compiler(_private("numba.core.compiler", "CompilerBase")):  # type: ignore[misc]
         def define_pipelines(self) -> list[Any]:
             """numba's own passes with another last step."""
-            made = _private("numba.core.compiler", "DefaultPassBuilder").define_nopython_pipeline(self.state)
-            made.passes = [(Linking if each is lowering else each, description) for each, description in made.passes]
+            made = _private("numba.core.compiler", "DefaultPassBuilder").define_nopython_pipeline(
+                self.state
+            )
+            made.passes = [
+                (Linking if each is lowering else each, description)
+                for each, description in made.passes
+            ]
             return [made]
 
     return Compiler
@@ -130,14 +161,17 @@ def _linked_only() -> Any:
 
 jit = _njit(_nrt=True, within=True, **WITHIN)
 lean_jit = _njit(within=True, **LEAN)
-inline_jit = _njit(within=True, **LEAN, forceinline=True)  # for functions that every step of the lanes calls
+# for functions that every step of the lanes calls
+inline_jit = _njit(within=True, **LEAN, forceinline=True)
 
 
 def llvm_of(function: Any, signature: Any) -> tuple[str, str]:
-    """LLVM's text of a function with all that it calls, without machine code, and the function's name in it.
+    """LLVM's text of a function with all that it calls, without machine code, and the function's
+    name in it.
 
-    For another processor the text is needed as numba writes it, before any optimisation folds the size of this one's pointers
-    into it: so in a process with NUMBA_OPT=0, which must not have compiled anything else before.
+    For another processor the text is needed as numba writes it, before any optimisation folds the
+    size of this one's pointers into it: so in a process with NUMBA_OPT=0, which must not have
+    compiled anything else before.
     """
     dispatcher = jit(function)
     dispatcher.compile(signature)
@@ -163,25 +197,32 @@ def name_attributes(kind: type, of: Callable[[Any, str], Any]) -> None:
 name_attributes(Reference, field_type)
 
 
-# --- compiled at once, and kept on disk ------------------------------------------------------------------------------------
+# --- compiled at once, and kept on disk --------------------------------------
 
 
 @cache
 def _kept() -> Any:
-    """A class for a cache on disk that is read without the registries of all that numba could compile."""
-    runtime, base = _private("numba.core.runtime", "rtsys"), _private("numba.core.caching", "FunctionCache")
+    """A class for a cache on disk that is read without the registries of all that numba could
+    compile.
+    """
+    runtime = _private("numba.core.runtime", "rtsys")
+    base = _private("numba.core.caching", "FunctionCache")
 
     class Kept(base):  # type: ignore[misc,valid-type]
         def __init__(self, py_func: Any) -> None:
             super().__init__(py_func)
-            # Beside the source, in a folder of the user's own: numba's settings could name any other folder.
-            self._cache_path = os.path.join(os.path.dirname(py_func.__code__.co_filename), "__pycache__")
+            # Beside the source, in a folder of the user's own: numba's settings could name any
+            # other folder.
+            self._cache_path = os.path.join(
+                os.path.dirname(py_func.__code__.co_filename), "__pycache__"
+            )
             stamp = self._impl.locator.get_source_stamp()
             self._cache_file = _with_digests()(self._cache_path, self._impl.filename_base, stamp)
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code for a signature, or None."""
-            runtime.initialize(target_context)  # numba cannot count references to arrays before this
+            # numba cannot count references to arrays before this
+            runtime.initialize(target_context)
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
 
@@ -190,7 +231,9 @@ def _kept() -> Any:
 
 @cache
 def _with_digests() -> Any:
-    """A class for numba's files of compiled code that appends a digest of their bytes, behind the part that numba reads."""
+    """A class for numba's files of compiled code that appends a digest of their bytes, behind the
+    part that numba reads.
+    """
     base = _private("numba.core.caching", "IndexDataCacheFile")
     for name in ("_open_for_write", "_load_index", "_load_data"):
         getattr(base, name)
@@ -208,7 +251,8 @@ def _with_digests() -> Any:
 
         def _load_data(self, name: str) -> Any:
             if undamaged(self._data_path(name)) is None:
-                raise OSError("damaged")  # numba then compiles it again, as if the file were missing
+                # numba then compiles it again, as if the file were missing
+                raise OSError("damaged")
             return super()._load_data(name)
 
     return CheckedFile
@@ -229,7 +273,9 @@ def _compiled(signature: Any, **options: Any) -> Callable[[Any], Any]:
 
 
 def cached_jit(signature: Any, nogil: bool = False) -> Callable[[Any], Any]:
-    """Compile for one signature at once, and keep the result on disk; if asked, without Python's lock."""
+    """Compile for one signature at once, and keep the result on disk; if asked, without Python's
+    lock.
+    """
     return _compiled(signature, nogil=nogil)
 
 
@@ -238,7 +284,7 @@ def pointed_jit(signature: Any) -> Callable[[Any], Any]:
     return _compiled(signature, _nrt=False, no_cpython_wrapper=True)
 
 
-# --- calls -----------------------------------------------------------------------------------------------------------------
+# --- calls -------------------------------------------------------------------
 
 
 def entry_point(function: Any) -> Callable[..., Any]:

@@ -1,13 +1,15 @@
 """The elementary functions, each in one rule, and the Taylor recurrences of arithmetic.
 
-An elementary function y = f(u) is added to everything (tracing, derivatives, one motion, ensembles) by one entry of FUNCTIONS
-under its name in the C library: NumPy's function, its slope f'(u) in terms of u and y, written with NumPy, and optional
-properties. The Taylor coefficients follow from y' = f'(u) u', as the slope is a series like any other,
+An elementary function y = f(u) is added to everything (tracing, derivatives, one motion, ensembles)
+by one entry of FUNCTIONS under its name in the C library: NumPy's function, its slope f'(u) in
+terms of u and y, written with NumPy, and optional properties. The Taylor coefficients follow from
+y' = f'(u) u', as the slope is a series like any other,
 
     k y_k = sum_{j=1}^{k} j u_j s_{k-j},    s = f'(u).
 
-If there is a recurrence that needs no series of the slope, as for the logarithm, the entry gives it. The tests go through the
-table and compare each function's coefficients with 40 digits (tests/taylor/test_series.py).
+If there is a recurrence that needs no series of the slope, as for the logarithm, the entry gives
+it. The tests go through the table and compare each function's coefficients with 40 digits
+(tests/taylor/test_series.py).
 """
 
 from __future__ import annotations
@@ -18,12 +20,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.taylor.vectors import CACHE_LINE, LONG, Coefficient, ColumnInputs, Vec, add, loop, multiply, subtract
+from saltus.taylor.vectors import (
+    CACHE_LINE,
+    LONG,
+    Coefficient,
+    ColumnInputs,
+    Vec,
+    add,
+    loop,
+    multiply,
+    subtract,
+)
 
 if TYPE_CHECKING:
     from saltus.taylor.series import Series
 
-Rule = Callable[..., None]  # arguments: the writer, the node's own series (still without this order), its operands' series
+# arguments: the writer, the node's own series (still without this order), its operands' series
+Rule = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -32,9 +45,10 @@ class Function:
 
     numpy: Callable[..., Any]
     slope: Callable[[Any, Any], Any]  # f'(u) of u and y
-    increasing: bool = False  # wherever it is defined: its bounds over an interval are then its values at the ends
-    # Whether the function may change steeply within a step although its Taylor terms are below rounding at the step's start;
-    # steps are then checked.
+    # wherever it is defined: its bounds over an interval are then its values at the ends
+    increasing: bool = False
+    # Whether the function may change steeply within a step although its Taylor terms are below
+    # rounding at the step's start; steps are then checked.
     steep: bool = False
     recurrence: Rule | None = None  # used in place of the recurrence that follows from the slope
 
@@ -75,7 +89,9 @@ def _quotient(w: Series, own: Row, a: Row, b: Row) -> None:
 
 
 def _power(w: Series, own: Row, u: Row, exponent: Row) -> None:
-    """u y' = p u' y for y = u^p: k u_0 y_k = p sum_{j=1}^{k} j u_j y_{k-j} - sum_{j=1}^{k-1} u_j (k - j) y_{k-j}."""
+    """u y' = p u' y for y = u^p: k u_0 y_k = p sum_{j=1}^{k} j u_j y_{k-j} - sum_{j=1}^{k-1} u_j (k
+    - j) y_{k-j}.
+    """
     p = exponent.first[0]
     if w.starts:
         w.push(own, w.start(u).function("pow", p))
@@ -90,9 +106,17 @@ def _sum_of(combined: Callable[[Coefficient, Coefficient], Coefficient]) -> Rule
     return lambda w, own, a, b: w.push(own, combined(w.now(a), w.now(b)))
 
 
-ARITHMETIC: dict[str, Rule] = {"add": _sum_of(add), "sub": _sum_of(subtract), "mul": _product, "div": _quotient, "pow": _power}
+ARITHMETIC: dict[str, Rule] = {
+    "add": _sum_of(add),
+    "sub": _sum_of(subtract),
+    "mul": _product,
+    "div": _quotient,
+    "pow": _power,
+}
 FUNCTIONS: dict[str, Function] = {
-    "sqrt": Function(np.sqrt, lambda u, y: 1.0 / (2.0 * y), increasing=True, recurrence=_square_root),
+    "sqrt": Function(
+        np.sqrt, lambda u, y: 1.0 / (2.0 * y), increasing=True, recurrence=_square_root
+    ),
     "exp": Function(np.exp, lambda u, y: y, increasing=True, steep=True),
     "log": Function(np.log, lambda u, y: 1.0 / u, increasing=True, recurrence=_logarithm),
     "sin": Function(np.sin, lambda u, y: np.cos(u)),
@@ -108,10 +132,12 @@ FUNCTIONS: dict[str, Function] = {
 class SeriesSettings:
     """How the code of series is laid out."""
 
-    # The most products in an inner loop, whose sums and loaded coefficients fit into the registers of AVX-512 and of AVX2.
+    # The most products in an inner loop, whose sums and loaded coefficients fit into the registers
+    # of AVX-512 and of AVX2.
     most_sums: int = 3
-    # The highest degree of a polynomial whose vanishing coefficients are left out of the sums. The orders that are written out
-    # for it must be fewer than the lowest order of an ensemble's series.
+    # The highest degree of a polynomial whose vanishing coefficients are left out of the sums. The
+    # orders that are written out for it must be fewer than the lowest order of an ensemble's
+    # series.
     most_ending: int = 7
 
 
@@ -120,7 +146,9 @@ SETTINGS = SeriesSettings()
 
 @dataclass(eq=False)
 class Row:
-    """One series: its coefficients of the first orders, and those of a pair of orders as far as they are known."""
+    """One series: its coefficients of the first orders, and those of a pair of orders as far as
+    they are known.
+    """
 
     degree: int | None  # above which all coefficients vanish; None where it does not end
     early: bool  # whether the coefficient k of a pair is known before the sums are
@@ -133,13 +161,19 @@ class Loops:
     """Writes the loops over modes, and over the columns of a tangent, at each order of a series."""
 
     def __init__(self, series: Any, rows: Any, inputs: list[Any]) -> None:
-        self.series, self.rows, self.block, self.b = series, rows, rows.modes, series.builder
+        self.series = series
+        self.rows = rows
+        self.block = rows.modes
+        self.b = series.builder
         self._inputs = dict(zip(rows.expressions, inputs, strict=True))  # their rows
         memory = series.memory
-        self._rows = [memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)]
+        self._rows = [
+            memory.pointer(place) for place in (rows.positions, rows.velocities, rows.accelerations)
+        ]
         array = memory.arguments[rows.positions[0]]
         self._stride = LONG(series.layout.capacity) if len(array.shape) == 1 else array.shape[1]
-        self._dof, self._forms = LONG(rows.dof), list[Any]()
+        self._dof = LONG(rows.dof)
+        self._forms = list[Any]()
         if self.block is not None:
             self._forms = list(self.block.forms)
             self._data = memory.pointer(memory.leaves["datum"])
@@ -164,7 +198,10 @@ class Loops:
             if kind in leaves:
                 given = self.series.memory.pointer(leaves[kind])
                 local = self._dof if self.block is None else LONG(self.block.first)
-                for begin, end, first in ((0, int(self.block is not None), local), (1, 1 + self.rows.columns, LONG(0))):
+                for begin, end, first in (
+                    (0, int(self.block is not None), local),
+                    (1, 1 + self.rows.columns, LONG(0)),
+                ):
                     if begin < end:
                         self._copy_columns(begin, end, first, which, given)
 
@@ -176,14 +213,21 @@ class Loops:
                 self._store(self._place(which, row, LONG(0)), self._load(self.b.gep(given, [row])))
 
     def sums(self) -> None:
-        """Compute all sums over modes at order 0; those of the next orders come with the modes' coefficients (`_columns`)."""
-        forms, b = self._forms, self.b
+        """Compute all sums over modes at order 0; those of the next orders come with the modes'
+        coefficients (`_columns`).
+        """
+        forms = self._forms
+        b = self.b
         if not forms or not self.series.starts:
             return
         with loop(self.b, 0, 1 + self.rows.columns) as j:
             base = b.add(b.mul(j, self._dof), LONG(self.block.first))
             for f in range(len(forms)):
-                parts = [(w, lambda i, at=place: self._datum(i, at), base) for g, w, place in self._parts if g == f]
+                parts = [
+                    (w, lambda i, at=place: self._datum(i, at), base)
+                    for g, w, place in self._parts
+                    if g == f
+                ]
                 self._store(self._sum_of(j, f), self._total(parts))
 
     def value(self, form: Any) -> Vec:
@@ -192,13 +236,17 @@ class Loops:
 
     @property
     def _parts(self) -> list[tuple[int, int, int]]:
-        """The parts of the sums: the number of the sum, of amplitudes (0) or rates (1), and the place of the coefficient."""
+        """The parts of the sums: the number of the sum, of amplitudes (0) or rates (1), and the
+        place of the coefficient.
+        """
         given = [(f, which, form[which]) for f, form in enumerate(self._forms) for which in (0, 1)]
         return [(f, which, place) for f, which, place in given if place is not None]
 
     def _sum_of(self, column: Any, f: int) -> Any:
         """LLVM's pointer to a sum of a column."""
-        return self.b.gep(self._sums, [self.b.add(self.b.mul(column, LONG(len(self._forms))), LONG(f))])
+        return self.b.gep(
+            self._sums, [self.b.add(self.b.mul(column, LONG(len(self._forms))), LONG(f))]
+        )
 
     def advance(self) -> None:
         """Compute the accelerations of columns and modes at this order, and integrate them."""
@@ -207,7 +255,8 @@ class Loops:
         if self.block is None:
             return
         self._columns(0, 1, [each for each in self.block.inputs if not each.local])
-        begin, extra = 1, self.block.columns
+        begin = 1
+        extra = self.block.columns
         for column in range(1, 1 + self.rows.columns):
             if extra and extra[column - 1]:
                 self._columns(begin, column, [])
@@ -217,28 +266,43 @@ class Loops:
 
     def _advance_columns(self) -> None:
         """The local equations of all columns, some of them side by side."""
-        b, count = self.b, self.rows.columns
-        abreast = min(4, count)  # so many do not wait for their sums, and four columns are what two coordinates have
+        b = self.b
+        count = self.rows.columns
+        # so many do not wait for their sums, and four columns are what two coordinates have
+        abreast = min(4, count)
         self._pushes.store(lambda push: self.series.now(self._inputs[push]))
         with loop(b, 0, -(-count // abreast)) as group:
             places = [b.add(b.mul(group, LONG(abreast)), LONG(1 + u)) for u in range(abreast)]
-            places = [b.select(b.icmp_signed("<", place, LONG(count)), place, LONG(count)) for place in places]
-            bases = [[b.gep(row, [b.mul(b.mul(place, self._dof), self._stride)]) for row in self._rows] for place in places]
-            found = [self._column_sums(i, each, places, bases) for i, each in enumerate(self.rows.sums)]
+            places = [
+                b.select(b.icmp_signed("<", place, LONG(count)), place, LONG(count))
+                for place in places
+            ]
+            bases = [
+                [b.gep(row, [b.mul(b.mul(place, self._dof), self._stride)]) for row in self._rows]
+                for place in places
+            ]
+            found = [
+                self._column_sums(i, each, places, bases) for i, each in enumerate(self.rows.sums)
+            ]
             for i, totals in enumerate(found):
                 for base, total in zip(bases, totals, strict=True):
                     self._integrate_column(i, base, total)
 
     def _column_sums(self, i: int, each: Any, places: list[Any], bases: list[Any]) -> list[Vec]:
-        """A coordinate's acceleration, or velocity, in some columns at this order: sum_l sum_j s_lj x_l,k-j."""
-        b, series = self.b, self.series
+        """A coordinate's acceleration, or velocity, in some columns at this order: sum_l sum_j s_lj
+        x_l,k-j.
+        """
+        b = self.b
+        series = self.series
         totals = [self._pushes.of(i, b.sub(place, LONG(1))) for place in places]
         looped = list[Any]()
         for leaf, slope in each.terms:
             row = self._inputs[slope]
             for index, coefficient in self._newest(row):
                 for u, (place, base) in enumerate(zip(places, bases, strict=True)):
-                    totals[u] = self._lifted(coefficient).fma(self._of_column(leaf, place, base, index), totals[u])
+                    totals[u] = self._lifted(coefficient).fma(
+                        self._of_column(leaf, place, base, index), totals[u]
+                    )
             looped += [(leaf, row)] if series.ahead is not None and row.degree is None else []
         if not looped:
             return totals
@@ -247,50 +311,78 @@ class Loops:
             index = b.sub(self._order, j)
             there = [[b.gep(row, [index]) for row in base] for base in bases]
             for leaf, row in looped:
-                factor, which, offset = series._at(row, j), int(leaf.op == "velocity"), self._offsets[leaf.value]
+                factor = series._at(row, j)
+                which = int(leaf.op == "velocity")
+                offset = self._offsets[leaf.value]
                 states = [self._load(b.gep(at[which], [offset])) for at in there]
                 sums = [factor.fma(state, total) for state, total in zip(states, sums, strict=True)]
             after += sums
         return after
 
     def _newest(self, row: Any) -> list[tuple[Any, Any]]:
-        """The coefficients of a slope that need no memory, each with the order of what it is multiplied by."""
-        order, ahead = self.series.order, self.series.ahead
+        """The coefficients of a slope that need no memory, each with the order of what it is
+        multiplied by.
+        """
+        order = self.series.order
+        ahead = self.series.ahead
         if ahead is None:
             pairs = [(LONG(order - j), row.first[j]) for j in range(order + 1)]
         elif row.degree is None:
             pairs = [(LONG(ahead - j), row.pair[j]) for j in range(ahead + 1)]
         else:
-            pairs = [(self.b.add(order, LONG(ahead - j)), row.first[j]) for j in range(row.degree + 1)]
+            pairs = [
+                (self.b.add(order, LONG(ahead - j)), row.first[j]) for j in range(row.degree + 1)
+            ]
         return [(index, coefficient) for index, coefficient in pairs if coefficient is not None]
 
     def _of_column(self, leaf: Any, place: Any, base: Any, index: Any) -> Vec:
-        """A coefficient of what a column has in a leaf's place; of sums over modes there is that of this order alone."""
+        """A coefficient of what a column has in a leaf's place; of sums over modes there is that of
+        this order alone.
+        """
         if leaf.op == "form":
             return self._load(self._sum_of(place, self._forms.index(leaf.value)))
-        return self._load(self.b.gep(base[leaf.op == "velocity"], [self.b.add(self._offsets[leaf.value], index)]))
+        return self._load(
+            self.b.gep(base[leaf.op == "velocity"], [self.b.add(self._offsets[leaf.value], index)])
+        )
 
     def _integrate_column(self, i: int, base: Any, total: Vec) -> None:
-        """Put a coordinate's acceleration in a column, or of first order its velocity, into the series."""
-        b, order, series, offset = self.b, self._order, self.series, self._offsets[i]
-        now, following = b.add(offset, order), b.add(offset, b.add(order, LONG(1)))
-        pull, zero = total, self.series.memory.arithmetic.number(b, 0.0)
+        """Put a coordinate's acceleration in a column, or of first order its velocity, into the
+        series.
+        """
+        b = self.b
+        order = self._order
+        series = self.series
+        offset = self._offsets[i]
+        now = b.add(offset, order)
+        following = b.add(offset, b.add(order, LONG(1)))
+        pull = total
+        zero = self.series.memory.arithmetic.number(b, 0.0)
         if i in self.rows.first_order:
             self._store(b.gep(base[1], [now]), total)
             pull = zero
             if self.rows.with_accelerations and not series.starts:
-                number = self._lifted(float(series.order) if series.ahead is None else series._number + float(series.ahead))
+                number = self._lifted(
+                    float(series.order)
+                    if series.ahead is None
+                    else series._number + float(series.ahead)
+                )
                 self._store(b.gep(base[2], [b.sub(now, LONG(1))]), number * total)
         if self.rows.with_accelerations:
             self._store(b.gep(base[2], [now]), pull)
-        self._store(b.gep(base[0], [following]), series._divided(self._load(b.gep(base[1], [now])), 1))
+        self._store(
+            b.gep(base[0], [following]), series._divided(self._load(b.gep(base[1], [now])), 1)
+        )
         self._store(b.gep(base[1], [following]), series._divided(pull, 1))
 
     def _columns(self, begin: int, end: int, more: list[Any]) -> None:
-        """The modes of some columns, with inputs that are expressions, and the sums over their coefficients of the next order."""
+        """The modes of some columns, with inputs that are expressions, and the sums over their
+        coefficients of the next order.
+        """
         if begin >= end:
             return
-        b, block, series = self.b, self.block, self.series
+        b = self.b
+        block = self.block
+        series = self.series
         values = [(each, series.now(self._inputs[each.of])) for each in more]
         given = [(each, self._lifted(value)) for each, value in values if value is not None]
         inverse = series._divided(self._one, 1)
@@ -299,7 +391,13 @@ class Loops:
             local = [
                 (
                     each,
-                    self._load(self._place(int(each.of.op == "velocity"), b.add(base, LONG(each.of.value)), self._order)),
+                    self._load(
+                        self._place(
+                            int(each.of.op == "velocity"),
+                            b.add(base, LONG(each.of.value)),
+                            self._order,
+                        )
+                    ),
                 )
                 for each in block.inputs
                 if each.local
@@ -308,7 +406,9 @@ class Loops:
             after = list[Vec]()
             with self._over_modes(len(self._parts), after) as (i, before):
                 row = b.add(first, i)
-                amplitude, rate = (self._load(self._place(which, row, self._order)) for which in (0, 1))
+                amplitude, rate = (
+                    self._load(self._place(which, row, self._order)) for which in (0, 1)
+                )
                 total = -(self._datum(i, block.square) * amplitude)
                 if block.coupled:
                     start = b.add(b.mul(self._count, LONG(block.record)), b.mul(i, self._count))
@@ -320,11 +420,15 @@ class Loops:
                     total = factor.fma(value if each.sign > 0.0 else -value, total)
                 if begin == 0 or self.rows.with_accelerations:
                     self._store(self._place(2, row, self._order), total)
-                following, new = b.add(self._order, LONG(1)), (rate * inverse, total * inverse)
+                following = b.add(self._order, LONG(1))
+                new = (rate * inverse, total * inverse)
                 for which in (1, 0):
                     self._store(self._place(which, row, following), new[which])
                 parts = zip(self._parts, before, strict=True)
-                after += [self._datum(i, place).fma(new[which], sofar) for (_, which, place), sofar in parts]
+                after += [
+                    self._datum(i, place).fma(new[which], sofar)
+                    for (_, which, place), sofar in parts
+                ]
             sums: dict[int, Vec] = {}
             for (f, _, _), value in zip(self._parts, after, strict=True):
                 sums[f] = sums[f] + value if f in sums else value
@@ -334,7 +438,8 @@ class Loops:
     @property
     def _order(self) -> Any:
         """This order, as LLVM's number."""
-        order, ahead = self.series.order, self.series.ahead
+        order = self.series.order
+        ahead = self.series.ahead
         return LONG(order) if ahead is None else self.b.add(order, LONG(ahead))
 
     @property
@@ -343,10 +448,14 @@ class Loops:
         return one
 
     def _lifted(self, value: Any) -> Vec:
-        return value if isinstance(value, Vec) else self.series.memory.arithmetic.number(self.b, value)
+        return (
+            value if isinstance(value, Vec) else self.series.memory.arithmetic.number(self.b, value)
+        )
 
     def _place(self, which: int, row: Any, index: Any) -> Any:
-        """LLVM's pointer to a coefficient of a coordinate (0), of its rate (1) or of its acceleration (2)."""
+        """LLVM's pointer to a coefficient of a coordinate (0), of its rate (1) or of its
+        acceleration (2).
+        """
         return self.b.gep(self._rows[which], [self.b.add(self.b.mul(row, self._stride), index)])
 
     def _datum(self, i: Any, place: int) -> Vec:
@@ -364,17 +473,27 @@ class Loops:
         self.b.store(value.value, pointer).align = 8
 
     def _total(self, parts: list[tuple[int, Any, Any]]) -> Vec:
-        """The sum over modes of coefficients, which are functions of the mode, times coordinates or rates, from a row on."""
+        """The sum over modes of coefficients, which are functions of the mode, times coordinates or
+        rates, from a row on.
+        """
         after = list[Vec]()
         with self._over_modes(1, after) as (i, (total,)):
             for which, factor, base in parts:
-                total = factor(i).fma(self._load(self._place(which, self.b.add(base, i), self._order)), total)
+                total = factor(i).fma(
+                    self._load(self._place(which, self.b.add(base, i), self._order)), total
+                )
             after.append(total)
         return after[0]
 
     def _over_modes(self, carried: int, after: list[Vec]) -> Any:
         """A loop over the modes, and through it so many numbers that begin with 0."""
-        return loop(self.b, 0, self._count, [self.series.memory.arithmetic.number(self.b, 0.0)] * carried, after)
+        return loop(
+            self.b,
+            0,
+            self._count,
+            [self.series.memory.arithmetic.number(self.b, 0.0)] * carried,
+            after,
+        )
 
 
 def needs_sums(op: str, degrees: list[int | None]) -> bool:
@@ -385,10 +504,15 @@ def needs_sums(op: str, degrees: list[int | None]) -> bool:
 
 
 def loops_of(series: Series, roots: list[int]) -> Loops | None:
-    """The loops over modes and columns, if there are any: the last of the roots that are kept are what they read."""
-    rows, last = series.layout.loops, len(series.layout.roots)
+    """The loops over modes and columns, if there are any: the last of the roots that are kept are
+    what they read.
+    """
+    rows = series.layout.loops
+    last = len(series.layout.roots)
     if rows is None:
         return None
-    loops = Loops(series, rows, [series.rows[root] for root in roots[last - len(rows.expressions) : last]])
+    loops = Loops(
+        series, rows, [series.rows[root] for root in roots[last - len(rows.expressions) : last]]
+    )
     loops.begin()
     return loops

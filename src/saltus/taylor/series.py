@@ -1,12 +1,14 @@
-"""The Taylor coefficients of all nodes of a tape in LLVM's code, for one motion or for all lanes, two orders at a time.
+"""The Taylor coefficients of all nodes of a tape in LLVM's code, for one motion or for all lanes,
+two orders at a time.
 
-The first orders are written out, every coefficient in a register. The others are a loop over pairs of orders k, k + 1, in which
-a product of two series takes for both orders a sum over coefficients that lie in memory,
+The first orders are written out, every coefficient in a register. The others are a loop over pairs
+of orders k, k + 1, in which a product of two series takes for both orders a sum over coefficients
+that lie in memory,
 
     sum_{j=1}^{k-1} a_j b_{k-j}    and    sum_{j=1}^{k-1} a_j b_{k+1-j}.
 
-An inner loop computes both (`InnerLoop`). The terms with the newest coefficients are added after it. A series that ends, such as
-that of the time, needs no loop: its few terms are written out.
+An inner loop computes both (`InnerLoop`). The terms with the newest coefficients are added after
+it. A series that ends, such as that of the time, needs no loop: its few terms are written out.
 """
 
 from __future__ import annotations
@@ -39,9 +41,10 @@ from saltus.taylor.vectors import (
 class Rows:
     """The places of the coefficients of a motion, and their largest number.
 
-    The first roots of the tape are the accelerations, one for each position; of a position in `first_order` its velocity, so that
-    this row of `velocities` is computed and not integrated, and its acceleration has one coefficient less. With `any_order` the
-    function's argument `order` is the highest order of the roots, odd or even; else it is the number of their orders, even and at
+    The first roots of the tape are the accelerations, one for each position; of a position in
+    `first_order` its velocity, so that this row of `velocities` is computed and not integrated, and
+    its acceleration has one coefficient less. With `any_order` the function's argument `order` is
+    the highest order of the roots, odd or even; else it is the number of their orders, even and at
     least that of the orders written out.
     """
 
@@ -60,12 +63,24 @@ class Series:
     """Writes the series of all nodes, order by order."""
 
     def __init__(self, memory: Memory, tape: Tape, layout: Rows) -> None:
-        self.memory, self.builder, self.nodes, self.layout = memory, memory.builder, tape.nodes, layout
+        self.memory, self.builder, self.nodes, self.layout = (
+            memory,
+            memory.builder,
+            tape.nodes,
+            layout,
+        )
         self.order: Any = 0  # a number among the first orders, then LLVM's number k of a pair
-        self.ahead: int | None = None  # of a pair: 0 at order k, 1 at order k + 1; None among the first
+        # of a pair: 0 at order k, 1 at order k + 1; None among the first
+        self.ahead: int | None = None
         own = layout.coordinates or range(len(layout.positions))
-        self.positions = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.positions, strict=True)}
-        self.velocities = {i: Row(None, True, place=memory.pointer(at)) for i, at in zip(own, layout.velocities, strict=True)}
+        self.positions = {
+            i: Row(None, True, place=memory.pointer(at))
+            for i, at in zip(own, layout.positions, strict=True)
+        }
+        self.velocities = {
+            i: Row(None, True, place=memory.pointer(at))
+            for i, at in zip(own, layout.velocities, strict=True)
+        }
         self.loops: Any = None
         self._nodes: dict[int, Node] = {}  # the node of each row, by the row's id
         self._scaled: dict[int, Row] = {}
@@ -79,7 +94,10 @@ class Series:
         for node in tape.nodes:
             self.rows.append(self._row(node))
             self._nodes.setdefault(id(self.rows[-1]), node)
-        self._slopes = [(layout.velocities[i], layout.roots[i], self.rows[tape.roots[i]]) for i in layout.first_order]
+        self._slopes = [
+            (layout.velocities[i], layout.roots[i], self.rows[tape.roots[i]])
+            for i in layout.first_order
+        ]
         for i in layout.first_order:
             self.velocities[i] = self.rows[tape.roots[i]]
         kept = [row for i, row in self.velocities.items() if i not in layout.first_order]
@@ -103,7 +121,9 @@ class Series:
         return Row(ends if ends is None or ends <= SETTINGS.most_ending else None, early)
 
     def write_motion(self, roots: list[int]) -> None:
-        """Write all orders of a motion, whose accelerations are the first roots, and put them into memory."""
+        """Write all orders of a motion, whose accelerations are the first roots, and put them into
+        memory.
+        """
         first_order = self.layout.first_order
         for rows, kind in ((self.positions, "coordinate"), (self.velocities, "velocity")):
             for i, row in rows.items():
@@ -119,7 +139,10 @@ class Series:
             for i, (place, root) in enumerate(zip(self.layout.roots, roots, strict=False))
             if place and i not in first_order
         ]
-        slopes: list[Any] = [(*(place and self.memory.pointer(place) for place in places), row) for *places, row in self._slopes]
+        slopes: list[Any] = [
+            (*(place and self.memory.pointer(place) for place in places), row)
+            for *places, row in self._slopes
+        ]
         numbers = zip(self.layout.numbers, roots[len(self.layout.roots) :], strict=True)
         self.loops = loops_of(self, roots)
         for _ in self._each_order():
@@ -141,11 +164,15 @@ class Series:
             if self.loops is not None:
                 self.loops.advance()
 
-    # --- the orders ------------------------------------------------------------------------------------------------------------
+    # --- the orders ----------------------------------------------------------
 
     def _each_order(self) -> Iterator[None]:
-        """Iterate over all orders; code that is written in an iteration is for one of the first orders, or for one of a pair."""
-        b, any_order, order = self.builder, self.layout.any_order, self.memory.arguments["order"]
+        """Iterate over all orders; code that is written in an iteration is for one of the first
+        orders, or for one of a pair.
+        """
+        b = self.builder
+        any_order = self.layout.any_order
+        order = self.memory.arguments["order"]
         order = b.add(order, LONG(1)) if any_order else order
         end = b.append_basic_block("end")
         for k in range(self.written_out):
@@ -153,7 +180,10 @@ class Series:
             if any_order and k:
                 self._go_on_if(b.icmp_signed("<", LONG(k), order), end)
             yield
-        first, self._head, newest = b.block, *(b.append_basic_block(name) for name in ("pair", "newest"))
+        first, self._head, newest = (
+            b.block,
+            *(b.append_basic_block(name) for name in ("pair", "newest")),
+        )
         b.cbranch(b.icmp_signed("<", LONG(self.written_out), order), self._head, end)
         b.position_at_end(self._head)
         self.order = b.phi(LONG)
@@ -190,7 +220,8 @@ class Series:
     def _advance(self) -> None:
         """Append the coefficient of this order to every node's series."""
         for row, node in zip(self.rows, self.nodes, strict=True):
-            op, ended = node[0], self.ahead is not None and row.degree is not None
+            op = node[0]
+            ended = self.ahead is not None and row.degree is not None
             if ended or op in ("coordinate", "velocity"):
                 continue
             if op in (*LEAVES, "constant"):
@@ -220,15 +251,17 @@ class Series:
         return 1.0 if node[0] == "time" and self.order == 1 else None
 
     def _integrate(self, row: Row, slope: Coefficient) -> None:
-        """Append to a position or velocity the coefficient of the next order, from that of its derivative at this one."""
+        """Append to a position or velocity the coefficient of the next order, from that of its
+        derivative at this one.
+        """
         value = self._divided(slope, 1)
         if self.ahead != 1:
             self.push(row, value)
         self._write(row.place, value, 1)
 
     def _write_slope(self, velocity: Any, acceleration: Any, value: Coefficient) -> None:
-        """Put a coefficient of a velocity that is computed into memory, and that of its derivative one order below; those that
-        would come next are 0."""
+        """Put a coefficient of a velocity that is computed into memory, and that of its derivative
+        one order below; those that would come next are 0."""
         self._write(velocity, value)
         self._write(velocity, None, 1)
         if acceleration is not None:
@@ -239,10 +272,14 @@ class Series:
 
     def _write(self, place: Any, value: Coefficient, more: int = 0) -> None:
         """Put a coefficient of this order, or of a following one, into a series in memory."""
-        index = LONG(self.order + more) if self.ahead is None else self.builder.add(self.order, LONG(self.ahead + more))
+        index = (
+            LONG(self.order + more)
+            if self.ahead is None
+            else self.builder.add(self.order, LONG(self.ahead + more))
+        )
         self._put(place, index, value)
 
-    # --- what a rule uses ------------------------------------------------------------------------------------------------------
+    # --- what a rule uses ----------------------------------------------------
 
     @property
     def starts(self) -> bool:
@@ -277,7 +314,9 @@ class Series:
         return row
 
     def _scaled_now(self, u: Row) -> Coefficient:
-        """j u_j at this order of a pair; from velocities, which are known sooner, if u is made of positions and constants."""
+        """j u_j at this order of a pair; from velocities, which are known sooner, if u is made of
+        positions and constants.
+        """
         op, *places = self._nodes.get(id(u), ("",))
         if op == "coordinate":
             return self._back(self.velocities[places[0]], 1)
@@ -299,7 +338,8 @@ class Series:
         """A number divided by coefficient 0 of a series."""
         if value is None:
             return None
-        arithmetic, start = self.memory.arithmetic, self.start(row)
+        arithmetic = self.memory.arithmetic
+        start = self.start(row)
         if not arithmetic.divides and id(row) not in self._inverses:
             self._inverses[id(row)] = start.inverse()
         if arithmetic.divides or (arithmetic.exact and self.ahead is None):
@@ -307,13 +347,25 @@ class Series:
         return quotient(value, *self._inverses[id(row)])
 
     def product(self, a: Row, b: Row, first: bool = True, last: bool = True) -> Coefficient:
-        """sum_{j=0}^{k} a_j b_{k-j} for this order k; without a_0 b_k if not `first`, without a_k b_0 if not `last`."""
+        """sum_{j=0}^{k} a_j b_{k-j} for this order k; without a_0 b_k if not `first`, without a_k
+        b_0 if not `last`.
+        """
         if self.ahead is None:
             k = self.order
-            return dot([(a.first[j], b.first[k - j]) for j in range(0 if first else 1, k + 1 if last else k)])
+            return dot(
+                [
+                    (a.first[j], b.first[k - j])
+                    for j in range(0 if first else 1, k + 1 if last else k)
+                ]
+            )
         for one, other, whole in ((a, b, first), (b, a, last)):
             if one.degree is not None:
-                return dot([(one.first[j], self._back(other, j)) for j in range(one.degree, -1 if whole else 0, -1)])
+                return dot(
+                    [
+                        (one.first[j], self._back(other, j))
+                        for j in range(one.degree, -1 if whole else 0, -1)
+                    ]
+                )
         forward, backward = (a, b) if b.early or not a.early else (b, a)
         newest = [(b.early, a.first[0], self.now(b))] if first else []
         newest += [(a.early, self.now(a), b.first[0])] if last else []
@@ -321,9 +373,11 @@ class Series:
             newest += [(False, forward.pair[0], backward.first[1])]
             newest += [] if backward.early else [(False, forward.first[1], backward.pair[0])]
         newest.sort(key=lambda term: not term[0])  # terms that are known last are added last
-        return dot([(one, other) for _, one, other in newest], self._earlier(forward, backward)[self.ahead])
+        return dot(
+            [(one, other) for _, one, other in newest], self._earlier(forward, backward)[self.ahead]
+        )
 
-    # --- memory ----------------------------------------------------------------------------------------------------------------
+    # --- memory --------------------------------------------------------------
 
     def _is_known(self, row: Row) -> bool:
         return len(row.first) > self.order if self.ahead is None else len(row.pair) > self.ahead
@@ -339,12 +393,18 @@ class Series:
         if arithmetic.divides:
             return value / (self._number + float(self.ahead + more))
         index = self.builder.add(self.order, LONG(self.ahead + more))
-        parts = [self.builder.load(self.builder.gep(table, [LONG(0), index])) for table in self._tables]
+        parts = [
+            self.builder.load(self.builder.gep(table, [LONG(0), index])) for table in self._tables
+        ]
         return quotient(value, *(arithmetic.everywhere(self.builder, part) for part in parts))
 
     def _before_sums(self, row: Row) -> AbstractContextManager[Any]:
-        """The place for the code of a series' coefficient: before the sums if all that it needs is known there."""
-        return self.builder.goto_block(self._head) if self.ahead == 0 and row.early else nullcontext()
+        """The place for the code of a series' coefficient: before the sums if all that it needs is
+        known there.
+        """
+        return (
+            self.builder.goto_block(self._head) if self.ahead == 0 and row.early else nullcontext()
+        )
 
     def _back(self, row: Row, j: int) -> Coefficient:
         """A row's coefficient j orders below the present one, while a pair of orders is written."""
@@ -381,7 +441,11 @@ class Series:
                 row.place = self.builder.alloca(self._kind, self.layout.capacity)
             row.place.align = min(CACHE_LINE, 8 * self.memory.arithmetic.width)
             self._kept.append(row)
-        return Vec(self.builder, self.memory.load_from(self.builder.gep(row.place, [index])), self.memory.arithmetic)
+        return Vec(
+            self.builder,
+            self.memory.load_from(self.builder.gep(row.place, [index])),
+            self.memory.arithmetic,
+        )
 
     def _put(self, place: Any, index: Any, value: Coefficient) -> None:
         self.builder.store(self.memory.value(value), self.builder.gep(place, [index])).align = 8
@@ -391,7 +455,9 @@ class Series:
         return self.memory.arithmetic.of(DOUBLE)
 
     def _keep(self, row: Row, first: Any) -> None:
-        """Keep a series in memory: its first orders from the block `first` on, and the orders of pairs from here on."""
+        """Keep a series in memory: its first orders from the block `first` on, and the orders of
+        pairs from here on.
+        """
         ended = [None] * (self.layout.capacity - len(row.first)) if row.degree is not None else []
         with self.builder.goto_block(first):
             for j, value in enumerate([*row.first, *ended]):

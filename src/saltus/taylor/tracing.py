@@ -1,4 +1,6 @@
-"""From a system to its structure: the expressions of the motion with symbols for every number, and the numbers beside them."""
+"""From a system to its structure: the expressions of the motion with symbols for every number, and
+the numbers beside them.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,16 @@ from saltus.taylor.graph import (
     uses_velocity,
 )
 from saltus.taylor.load_tables import LoadTime
-from saltus.taylor.memory import ColumnSum, LoopRows, ModeBlock, ModeInput, leaves_of, local_parts, mode_block, without_modes
+from saltus.taylor.memory import (
+    ColumnSum,
+    LoopRows,
+    ModeBlock,
+    ModeInput,
+    leaves_of,
+    local_parts,
+    mode_block,
+    without_modes,
+)
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -45,36 +56,43 @@ FREQUENCY = "load.frequency"
 
 @dataclass(eq=False)
 class Trace:
-    """The expressions of a system's motion; leaves are the time, the coordinates, the velocities, the side and the parameters.
+    """The expressions of a system's motion; leaves are the time, the coordinates, the velocities,
+    the side and the parameters.
 
-    `acceleration`, one for each coordinate; `gap` and `gap_rate` (its derivative to the coordinate at contact); `contact`;
-    `contact_acceleration`, the second derivative of the gap at rest at contact, a function of the time alone, and
-    `contact_damping`, minus its derivative to the velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
+    `acceleration`, one for each coordinate; `gap` and `gap_rate` (its derivative to the coordinate
+    at contact); `contact`; `contact_acceleration`, the second derivative of the gap at rest at
+    contact, a function of the time alone, and `contact_damping`, minus its derivative to the
+    velocity; `next_side` and `velocity_after`, the reset; `margins` to stop at.
 
-    A model with several contacts has `reactions`; `mass`, the mass matrix row by row; `restitution`, the rows of E; `positions`.
-    Its leaves include `free`, 1 for each coordinate that no contact holds, else 0. With frictions there are, behind the
-    reactions, the two margins of each (`stick_margins`), `ground_speeds`, and the leaves `slide`, the direction in which each
-    slides, 0 if it sticks. A surface has rows as a friction, with margins of 1, its position, and its side.
+    A model with several contacts has `reactions`; `mass`, the mass matrix row by row;
+    `restitution`, the rows of E; `positions`. Its leaves include `free`, 1 for each coordinate that
+    no contact holds, else 0. With frictions there are, behind the reactions, the two margins of
+    each (`stick_margins`), `ground_speeds`, and the leaves `slide`, the direction in which each
+    slides, 0 if it sticks. A surface has rows as a friction, with margins of 1, its position, and
+    its side.
 
-    With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`. Column j is the derivative to
-    the j-th initial coordinate, then to the j-th initial velocity, then to the number at the j-th of `paths`. With u = dq/dc and
-    z = dv/dc it obeys, along an arc, u' = z and
+    With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`.
+    Column j is the derivative to the j-th initial coordinate, then to the j-th initial velocity,
+    then to the number at the j-th of `paths`. With u = dq/dc and z = dv/dc it obeys, along an arc,
+    u' = z and
 
         z' = a_q u + a_v z + a_c.
 
-    All derivatives are at a fixed time. If c is the forcing frequency W, one must note that the kernel's time counts from
-    `origin`, whole forcing periods after 0, and that a load depends on n W (origin + t). Therefore a_c = a_W + (origin / W) a_t,
-    where a_t leaves out the records.
+    All derivatives are at a fixed time. If c is the forcing frequency W, one must note that the
+    kernel's time counts from `origin`, whole forcing periods after 0, and that a load depends on n
+    W (origin + t). Therefore a_c = a_W + (origin / W) a_t, where a_t leaves out the records.
     """
 
     model: str = ""  # its name
     parameters: list[str] = field(default_factory=list)
     dof: int = 1  # of the model
     first_order: int = 0  # how many of its coordinates, the last ones, are of first order
-    dependent: int = 0  # how many of these are sums of others, with minus their coefficients in their rows of `mass`
+    # how many of these are sums of others, with minus their coefficients in their rows of `mass`
+    dependent: int = 0
     columns: int = 0
     paths: tuple[str, ...] = ()  # of the parameters that the last columns are derivatives to
-    records: list[tuple[str, int]] = field(default_factory=list)  # dotted path, order of the derivative (see `load_tables.py`)
+    # dotted path, order of the derivative (see `load_tables.py`)
+    records: list[tuple[str, int]] = field(default_factory=list)
     side_count: int = 0  # of the contact
     acceleration: list[Expr] = field(default_factory=list)
     gap: Expr | None = None
@@ -89,24 +107,35 @@ class Trace:
     mass: list[Expr] = field(default_factory=list)
     restitution: list[Expr] = field(default_factory=list)
     positions: list[Expr] = field(default_factory=list)
-    jumps: list[Expr] = field(default_factory=list)  # for each contact, the coordinates of first order after an impact on it
+    # for each contact, the coordinates of first order after an impact on it
+    jumps: list[Expr] = field(default_factory=list)
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
-    coefficients: list[Expr] = field(default_factory=list)  # with frictions in contacts: `has_phases`, then each
-    friction_contacts: tuple[int, ...] = ()  # then the contact whose reaction presses each of them, -1 for none
-    friction_coordinates: tuple[int, ...] = ()  # the coordinate of each friction, then -1 less that of each surface
+    # with frictions in contacts: `has_phases`, then each
+    coefficients: list[Expr] = field(default_factory=list)
+    # then the contact whose reaction presses each of them, -1 for none
+    friction_contacts: tuple[int, ...] = ()
+    # the coordinate of each friction, then -1 less that of each surface
+    friction_coordinates: tuple[int, ...] = ()
     modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
-    sums: tuple[ColumnSum, ...] = ()  # the accelerations of all columns, which are then leaves "mode" too
+    # the accelerations of all columns, which are then leaves "mode" too
+    sums: tuple[ColumnSum, ...] = ()
 
     @property
     def first_order_rows(self) -> tuple[int, ...]:
-        """The coordinates of first order, those of the tangent's columns included: `acceleration` has their velocities."""
-        return tuple(i for i in range(len(self.acceleration)) if i % self.dof >= self.dof - self.first_order)
+        """The coordinates of first order, those of the tangent's columns included: `acceleration`
+        has their velocities.
+        """
+        return tuple(
+            i for i in range(len(self.acceleration)) if i % self.dof >= self.dof - self.first_order
+        )
 
     @property
     def local(self) -> int:
-        """The number of its first coordinates on which impacts act: all, or the local ones of a structure."""
+        """The number of its first coordinates on which impacts act: all, or the local ones of a
+        structure.
+        """
         return self.dof if self.modes is None else self.modes.first
 
     @property
@@ -116,19 +145,37 @@ class Trace:
 
     @property
     def contact_numbers(self) -> list[Expr]:
-        """The mass matrix, E, positions, jumps, coefficients of frictions in contacts, speeds of grounds: what events need."""
-        return [*self.mass, *self.restitution, *self.positions, *self.jumps, *self.coefficients, *self.ground_speeds]
+        """The mass matrix, E, positions, jumps, coefficients of frictions in contacts, speeds of
+        grounds: what events need.
+        """
+        return [
+            *self.mass,
+            *self.restitution,
+            *self.positions,
+            *self.jumps,
+            *self.coefficients,
+            *self.ground_speeds,
+        ]
 
     @property
     def local_rows(self) -> list[int]:
-        """The coordinates, with those of the tangent's columns, whose accelerations are expressions of their own."""
+        """The coordinates, with those of the tangent's columns, whose accelerations are expressions
+        of their own.
+        """
         return [i for i, a in enumerate(self.acceleration) if a.op != "mode"]
 
     def loop_rows(self, places: Sequence[Any], with_accelerations: bool) -> LoopRows | None:
-        """The equations in loops over modes and columns, or None, with the places of the first coordinate's series."""
+        """The equations in loops over modes and columns, or None, with the places of the first
+        coordinate's series.
+        """
         first_order = tuple(i for i in self.first_order_rows if i < self.dof)
-        at, counts = (places[0], places[1], places[2]), (self.dof, self.columns)
-        return LoopRows(*at, *counts, with_accelerations, self.modes, self.sums, first_order) if self.modes or self.sums else None
+        at = (places[0], places[1], places[2])
+        counts = (self.dof, self.columns)
+        return (
+            LoopRows(*at, *counts, with_accelerations, self.modes, self.sums, first_order)
+            if self.modes or self.sums
+            else None
+        )
 
     @property
     def inputs_of_loops(self) -> list[Expr]:
@@ -137,7 +184,9 @@ class Trace:
 
     @property
     def in_loops(self) -> bool:
-        """Whether the tangent's equations are written once, in loops over columns; of one coordinate others are 5 % faster."""
+        """Whether the tangent's equations are written once, in loops over columns; of one
+        coordinate others are 5 % faster.
+        """
         return self.columns > 0 and (self.dof > 1 or self.modes is not None)
 
     def symbol(self, path: str, value: float) -> Expr:
@@ -146,19 +195,27 @@ class Trace:
         return Expr("parameter", (), len(self.parameters) - 1)
 
     def append_tangent(self, paths: tuple[str, ...]) -> None:
-        """Append the tangent's columns as further coordinates; coordinate dof + j dof + d is u_d of column j."""
+        """Append the tangent's columns as further coordinates; coordinate dof + j dof + d is u_d of
+        column j.
+        """
         own = list(self.acceleration)
-        self.paths, self.columns = paths, 2 * self.dof + len(paths)
-        for path, order in list(self.records):  # the time derivative at a jump of the motion needs these
+        self.paths = paths
+        self.columns = 2 * self.dof + len(paths)
+        # the time derivative at a jump of the motion needs these
+        for path, order in list(self.records):
             if (path, order + 1) not in self.records:
                 self.records.append((path, order + 1))
         if self.in_loops:
             self.sums = tuple(map(self.column_sum, own[: self.local]))
-            self.acceleration += [Expr("mode", (), place) for place in range(self.dof, self.dof * (1 + self.columns))]
+            self.acceleration += [
+                Expr("mode", (), place) for place in range(self.dof, self.dof * (1 + self.columns))
+            ]
         else:
             self.acceleration += [self.derivative_along(own[0], j) for j in range(self.columns)]
         if self.modes is not None:
-            self.modes = replace(self.modes, columns=tuple(self._inputs_of_modes(j) for j in range(self.columns)))
+            self.modes = replace(
+                self.modes, columns=tuple(self._inputs_of_modes(j) for j in range(self.columns))
+            )
 
     def _inputs_of_modes(self, j: int) -> tuple[ModeInput, ...]:
         """The inputs of the modes of column j that are expressions."""
@@ -174,22 +231,32 @@ class Trace:
     def tangent_leaves(self, j: int) -> tuple[list[Expr], list[Expr]]:
         """The leaves for u and z of column j, as coordinates and velocities."""
         places = range(self.dof * (1 + j), self.dof * (2 + j))
-        return [Expr("coordinate", (), i) for i in places], [Expr("velocity", (), i) for i in places]
+        return [Expr("coordinate", (), i) for i in places], [
+            Expr("velocity", (), i) for i in places
+        ]
 
     def derivative_along(self, root: Expr, j: int) -> Expr:
-        """The derivative of an expression of the motion along column j, at a fixed time, written out."""
+        """The derivative of an expression of the motion along column j, at a fixed time, written
+        out.
+        """
         total = self.partial_derivative(root, j)
         for leaf, slope in self.column_sum(root).terms:
             total = total + slope * Expr(leaf.op, (), leaf.value + self.dof * (1 + j))
         return total
 
     def column_sum(self, root: Expr, over: Expr | None = None) -> ColumnSum:
-        """The derivative of an expression of the motion along each column, at a fixed time, divided by `over`."""
+        """The derivative of an expression of the motion along each column, at a fixed time, divided
+        by `over`.
+        """
         pushes = [self.partial_derivative(root, j) for j in range(2 * self.dof, self.columns)]
-        return ColumnSum.of([(leaf, differentiate(root, leaf)) for leaf in leaves_of(root)], pushes, over)
+        return ColumnSum.of(
+            [(leaf, differentiate(root, leaf)) for leaf in leaves_of(root)], pushes, over
+        )
 
     def partial_derivative(self, root: Expr, j: int) -> Expr:
-        """The partial derivative of an expression to column j's parameter, at a fixed time and state; 0 for the other columns."""
+        """The partial derivative of an expression to column j's parameter, at a fixed time and
+        state; 0 for the other columns.
+        """
         if j < 2 * self.dof:
             return number(0.0)
         path = self.paths[j - 2 * self.dof]
@@ -205,47 +272,75 @@ class Trace:
         for node in ordered([root]):
             if node.op == "record":
                 path, order = self.records[node.value]
-                total = total + differentiate(root, node) * Expr("record", (), self.records.index((path, order + 1)))
+                total = total + differentiate(root, node) * Expr(
+                    "record", (), self.records.index((path, order + 1))
+                )
         return total
 
 
 def trace(
-    system: System, stop_at: tuple[str, ...] = (), sensitivities: tuple[str, ...] | None = None, energy: bool = False
+    system: System,
+    stop_at: tuple[str, ...] = (),
+    sensitivities: tuple[str, ...] | None = None,
+    energy: bool = False,
 ) -> Trace:
-    """Trace the model, the load and the impact law of a system, and the margins at which a motion stops.
+    """Trace the model, the load and the impact law of a system, and the margins at which a motion
+    stops.
 
-    If `sensitivities` is given, as dotted paths (maybe none), the tangent is traced as well: the derivatives to the state at the
-    start and to the numbers at these paths. With `energy` the kinetic energy stands behind the margins.
+    If `sensitivities` is given, as dotted paths (maybe none), the tangent is traced as well: the
+    derivatives to the state at the start and to the numbers at these paths. With `energy` the
+    kinetic energy stands behind the margins.
 
     Raises
     ------
     TraceError
-        There is an operation without a Taylor recurrence, a branch on the state, or a use of the time outside the load.
+        There is an operation without a Taylor recurrence, a branch on the state, or a use of the
+        time outside the load.
     ParameterError
         The model does not have a margin, or a path leads to no number.
     """
     paths = None if sensitivities is None else check_paths(system, sensitivities)
-    sides, inner = system.model.sides, system.in_gap_coordinates.model
-    result = Trace(model=type(system.model).__name__, side_count=len(sides), dof=len(inner.coordinates))
+    sides = system.model.sides
+    inner = system.in_gap_coordinates.model
+    result = Trace(
+        model=type(system.model).__name__, side_count=len(sides), dof=len(inner.coordinates)
+    )
     result.first_order, result.dependent = len(inner.first_order), getattr(inner, "dependent", 0)
     twin = substitute_numbers(system.in_gap_coordinates, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
-    model, load, t, dof = twin.model, twin.load, LoadTime(result), result.dof
-    coordinates, velocities = (tuple(Expr(op, (), i) for i in range(dof)) for op in ("coordinate", "velocity"))
+    model = twin.model
+    load = twin.load
+    t = LoadTime(result)
+    dof = result.dof
+    coordinates, velocities = (
+        tuple(Expr(op, (), i) for i in range(dof)) for op in ("coordinate", "velocity")
+    )
     side = Expr("side") if sides else number(1.0)
     q, v = (coordinates[0], velocities[0]) if dof == 1 else (coordinates, velocities)
     several = model.holds_coordinates
-    accelerations = _trace_contacts(result, twin, t, q, v) if several else ask(model, "acceleration", t, q, v, side, load)
-    if dof > 1 and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations]) != dof:
-        raise TraceError(f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}")
+    accelerations = (
+        _trace_contacts(result, twin, t, q, v)
+        if several
+        else ask(model, "acceleration", t, q, v, side, load)
+    )
+    if (
+        dof > 1
+        and len(accelerations if isinstance(accelerations, (tuple, list)) else [accelerations])
+        != dof
+    ):
+        raise TraceError(
+            f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}"
+        )
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
     if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _trace_margins(result, twin, t, q, v, side, stop_at)
     if energy:
-        result.margins["kinetic_energy"] = combine("add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0)
+        result.margins["kinetic_energy"] = combine(
+            "add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0
+        )
     _check(result)
     if paths is not None:
         result.append_tangent(paths)
@@ -254,7 +349,9 @@ def trace(
 
 
 def _name_records(load: Any) -> None:
-    """Give every record and pulse of a symbolic load its path, by which its breakpoints are found when the numbers are known."""
+    """Give every record and pulse of a symbolic load its path, by which its breakpoints are found
+    when the numbers are known.
+    """
     for name, signal in load.channels.items():
         terms = {f"load.{name}.{i}": term for i, term in enumerate(getattr(signal, "terms", ()))}
         for path, term in (terms or {f"load.{name}": signal}).items():
@@ -262,10 +359,15 @@ def _name_records(load: Any) -> None:
                 object.__setattr__(term, "path", path)
 
 
-def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v: tuple[Expr, ...], side: Expr) -> None:
-    model, load = twin.model, twin.load
+def _trace_contact(
+    result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v: tuple[Expr, ...], side: Expr
+) -> None:
+    model = twin.model
+    load = twin.load
     if len(q) != 1:
-        raise TraceError("a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead")
+        raise TraceError(
+            "a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead"
+        )
     result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
     result.contact = combine("add", model.contact, 0.0)
     at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
@@ -274,13 +376,14 @@ def _trace_contact(result: Trace, twin: Any, t: LoadTime, q: tuple[Expr, ...], v
     result.contact_acceleration = result.gap_rate * substitute(result.acceleration[0], at_contact)
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
     next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
-    result.next_side, result.velocity_after = combine("add", next_side, 0.0), combine("add", after, 0.0)
+    result.next_side = combine("add", next_side, 0.0)
+    result.velocity_after = combine("add", after, 0.0)
     _check_next_side(result.next_side, twin.one_contact.sides, type(model).__name__)
 
 
 def _check_gap(gap: Expr, coordinate: Expr, model: str) -> None:
-    """Refuse a gap that is not provably a polynomial of degree 1 in the coordinate, as the flow assumes a single contact
-    point."""
+    """Refuse a gap that is not provably a polynomial of degree 1 in the coordinate, as the flow
+    assumes a single contact point."""
     slope = differentiate(gap, coordinate)
     if _known_number(differentiate(slope, coordinate)) != 0:
         raise TraceError(
@@ -306,7 +409,8 @@ def _known_number(expression: Expr) -> float | Fraction | None:
     if not expression.args:
         value: float | None = expression.value if expression.op == "number" else None
         return value
-    from saltus.taylor.exact_algebra import NoNormalForm, constant_value, normal_form  # seldom needed, and slow to import
+    # seldom needed, and slow to import
+    from saltus.taylor.exact_algebra import NoNormalForm, constant_value, normal_form
 
     try:
         return constant_value(normal_form(expression))
@@ -316,41 +420,85 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
-    model, load, contacts, frictions = twin.contact_model, twin.load, twin.contact_model.contacts, twin.contact_model.frictions
-    local, parts = getattr(model, "local_count", result.dof), (*frictions, *model.surfaces)
+    model = twin.contact_model
+    load = twin.load
+    contacts = twin.contact_model.contacts
+    frictions = twin.contact_model.frictions
+    local = getattr(model, "local_count", result.dof)
+    parts = (*frictions, *model.surfaces)
     if local < result.dof:
         q, v = local_parts(q, v, local)
-    a, slides = ([Expr(op, (), i) for i in range(n)] for op, n in (("acceleration", local), ("slide", len(parts))))
-    found, along, sums = solved_motion(model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides)
-    holding = [f for forces in (reactions, stick_margins) for f in forces(model, t, q, v, a, load, slides, along)]
-    result.reactions = [combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))]
+    a, slides = (
+        [Expr(op, (), i) for i in range(n)]
+        for op, n in (("acceleration", local), ("slide", len(parts)))
+    )
+    found, along, sums = solved_motion(
+        model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides
+    )
+    holding = [
+        f
+        for forces in (reactions, stick_margins)
+        for f in forces(model, t, q, v, a, load, slides, along)
+    ]
+    result.reactions = [
+        combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))
+    ]
     if model.rubs_in_contacts:
         given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
         result.coefficients = [combine("add", mu, 0.0) for mu in given]
         presses = {None: -1} | {contact.name: i for i, contact in enumerate(contacts)}
         result.friction_contacts = tuple(presses[getattr(part, "contact", None)] for part in parts)
-    speeds = (*(friction.ground_speed for friction in frictions), *(surface.position for surface in model.surfaces))
+    speeds = (
+        *(friction.ground_speed for friction in frictions),
+        *(surface.position for surface in model.surfaces),
+    )
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [model.coordinates.index(part.coordinate) for part in parts]
-    result.friction_coordinates = tuple(p if k < len(frictions) else -1 - p for k, p in enumerate(places))
-    result.mass = [combine("add", x, 0.0) for i, row in enumerate(mass_rows(model, q, t, load)) for x in sums.get(i, row)]
-    result.restitution = [combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row]
+    result.friction_coordinates = tuple(
+        p if k < len(frictions) else -1 - p for k, p in enumerate(places)
+    )
+    result.mass = [
+        combine("add", x, 0.0)
+        for i, row in enumerate(mass_rows(model, q, t, load))
+        for x in sums.get(i, row)
+    ]
+    result.restitution = [
+        combine("add", entry, 0.0) for row in twin.impact.restitution_matrix(model) for entry in row
+    ]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
-    afters = [ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order]
-    result.jumps = [combine("add", x, 0.0) for after in afters for x in (after if isinstance(after, (tuple, list)) else (after,))]
+    afters = [
+        ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order
+    ]
+    result.jumps = [
+        combine("add", x, 0.0)
+        for after in afters
+        for x in (after if isinstance(after, (tuple, list)) else (after,))
+    ]
     result.signs = tuple(contact.sign for contact in contacts)
-    result.contact_coordinates = tuple(model.coordinates.index(contact.coordinate) for contact in contacts)
+    result.contact_coordinates = tuple(
+        model.coordinates.index(contact.coordinate) for contact in contacts
+    )
     if local < result.dof:
-        result.modes = mode_block(model.mode_equations(t, q, v, load), local, result.dof - local, q.sums)
+        result.modes = mode_block(
+            model.mode_equations(t, q, v, load), local, result.dof - local, q.sums
+        )
         found += [Expr("mode", (), i) for i in range(local, result.dof)]
     return found
 
 
-def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]) -> None:
+def _trace_margins(
+    result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]
+) -> None:
     a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
-    margins = dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load)) if stop_at else {}
+    margins = (
+        dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load))
+        if stop_at
+        else {}
+    )
     if result.several and stop_at:
-        free: list[Any] = [Expr("free", (), i) for i in range(result.local)] + [1.0] * (result.dof - result.local)
+        free: list[Any] = [Expr("free", (), i) for i in range(result.local)] + [1.0] * (
+            result.dof - result.local
+        )
         slides = [Expr("slide", (), i) for i in range(len(result.ground_speeds))]
         margins |= friction_margins(twin.model, t, q, v, twin.load, free, slides)
     for name in stop_at:
@@ -361,29 +509,42 @@ def _trace_margins(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: 
 
 
 def _check(result: Trace) -> None:
-    """Refuse comparisons in expressions that are expanded in series, and a gap that depends on more than the coordinate."""
+    """Refuse comparisons in expressions that are expanded in series, and a gap that depends on more
+    than the coordinate.
+    """
     gap = [] if result.gap is None else [result.gap]
     expanded = [*result.acceleration, *result.reactions, *result.margins.values(), *gap]
     check_size(result)
     for node in ordered(expanded):
         if node.op == "velocity" and node.value in result.first_order_rows:
-            raise TraceError(f"{result.model} reads the velocity of coordinate {node.value + 1}, which is of first order")
+            raise TraceError(
+                f"{result.model} reads the velocity of coordinate {node.value + 1}, which is of first order"
+            )
         if node.op in POINTWISE:
             where = f"{result.model} uses {node.op} in an acceleration, a gap or a margin"
             raise TraceError(f"{where}; {FRICTION if uses_velocity(*node.args) else BRANCH}")
     if result.gap is not None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):
-                raise TraceError(f"{result.model}.gap may depend on the coordinate, the side and the parameters only")
+                raise TraceError(
+                    f"{result.model}.gap may depend on the coordinate, the side and the parameters only"
+                )
     _check_abs(result, expanded)
 
 
 def _check_abs(result: Trace, expanded: list[Expr]) -> None:
-    """Refuse abs of a coordinate, which is traced as side * coordinate, in models in which the two differ."""
-    side, coordinates = Expr("side"), [Expr("coordinate", (), i) for i in range(len(result.acceleration))]
+    """Refuse abs of a coordinate, which is traced as side * coordinate, in models in which the two
+    differ.
+    """
+    side = Expr("side")
+    coordinates = [Expr("coordinate", (), i) for i in range(len(result.acceleration))]
     sized = {side * q for q in coordinates}
-    if result.gap not in sized | {q * side for q in coordinates} and any(node in sized for node in ordered(expanded)):
-        raise TraceError("abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap")
+    if result.gap not in sized | {q * side for q in coordinates} and any(
+        node in sized for node in ordered(expanded)
+    ):
+        raise TraceError(
+            "abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap"
+        )
 
 
 def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
@@ -392,21 +553,26 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
     Raises
     ------
     ParameterError
-        A path leads to no number of the system (the message has similar paths), or to an order, or is given twice.
+        A path leads to no number of the system (the message has similar paths), or to an order, or
+        is given twice.
     """
     known = [path for path, _ in numbers(system)]
     for path in paths:
         if path not in known:
             system.get(str(path))  # refuses a path to a part that does not exist
             below = [name for name in known if name.startswith(f"{path}.")]
-            raise ParameterError(f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}")
+            raise ParameterError(
+                f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}"
+            )
         owner = system.get(path.rpartition(".")[0])
         if isinstance(owner, Pulse) and path.rpartition(".")[2] in owner.moving:
             raise ParameterError(
                 f"{path} moves the instants at which the load is not smooth, so there are no derivatives to it; take another"
             )
         if path.endswith(".order") and isinstance(owner, Harmonic):
-            raise ParameterError(f"{path} is a whole number, so there is no derivative to it; choose another parameter")
+            raise ParameterError(
+                f"{path} is a whole number, so there is no derivative to it; choose another parameter"
+            )
     if len(set(paths)) < len(paths):
         raise ParameterError(f"each parameter may be named once, got {paths!r}")
     return tuple(paths)

@@ -1,7 +1,7 @@
 """The numbers of generated arithmetic: one double, or a vector of doubles with one for each lane.
 
-`Vec` stands for such a number while LLVM's code is written: Python's operators append instructions. None stands for a number
-that is known to be zero, and a float for any other number that is known.
+`Vec` stands for such a number while LLVM's code is written: Python's operators append instructions.
+None stands for a number that is known to be zero, and a float for any other number that is known.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from typing import Any, cast
 
 from llvmlite import binding, ir
 
-DOUBLE, BIT, LONG, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
+DOUBLE = ir.DoubleType()
+BIT = ir.IntType(1)
+LONG = ir.IntType(64)
+INDEX = ir.IntType(32)
 CACHE_LINE = 64  # bytes
 FUSED = ("contract", "nsz")  # LLVM's flags that allow fused multiply-adds
 
@@ -24,9 +27,9 @@ FUSED = ("contract", "nsz")  # LLVM's flags that allow fused multiply-adds
 def host_width() -> int:
     """How many lanes suit this machine: 16 with AVX-512, 4 with AVX2, 2 with SSE2 or NEON, else 1.
 
-    With AVX-512 a vector takes two registers: while the processor waits for the sums in one, it works on those in the other, so
-    that a step takes about 10 % less time for each lane.
-    The environment variable SALTUS_LANES overrides it, for tests: the results are the same.
+    With AVX-512 a vector takes two registers: while the processor waits for the sums in one, it
+    works on those in the other, so that a step takes about 10 % less time for each lane. The
+    environment variable SALTUS_LANES overrides it, for tests: the results are the same.
     """
     if os.environ.get("SALTUS_LANES") in ("1", "2", "4", "8", "16"):
         return int(os.environ["SALTUS_LANES"])
@@ -42,11 +45,15 @@ WIDTH = host_width()
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """How numbers are computed: on how many lanes at once, whether multiply-adds may be fused, and how exactly."""
+    """How numbers are computed: on how many lanes at once, whether multiply-adds may be fused, and
+    how exactly.
+    """
 
     width: int
     fused: bool = True
-    exact: bool = False  # quotients are rounded once, the C library has sine and cosine; lanes use reciprocals, polynomials
+    # quotients are rounded once, the C library has sine and cosine; lanes use reciprocals,
+    # polynomials
+    exact: bool = False
 
     def of(self, element: Any) -> Any:
         """LLVM's type of a number, a truth or an integer for each lane."""
@@ -71,24 +78,33 @@ class Arithmetic:
 
     @property
     def divides(self) -> bool:
-        """Whether quotients need divisions: without fused multiply-adds a product with an inverse in two parts is no quotient."""
+        """Whether quotients need divisions: without fused multiply-adds a product with an inverse
+        in two parts is no quotient.
+        """
         return self.exact and not self.fused
 
     def unfused(self) -> Arithmetic:
-        """The same without fused multiply-adds: a law that takes the difference of two equal products must get 0."""
+        """The same without fused multiply-adds: a law that takes the difference of two equal
+        products must get 0.
+        """
         return replace(self, fused=False)
 
 
-SCALAR, LANES = Arithmetic(1, exact=True), Arithmetic(WIDTH)
+SCALAR = Arithmetic(1, exact=True)
+LANES = Arithmetic(WIDTH)
 
 
 class Vec:
-    """A number, or a vector of them, while LLVM's code is written: Python's operators append instructions."""
+    """A number, or a vector of them, while LLVM's code is written: Python's operators append
+    instructions.
+    """
 
     __slots__ = ("arithmetic", "builder", "value")
 
     def __init__(self, builder: Any, value: Any, arithmetic: Arithmetic) -> None:
-        self.builder, self.value, self.arithmetic = builder, value, arithmetic
+        self.builder = builder
+        self.value = value
+        self.arithmetic = arithmetic
 
     def _new(self, value: Any) -> Vec:
         return Vec(self.builder, value, self.arithmetic)
@@ -99,7 +115,9 @@ class Vec:
 
     def _operation(self, name: str, left: Any, right: Any) -> Vec:
         flags = FUSED if self.arithmetic.fused else FUSED[1:]
-        return self._new(getattr(self.builder, name)(self.as_value(left), self.as_value(right), flags=flags))
+        return self._new(
+            getattr(self.builder, name)(self.as_value(left), self.as_value(right), flags=flags)
+        )
 
     def __add__(self, other: Any) -> Vec:
         return self._operation("fadd", self, other)
@@ -142,7 +160,11 @@ class Vec:
         if name == "sqrt":
             return self.intrinsic("llvm.sqrt")
         if name in ("sin", "cos"):
-            return self.intrinsic(f"llvm.{name}") if self.arithmetic.exact else self._sin_cos()[name == "cos"]
+            return (
+                self.intrinsic(f"llvm.{name}")
+                if self.arithmetic.exact
+                else self._sin_cos()[name == "cos"]
+            )
         return self._library(name, [self.value, *(self.as_value(other) for other in others)])
 
     def intrinsic(self, name: str, *others: Any) -> Vec:
@@ -153,7 +175,9 @@ class Vec:
 
     def _call(self, name: str, kind: Any, values: list[Any]) -> Any:
         module = self.builder.module
-        function = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), name)
+        function = module.globals.get(name) or ir.Function(
+            module, ir.FunctionType(kind, [kind] * len(values)), name
+        )
         return self.builder.call(function, values)
 
     def compare(self, sign: str, other: Any) -> Any:
@@ -178,8 +202,9 @@ class Vec:
     def _sin_cos(self) -> tuple[Vec, Vec]:
         """Sine and cosine to about one unit in the last place, for arguments up to 1e6.
 
-        The argument is reduced by pi/2 in three parts, of which the first two have 33 bits so that their products with a
-        whole number are exact, and the polynomials for [-pi/4, pi/4] are those of fdlibm (Sun Microsystems, 1993).
+        The argument is reduced by pi/2 in three parts, of which the first two have 33 bits so that
+        their products with a whole number are exact, and the polynomials for [-pi/4, pi/4] are
+        those of fdlibm (Sun Microsystems, 1993).
         """
         n = (self * (2.0 / 3.141592653589793)).intrinsic("llvm.rint")
         r = self - n * 1.57079632673412561417e00
@@ -191,7 +216,8 @@ class Vec:
         c = _polynomial(z, COSINE) * (z * z) - half + 1.0
         quadrant = self.builder.fptosi(n.value, self.arithmetic.of(LONG))
         odd = self._bit(quadrant, 0)
-        sine, cosine = c.select(odd, s), s.select(odd, c)
+        sine = c.select(odd, s)
+        cosine = s.select(odd, c)
         high = self._bit(quadrant, 1)
         return (-sine).select(high, sine), (-cosine).select(self.builder.xor(high, odd), cosine)
 
@@ -257,36 +283,50 @@ def dot(pairs: Iterable[tuple[Coefficient, Coefficient]], start: Coefficient = N
     for a, b in pairs:
         if a is not None and b is not None:
             vector, factor = (a, b) if isinstance(a, Vec) else (b, a)
-            start = multiply(a, b) if start is None else cast(Vec, vector).fma(factor, start)  # two known numbers come first
+            # two known numbers come first
+            start = multiply(a, b) if start is None else cast(Vec, vector).fma(factor, start)
     return start
 
 
 @contextmanager
-def loop(builder: Any, begin: int, end: Any, starts: Sequence[Vec] = (), after: list[Vec] | None = None) -> Iterator[Any]:
-    """A loop over whole numbers, at least once. With `after` numbers go through it, which begin with `starts`: the code within
-    appends their next values to it, and they are the last ones afterwards."""
-    before, body = builder.block, builder.append_basic_block("loop")
+def loop(
+    builder: Any, begin: int, end: Any, starts: Sequence[Vec] = (), after: list[Vec] | None = None
+) -> Iterator[Any]:
+    """A loop over whole numbers, at least once. With `after` numbers go through it, which begin
+    with `starts`: the code within appends their next values to it, and they are the last ones
+    afterwards."""
+    before = builder.block
+    body = builder.append_basic_block("loop")
     builder.branch(body)
     builder.position_at_end(body)
     i = builder.phi(LONG)
     i.add_incoming(LONG(begin), before)
     carried = [builder.phi(start.value.type) for start in starts]
-    yield i if after is None else (i, [Vec(builder, x, start.arithmetic) for x, start in zip(carried, starts, strict=True)])
+    yield (
+        i
+        if after is None
+        else (
+            i,
+            [Vec(builder, x, start.arithmetic) for x, start in zip(carried, starts, strict=True)],
+        )
+    )
     for x, start, value in zip(carried, starts, after or (), strict=True):
         x.add_incoming(start.value, before)
         x.add_incoming(value.value, builder.block)
     following = builder.add(i, LONG(1))
     i.add_incoming(following, builder.block)
     done = builder.append_basic_block("after")
-    builder.cbranch(builder.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, done)
+    builder.cbranch(
+        builder.icmp_signed("<", following, LONG(end) if isinstance(end, int) else end), body, done
+    )
     builder.position_at_end(done)
 
 
 def quotient(value: Coefficient, inverse: Vec, rest: Vec) -> Coefficient:
     """A number times an inverse in two parts (`Vec.inverse`), in two thirds of a division's time.
 
-    What must be exact is rounded once, as the quotient is: with the first part alone the coefficients of a series would have the
-    same error in every step.
+    What must be exact is rounded once, as the quotient is: with the first part alone the
+    coefficients of a series would have the same error in every step.
     """
     return dot([(inverse, value)], multiply(rest, value) if inverse.arithmetic.exact else None)
 
@@ -299,22 +339,30 @@ def inverses(builder: Any, count: int) -> list[Any]:
 
 
 class InnerLoop:
-    """A loop over j = 1 .. k - 1 that makes the sums of some products of series for the orders k and k + 1 (see `series.py`)."""
+    """A loop over j = 1 ..
+
+    k - 1 that makes the sums of some products of series for the orders k and k + 1 (see
+    `series.py`).
+    """
 
     def __init__(self, series: Any) -> None:
         self.series, self.builder = series, series.builder
         self.block = self.builder.append_basic_block("sums")
-        self._changing: list[tuple[Any, Any, Any]] = []  # LLVM's variable, its value at first, its next value
+        # LLVM's variable, its value at first, its next value
+        self._changing: list[tuple[Any, Any, Any]] = []
         self._loaded: dict[tuple[int, bool], Vec] = {}
         self._carried: dict[int, Vec] = {}
         self.made = 0  # sums
         self._j = self._variable(LONG)
 
     def sums(self, forward: Any, backward: Any) -> tuple[Vec, Vec]:
-        """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k is known before the loop."""
+        """sum a_j b_{k-j} and sum a_j b_{k+1-j} of a `forward`, b `backward`; a_1 b_k only if b_k
+        is known before the loop.
+        """
         self.made += 1
         with self.builder.goto_block(self.block):
-            a, b = self._load(forward, False), self._load(backward, True)
+            a = self._load(forward, False)
+            b = self._load(backward, True)
             return self._sum(a, b), self._sum(a, self._before(backward, b))
 
     def _variable(self, kind: Any) -> Any:
@@ -349,19 +397,28 @@ class InnerLoop:
         """Join the loop to the code before and after it."""
         with self.builder.goto_block(self.block):
             following = self.builder.add(self._j, LONG(1))
-            self.builder.cbranch(self.builder.icmp_signed("<", following, self.series.order), self.block, after)
+            self.builder.cbranch(
+                self.builder.icmp_signed("<", following, self.series.order), self.block, after
+            )
         for variable, start, value in [(self._j, LONG(1), following), *self._changing]:
             variable.add_incoming(start, before)
             variable.add_incoming(value, self.block)
 
 
 class ColumnInputs:
-    """What is pushed in the columns of parameters, in memory: zeros for the other columns, then numbers for each of these."""
+    """What is pushed in the columns of parameters, in memory: zeros for the other columns, then
+    numbers for each of these.
+    """
 
     def __init__(self, memory: Any, columns: int, pushes: Sequence[Sequence[Any]]) -> None:
-        """`pushes` are, of each number that a column has, those in the last of all columns, None for 0."""
-        self._builder, self._arithmetic = memory.builder, memory.arithmetic
-        self._pushes = {i: each for i, each in enumerate(pushes) if any(push is not None for push in each)}
+        """`pushes` are, of each number that a column has, those in the last of all columns, None
+        for 0.
+        """
+        self._builder = memory.builder
+        self._arithmetic = memory.arithmetic
+        self._pushes = {
+            i: each for i, each in enumerate(pushes) if any(push is not None for push in each)
+        }
         self._first = columns - max(map(len, self._pushes.values()), default=0)
         size = max(1, len(self._pushes) * (1 + columns - self._first))
         with self._builder.goto_entry_block():
@@ -396,5 +453,7 @@ def constant_table(builder: Any, numbers: list[float]) -> Any:
     values = ir.Constant(ir.ArrayType(ir.DoubleType(), len(numbers)), numbers)
     module = builder.module
     table = ir.GlobalVariable(module, values.type, module.get_unique_name("numbers"))
-    table.linkage, table.global_constant, table.initializer = "internal", True, values
+    table.linkage = "internal"
+    table.global_constant = True
+    table.initializer = values
     return table

@@ -1,4 +1,6 @@
-"""What closed forms refuse in their arguments: anything but finite numbers within the range in which a formula has a meaning."""
+"""What closed forms refuse in their arguments: anything but finite numbers within the range in
+which a formula has a meaning.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +34,17 @@ def numbers(name: str, values: Any, **bounds: Any) -> np.ndarray:
     except (TypeError, ValueError, OverflowError):
         if np.ndim(values) == 0 or isinstance(values, str):
             check_number(name, values, **bounds)
-        raise ParameterError(f"{name} must be a number or an array of numbers, got {shown(values)}", name) from None
-    least, most = bounds.get("at_least", -np.inf), bounds.get("at_most", np.inf)
-    inside = (array > bounds.get("above", -np.inf)) & (array < bounds.get("below", np.inf)) & (array >= least) & (array <= most)
+        raise ParameterError(
+            f"{name} must be a number or an array of numbers, got {shown(values)}", name
+        ) from None
+    least = bounds.get("at_least", -np.inf)
+    most = bounds.get("at_most", np.inf)
+    inside = (
+        (array > bounds.get("above", -np.inf))
+        & (array < bounds.get("below", np.inf))
+        & (array >= least)
+        & (array <= most)
+    )
     if not inside.all():
         check_number(name, float(array[~inside].flat[0]), **bounds)
     return array
@@ -48,8 +58,15 @@ def check_side(side: Any) -> None:
     ParameterError
         The error has the value.
     """
-    if isinstance(side, bool) or not isinstance(side, (int, float, np.integer, np.floating)) or side not in (1, -1):
-        raise ParameterError(f"side must be +1 for the lower layer or -1 for the upper one, got {shown(side)}", "side")
+    if (
+        isinstance(side, bool)
+        or not isinstance(side, (int, float, np.integer, np.floating))
+        or side not in (1, -1)
+    ):
+        raise ParameterError(
+            f"side must be +1 for the lower layer or -1 for the upper one, got {shown(side)}",
+            "side",
+        )
 
 
 def check_shapes(**arrays: Any) -> None:
@@ -64,4 +81,6 @@ def check_shapes(**arrays: Any) -> None:
         np.broadcast_shapes(*(np.shape(array) for array in arrays.values()))
     except ValueError:
         shapes = " and ".join(f"{name} {np.shape(array)}" for name, array in arrays.items())
-        raise ParameterError(f"the shapes of {shapes} do not fit one another", next(iter(arrays))) from None
+        raise ParameterError(
+            f"the shapes of {shapes} do not fit one another", next(iter(arrays))
+        ) from None

@@ -19,7 +19,8 @@ from saltus.theory.loaded_equilibria import zeros_of_slope
 
 @dataclass(frozen=True, slots=True)
 class Peaks:
-    """The two peaks of a periodic motion through theta = 0, and the speeds at theta = 0 on both sides.
+    """The two peaks of a periodic motion through theta = 0, and the speeds at theta = 0 on both
+    sides.
 
     Attributes
     ----------
@@ -55,14 +56,18 @@ class Peaks:
 
 
 def peaks(system: System, theta0: float) -> Peaks:
-    """Both peaks of the undamped motion from theta0, at rest, under constant loads (`pot_balance`, errata 6 and 7).
+    """Both peaks of the undamped motion from theta0, at rest, under constant loads (`pot_balance`,
+    errata 6 and 7).
 
-    The motion starts on the side of theta0's sign. The speed at theta = 0 follows from P(theta0) = M v^2 / 2, the system's
-    impact law gives the speed on the other side, and the other peak is where M v^2 / 2 = P again; with m = 0 and e = 1 this is
+    The motion starts on the side of theta0's sign. The speed at theta = 0 follows from P(theta0) =
+    M v^2 / 2, the system's impact law gives the speed on the other side, and the other peak is
+    where M v^2 / 2 = P again; with m = 0 and e = 1 this is
 
-        k theta_max^2 / 2 - V sin(beta0 + theta_max) = theta_min^2 / 2 - V sin(beta0 + abs(theta_min))
+        k theta_max^2 / 2 - V sin(beta0 + theta_max) = theta_min^2 / 2 - V sin(beta0 +
+        abs(theta_min))
 
-    With m > 0 and e = 1 one impact changes the energy and the next one changes it back; with r = 1 each keeps it.
+    With m > 0 and e = 1 one impact changes the energy and the next one changes it back; with r = 1
+    each keeps it.
 
     Parameters
     ----------
@@ -74,8 +79,9 @@ def peaks(system: System, theta0: float) -> Peaks:
     Raises
     ------
     ParameterError
-        Damping; an impact law under which the motion does not repeat itself; a theta0 that is 0 or from which theta = 0 is not
-        reached; a peak beyond the kinematic limit; a load that varies in time.
+        Damping; an impact law under which the motion does not repeat itself; a theta0 that is 0 or
+        from which theta = 0 is not reached; a peak beyond the kinematic limit; a load that varies
+        in time.
 
     Examples
     --------
@@ -86,13 +92,20 @@ def peaks(system: System, theta0: float) -> Peaks:
     lower, upper = layers(system)
     if lower.damping or upper.damping:
         raise ParameterError(
-            f"peak ratios are for undamped motion; set model.damping to 0, got {system.get('model.damping')!r}", "model.damping"
+            (
+                "peak ratios are for undamped motion; set model.damping to 0, got "
+                f"{system.get('model.damping')!r}"
+            ),
+            "model.damping",
         )
     here, there = (lower, upper) if theta0 > 0 else (upper, lower)
     speed = _fall_speed(here, abs(theta0))
     other_speed = _after_impact(system, speed, here.side)
     if not math.isclose(_after_impact(system, other_speed, there.side), speed, rel_tol=1e-12):
-        raise ParameterError(f"{system.impact!r} loses energy, so the motion does not repeat; use e = 1 or r = 1", "impact")
+        raise ParameterError(
+            f"{system.impact!r} loses energy, so the motion does not repeat; use e = 1 or r = 1",
+            "impact",
+        )
     other = turning_point(there, there.mass * other_speed**2 / 2)
     period = 2 * (fall_time(here, abs(theta0)) + fall_time(there, other))
     if here is lower:
@@ -101,7 +114,8 @@ def peaks(system: System, theta0: float) -> Peaks:
 
 
 def turning_point(layer: Layer, energy: float) -> float:
-    """The opening x > 0 at which a motion that leaves contact with this kinetic energy turns back: the first P(x) = energy.
+    """The opening x > 0 at which a motion that leaves contact with this kinetic energy turns back:
+    the first P(x) = energy.
 
     Raises
     ------
@@ -115,21 +129,37 @@ def turning_point(layer: Layer, energy: float) -> float:
     nodes = [0.0, *zeros_of_slope(layer), layer.kinematic_limit]
     for a, b in pairwise(nodes):
         if layer.potential(b) >= energy:
-            return float(brentq(lambda x: layer.potential(x) - energy, a, b, xtol=1e-300, rtol=1e-15, maxiter=5000))
+            return float(
+                brentq(
+                    lambda x: layer.potential(x) - energy,
+                    a,
+                    b,
+                    xtol=1e-300,
+                    rtol=1e-15,
+                    maxiter=5000,
+                )
+            )
     raise ParameterError(
-        f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; start lower", "theta0"
+        (
+            f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; "
+            "start lower"
+        ),
+        "theta0",
     )
 
 
 def fall_time(layer: Layer, peak: float) -> float:
-    """The time from rest at the opening `peak` to contact, without damping: the integral of dx / sqrt(2 (P(peak) - P(x)) / M).
+    """The time from rest at the opening `peak` to contact, without damping: the integral of dx /
+    sqrt(2 (P(peak) - P(x)) / M).
 
-    With x = peak (1 - u^2) the singularity at the peak is gone; the quadrature is good to about 1e-13.
+    With x = peak (1 - u^2) the singularity at the peak is gone; the quadrature is good to about
+    1e-13.
     """
     from scipy.integrate import quad
 
     def integrand(u: float) -> float:
-        # P(peak) - P(peak - d) with d = peak u^2, by products of sines, so that nothing cancels near u = 0
+        # P(peak) - P(peak - d) with d = peak u^2, by products of sines, so that nothing cancels
+        # near u = 0
         d = peak * u * u
         middle = layer.beta0 + peak - d / 2
         half_chord = math.sin(d / 2) / d if d else 0.5
@@ -140,7 +170,9 @@ def fall_time(layer: Layer, peak: float) -> float:
     return float(quad(integrand, 0.0, 1.0, epsabs=1e-14, epsrel=1e-13, limit=200)[0])
 
 
-def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, energy_conserving: bool = False) -> Any:
+def unloaded_peak_ratio(
+    stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, energy_conserving: bool = False
+) -> Any:
     """P_R without loads, any shape (`quasi-bounce-peak`, errata 7):
 
         min(sqrt(k), 1/sqrt(k))                  if the impact keeps the energy (r = 1), for every m
@@ -163,12 +195,15 @@ def unloaded_peak_ratio(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0, *, 
     0.5
     """
     _check_ratios(stiffness_ratio, mass_ratio)
-    ratio = np.sqrt((1 if energy_conserving else 1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio))
+    ratio = np.sqrt(
+        (1 if energy_conserving else 1 + np.asarray(mass_ratio)) / np.asarray(stiffness_ratio)
+    )
     return np.minimum(ratio, 1 / ratio)
 
 
 def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> tuple[Any, float]:
-    """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k) and pi, any shape.
+    """Durations without loads on the lower and on the upper side (`period_case1`): pi sqrt((1+m)/k)
+    and pi, any shape.
 
     Parameters
     ----------
@@ -188,9 +223,11 @@ def unloaded_half_periods(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -
 
 
 def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
-    """T0(k, m) = pi (1 + sqrt((1+m)/k)) (`period_case2`), any shape; pi for k -> infinity, unbounded for k -> 0 or m -> infinity.
+    """T0(k, m) = pi (1 + sqrt((1+m)/k)) (`period_case2`), any shape; pi for k -> infinity,
+    unbounded for k -> 0 or m -> infinity.
 
-    It holds for e = 1 and for r = 1, since without loads the durations do not depend on the amplitude.
+    It holds for e = 1 and for r = 1, since without loads the durations do not depend on the
+    amplitude.
 
     Parameters
     ----------
@@ -209,11 +246,13 @@ def unloaded_period(stiffness_ratio: Numbers, mass_ratio: Numbers = 0.0) -> Any:
 
 
 def reciprocal(system: System, theta0: float) -> tuple[System, float]:
-    """The system with the layers' roles exchanged, and the start that has the same peak ratio (`Prprop`):
+    """The system with the layers' roles exchanged, and the start that has the same peak ratio
+    (`Prprop`):
 
         P_R(V, k), from theta0, equals P_R(V / k, 1 / k) from -theta0
 
-    Constant forces on the upper mass only, m = 0. P and M are divided by k, which rescales time by sqrt(k) and leaves the angles.
+    Constant forces on the upper mass only, m = 0. P and M are divided by k, which rescales time by
+    sqrt(k) and leaves the angles.
 
     Parameters
     ----------
@@ -235,30 +274,58 @@ def reciprocal(system: System, theta0: float) -> tuple[System, float]:
     """
     check_number("theta0", theta0)
     lower, upper = layers(system)
-    if lower.mass != upper.mass or lower.vertical != upper.vertical or lower.outward != -upper.outward:
-        raise ParameterError("the reciprocity of the peak ratio is for m = 0 and forces on the upper mass only", "system")
+    if (
+        lower.mass != upper.mass
+        or lower.vertical != upper.vertical
+        or lower.outward != -upper.outward
+    ):
+        raise ParameterError(
+            "the reciprocity of the peak ratio is for m = 0 and forces on the upper mass only",
+            "system",
+        )
     k = lower.stiffness
-    changes = {"model.stiffness_ratio": 1 / k, "load.vertical": upper.vertical / k, "load.horizontal": upper.outward / k}
+    changes = {
+        "model.stiffness_ratio": 1 / k,
+        "load.vertical": upper.vertical / k,
+        "load.horizontal": upper.outward / k,
+    }
     return system.with_(changes), -float(theta0)
 
 
 def _fall_speed(layer: Layer, peak: float) -> float:
     if peak == 0:
-        raise ParameterError("theta0 must not be 0: a motion with two peaks starts at one of them", "theta0")
+        raise ParameterError(
+            "theta0 must not be 0: a motion with two peaks starts at one of them", "theta0"
+        )
     if peak > layer.kinematic_limit:
         raise ParameterError(
-            f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, got {peak!r}", "theta0"
+            (
+                f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, "
+                f"got {peak!r}"
+            ),
+            "theta0",
         )
     start = float(layer.potential(peak))
     highest = max([0.0, *(float(layer.potential(x)) for x in zeros_of_slope(layer) if x < peak)])
     if start <= highest or layer.slope(peak) <= 0:
-        raise ParameterError(f"a motion from theta0 = {layer.side * peak!r} at rest never reaches theta = 0", "theta0")
+        raise ParameterError(
+            f"a motion from theta0 = {layer.side * peak!r} at rest never reaches theta = 0",
+            "theta0",
+        )
     return math.sqrt(2 * start / layer.mass)
 
 
 def _after_impact(system: System, speed: float, side: int) -> float:
-    """The speed after an impact that ends `side`, of a motion that comes to the contact with the velocity -side speed."""
-    return abs(float(system.impact.velocity_after(system.one_contact, 0.0, -side * speed, side, -side, system.load)))
+    """The speed after an impact that ends `side`, of a motion that comes to the contact with the
+    velocity -side speed.
+    """
+    return abs(
+        float(
+            system.impact.velocity_after(
+                system.one_contact, 0.0, -side * speed, side, -side, system.load
+            )
+        )
+    )
 
 
 def _check_ratios(stiffness_ratio: Any, mass_ratio: Any) -> None:

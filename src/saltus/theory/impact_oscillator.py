@@ -1,4 +1,6 @@
-"""Periodic orbits of the impact oscillator with one impact in q forcing periods: speeds, folds and multipliers."""
+"""Periodic orbits of the impact oscillator with one impact in q forcing periods: speeds, folds and
+multipliers.
+"""
 
 from __future__ import annotations
 
@@ -12,26 +14,33 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems import Harmonic, System, WallOscillator
 
-SAMPLES_PER_TURN = 64  # samples in the shorter of the load's and the free period, by which the maxima of an orbit are found
+# samples in the shorter of the load's and the free period, by which the maxima of an orbit are
+# found
+SAMPLES_PER_TURN = 64
 
 
 @dataclass(frozen=True)
 class WallOrbits:
-    """The orbits of x'' + c x' + k x = mean + A sin(Omega tau + phase), v+ = -e v-, with one impact in q forcing periods.
+    """The orbits of x'' + c x' + k x = mean + A sin(Omega tau + phase), v+ = -e v-, with one impact
+    in q forcing periods.
 
-    From here on x is counted from mean / k, so that the wall is at `wall`. Phi is the free flow over q T, T = 2 pi / Omega,
-    D = det Phi = e^(-c q T), tr its trace, and Delta = det(1 - Phi) = 1 - tr + D. The steady response is periodic by itself, so
-    that the free part y of the motion must satisfy y- = Phi [y- - (0, (1 + e) v)]; it is linear in the speed v before the impact:
+    From here on x is counted from mean / k, so that the wall is at `wall`. Phi is the free flow
+    over q T, T = 2 pi / Omega, D = det Phi = e^(-c q T), tr its trace, and Delta = det(1 - Phi) = 1
+    - tr + D. The steady response is periodic by itself, so that the free part y of the motion must
+    satisfy y- = Phi [y- - (0, (1 + e) v)]; it is linear in the speed v before the impact:
 
-        y- = v (alpha, beta),     alpha = -(1 + e) Phi_12 / Delta,     beta = (1 + e) (D - Phi_22) / Delta
+        y- = v (alpha, beta),     alpha = -(1 + e) Phi_12 / Delta,     beta = (1 + e) (D - Phi_22) /
+        Delta
 
-    The steady response at the impact has the rest of the position and of the velocity, P = wall - alpha v and Q = (1 - beta) v.
-    With gamma = (1 - beta) / Omega the square of the load's amplitude is a quadratic in v:
+    The steady response at the impact has the rest of the position and of the velocity, P = wall -
+    alpha v and Q = (1 - beta) v. With gamma = (1 - beta) / Omega the square of the load's amplitude
+    is a quadratic in v:
 
         A^2 = Z^2 [(wall - alpha v)^2 + gamma^2 v^2],     Z = abs(k - Omega^2 + i c Omega)
 
-    The multipliers are those of Phi S, with S = [[-e, 0], [(a+ + e a-) / v, -e]] at the impact, a- and a+ the accelerations
-    before and after it: lambda^2 - trace lambda + e^2 D = 0, where a+ + e a- = (1 + e) (F - k wall) makes trace linear in 1 / v:
+    The multipliers are those of Phi S, with S = [[-e, 0], [(a+ + e a-) / v, -e]] at the impact, a-
+    and a+ the accelerations before and after it: lambda^2 - trace lambda + e^2 D = 0, where a+ + e
+    a- = (1 + e) (F - k wall) makes trace linear in 1 / v:
 
         trace = -e tr + alpha Delta {Omega^2 wall / v - [c (1 - beta) - (k - Omega^2) alpha]}
 
@@ -96,7 +105,8 @@ class WallOrbits:
 
         A is there Z abs(gamma wall) / sqrt(alpha^2 + gamma^2), below GR.
         """
-        alpha, gamma = self._slopes[0], self._slopes[2]
+        alpha = self._slopes[0]
+        gamma = self._slopes[2]
         return _positive(alpha * self.wall, alpha**2 + gamma**2)
 
     @property
@@ -114,10 +124,14 @@ class WallOrbits:
             v just before the impact.
         """
         alpha, _, gamma = self._slopes
-        return abs(self.impedance) * np.hypot(self.wall - alpha * np.asarray(speed), gamma * np.asarray(speed))[()]
+        return (
+            abs(self.impedance)
+            * np.hypot(self.wall - alpha * np.asarray(speed), gamma * np.asarray(speed))[()]
+        )
 
     def speeds(self, amplitude: float) -> tuple[float, ...]:
-        """The speeds v > 0 of all orbits under the amplitude A, increasing: none, one, or two (between LP and GR).
+        """The speeds v > 0 of all orbits under the amplitude A, increasing: none, one, or two
+        (between LP and GR).
 
         Parameters
         ----------
@@ -125,7 +139,8 @@ class WallOrbits:
             A of the force.
         """
         alpha, _, gamma = self._slopes
-        response, square = abs(amplitude) / abs(self.impedance), alpha**2 + gamma**2
+        response = abs(amplitude) / abs(self.impedance)
+        square = alpha**2 + gamma**2
         inside = square * response**2 - (gamma * self.wall) ** 2
         if inside < 0:
             return ()
@@ -135,7 +150,8 @@ class WallOrbits:
         return tuple(sorted(v for v in roots if v > 0))
 
     def multipliers(self, speed: float) -> np.ndarray:
-        """Both multipliers of the orbit whose impact has the speed v > 0, complex, the larger one first.
+        """Both multipliers of the orbit whose impact has the speed v > 0, complex, the larger one
+        first.
 
         Parameters
         ----------
@@ -162,7 +178,9 @@ class WallOrbits:
             A speed that is not positive.
         """
         if not speed > 0:
-            raise ParameterError(f"an orbit with an impact needs a speed above 0, got {speed!r}; at 0 it grazes")
+            raise ParameterError(
+                f"an orbit with an impact needs a speed above 0, got {speed!r}; at 0 it grazes"
+            )
         return WallOrbit(self, float(speed))
 
     @cached_property
@@ -190,12 +208,15 @@ class WallOrbits:
         alpha, beta, _ = self._slopes
         pull = self.damping * (1 - beta) - self.impedance.real * alpha
         scaled = alpha * self._delta
-        return -self.restitution * (phi11 + phi22) - scaled * pull, scaled * self.frequency**2 * self.wall
+        return -self.restitution * (
+            phi11 + phi22
+        ) - scaled * pull, scaled * self.frequency**2 * self.wall
 
 
 @dataclass(frozen=True)
 class WallOrbit:
-    """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion between two impacts.
+    """One of `WallOrbits`, admissible or not: its impact, its load, its multipliers, and the motion
+    between two impacts.
 
     Attributes
     ----------
@@ -221,10 +242,14 @@ class WallOrbit:
 
     @property
     def impact_time(self) -> float:
-        """tau of one impact, in [0, 2 pi / Omega); for q = 2, 3, ... there are q orbits, shifted by whole forcing periods."""
+        """tau of one impact, in [0, 2 pi / Omega); for q = 2, 3, ...
+
+        there are q orbits, shifted by whole forcing periods.
+        """
         family = self.family
         position, velocity = self._steady
-        behind = math.atan2(family.impedance.imag, family.impedance.real)  # phase by which the response lags a cosine
+        # phase by which the response lags a cosine
+        behind = math.atan2(family.impedance.imag, family.impedance.real)
         crest = math.atan2(-velocity / family.frequency, position) + behind
         return float((crest + math.pi / 2 - family.phase) % (2 * math.pi) / family.frequency)
 
@@ -245,10 +270,11 @@ class WallOrbit:
 
     @cached_property
     def clearance(self) -> float:
-        """d - x at the highest maximum between impacts, infinite if there is none; at 0 the orbit grazes, below 0 it is not
-        admissible.
+        """d - x at the highest maximum between impacts, infinite if there is none; at 0 the orbit
+        grazes, below 0 it is not admissible.
 
-        Maxima are found among samples, `SAMPLES_PER_TURN` in the shorter of the load's and the free period.
+        Maxima are found among samples, `SAMPLES_PER_TURN` in the shorter of the load's and the free
+        period.
         """
         from scipy.optimize import brentq
 
@@ -257,19 +283,24 @@ class WallOrbit:
         after = np.linspace(0, family.duration, SAMPLES_PER_TURN * math.ceil(turns) + 1)[1:]
         rising = self._between(after)[1] > 0
         tops = np.flatnonzero(rising[:-1] & ~rising[1:])
-        maxima = [brentq(lambda s: self._between(s)[1], after[i], after[i + 1], xtol=1e-14) for i in tops]
+        maxima = [
+            brentq(lambda s: self._between(s)[1], after[i], after[i + 1], xtol=1e-14) for i in tops
+        ]
         heights = [float(self._between(s)[0]) for s in maxima]
         return family.wall - max(heights) if heights else math.inf
 
     def state(self, tau: Any) -> tuple[Any, Any]:
-        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; at an impact, x' is the velocity after it.
+        """x and x' at tau, any shape, of the orbit with an impact at `impact_time`; at an impact,
+        x' is the velocity after it.
 
         Parameters
         ----------
         tau
             The dimensionless time, any shape.
         """
-        x, velocity = self._between((np.asarray(tau, dtype=float) - self.impact_time) % self.family.duration)
+        x, velocity = self._between(
+            (np.asarray(tau, dtype=float) - self.impact_time) % self.family.duration
+        )
         return x + self.family.centre, velocity
 
     @property
@@ -280,16 +311,26 @@ class WallOrbit:
 
     def _between(self, since: Any) -> tuple[Any, Any]:
         """x - mean / k and x' at the times `since` an impact."""
-        family, (position, velocity) = self.family, self._steady
-        free_x, free_v = family.wall - position, -family.restitution * self.speed - velocity
+        family = self.family
+        (position, velocity) = self._steady
+        free_x = family.wall - position
+        free_v = -family.restitution * self.speed - velocity
         phi11, phi12, phi21, phi22 = free_flow(since, family.stiffness, family.damping)
-        cosine, sine = np.cos(family.frequency * since), np.sin(family.frequency * since)
+        cosine = np.cos(family.frequency * since)
+        sine = np.sin(family.frequency * since)
         x = position * cosine + velocity / family.frequency * sine + phi11 * free_x + phi12 * free_v
-        return x, velocity * cosine - family.frequency * position * sine + phi21 * free_x + phi22 * free_v
+        return (
+            x,
+            velocity * cosine
+            - family.frequency * position * sine
+            + phi21 * free_x
+            + phi22 * free_v,
+        )
 
 
 def wall_orbits(system: System, period: int = 1) -> WallOrbits:
-    """The orbits of an impact oscillator with one impact in `period` forcing periods; the system's amplitude does not matter.
+    """The orbits of an impact oscillator with one impact in `period` forcing periods; the system's
+    amplitude does not matter.
 
     Parameters
     ----------
@@ -301,30 +342,50 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     Raises
     ------
     ParameterError
-        Another model, a force that is not one harmonic of order 1, damping that is not below critical, a period below 1, an
-        impact law that is not v+ = -e v-, a resonance without damping, at which no speed or every speed is a solution.
+        Another model, a force that is not one harmonic of order 1, damping that is not below
+        critical, a period below 1, an impact law that is not v+ = -e v-, a resonance without
+        damping, at which no speed or every speed is a solution.
 
     Examples
     --------
     >>> len(saltus.theory.wall_orbits(wall).speeds(8.0))
     1
     """
-    model, load = system.model, system.load
+    model = system.model
+    load = system.load
     if not isinstance(model, WallOscillator):
-        raise ParameterError(f"wall_orbits is for a WallOscillator, got {type(model).__name__}", "system")
+        raise ParameterError(
+            f"wall_orbits is for a WallOscillator, got {type(model).__name__}", "system"
+        )
     force = load.channels.get("force")
     if not isinstance(force, Harmonic) or force.order != 1 or load.frequency is None:
-        raise ParameterError(f"wall_orbits needs load.force to be one Harmonic of order 1, got {force!r}", "load.force")
+        raise ParameterError(
+            f"wall_orbits needs load.force to be one Harmonic of order 1, got {force!r}",
+            "load.force",
+        )
     if not model.damping**2 < 4 * model.stiffness:
         most = 2 * math.sqrt(model.stiffness)
         raise ParameterError(
-            f"wall_orbits needs damping below critical, 2 sqrt(k) = {most:.6g}, got {model.damping!r}", "model.damping"
+            (
+                f"wall_orbits needs damping below critical, 2 sqrt(k) = {most:.6g}, got "
+                f"{model.damping!r}"
+            ),
+            "model.damping",
         )
     if isinstance(period, bool) or period != int(period) or period < 1:
-        raise ParameterError(f"period must be a whole number of forcing periods, at least 1, got {period!r}", "period")
-    factors = [float(system.impact.velocity_after(model, t, v, 1, 1, load)) / v for t, v in ((0.0, 1.0), (1.0, 0.125))]
+        raise ParameterError(
+            f"period must be a whole number of forcing periods, at least 1, got {period!r}",
+            "period",
+        )
+    factors = [
+        float(system.impact.velocity_after(model, t, v, 1, 1, load)) / v
+        for t, v in ((0.0, 1.0), (1.0, 0.125))
+    ]
     if not math.isclose(*factors, rel_tol=1e-12):
-        raise ParameterError(f"wall_orbits needs an impact law v+ = -e v- with a constant e, got {system.impact!r}", "impact")
+        raise ParameterError(
+            f"wall_orbits needs an impact law v+ = -e v- with a constant e, got {system.impact!r}",
+            "impact",
+        )
     centre = force.mean / model.stiffness
     orbits = WallOrbits(
         stiffness=model.stiffness,
@@ -336,18 +397,29 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
         phase=force.phase,
         centre=centre,
     )
-    if orbits._delta < 1e-20 or math.hypot(orbits._slopes[0], orbits._slopes[2]) < 1e-10 or orbits.impedance == 0:
+    if (
+        orbits._delta < 1e-20
+        or math.hypot(orbits._slopes[0], orbits._slopes[2]) < 1e-10
+        or orbits.impedance == 0
+    ):
         raise ParameterError(
-            "without damping a resonance leaves the speed of the impact open; give the model some damping", "model.damping"
+            (
+                "without damping a resonance leaves the speed of the impact open; give the model "
+                "some damping"
+            ),
+            "model.damping",
         )
     return orbits
 
 
 def free_flow(t: Any, stiffness: float, damping: float) -> tuple[Any, Any, Any, Any]:
-    """Phi_11, Phi_12, Phi_21, Phi_22 of the free flow of x'' + c x' + k x = 0, c^2 < 4 k, over the times t, any shape."""
+    """Phi_11, Phi_12, Phi_21, Phi_22 of the free flow of x'' + c x' + k x = 0, c^2 < 4 k, over the
+    times t, any shape.
+    """
     w = math.sqrt(stiffness - damping**2 / 4)
     shrink = np.exp(-damping * np.asarray(t, dtype=float) / 2)
-    cosine, sine = shrink * np.cos(w * t), shrink * np.sin(w * t) / w
+    cosine = shrink * np.cos(w * t)
+    sine = shrink * np.sin(w * t) / w
     return cosine + damping / 2 * sine, sine, -stiffness * sine, cosine - damping / 2 * sine
 
 

@@ -1,5 +1,6 @@
-"""One open layer under constant loads, as a one-sided oscillator: the basis of the closed forms here; its energies, and
-the amplitudes beyond which a motion is no longer one of the real mechanism."""
+"""One open layer under constant loads, as a one-sided oscillator: the basis of the closed forms
+here; its energies, and the amplitudes beyond which a motion is no longer one of the real
+mechanism."""
 
 from __future__ import annotations
 
@@ -19,11 +20,13 @@ from saltus.theory.arguments import check_side
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """The layer open on one side, in its opening x = s theta >= 0 (`gov_eqn_theta_long` under constant loads):
+    """The layer open on one side, in its opening x = s theta >= 0 (`gov_eqn_theta_long` under
+    constant loads):
 
         mass x'' + damping x' + stiffness x = outward sin(beta0 + x) + vertical cos(beta0 + x)
 
-    with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H, vertical (1+v)^P V.
+    with the powers P taken: mass (1+m)^P, damping c^P C, stiffness k^P, outward s (1+h)^P H,
+    vertical (1+v)^P V.
 
     Attributes
     ----------
@@ -77,14 +80,16 @@ class Layer:
         return self.outward * np.sin(self.beta0 + x) + self.vertical * np.cos(self.beta0 + x)
 
     def potential(self, x: Any) -> Any:
-        """P (`pot_balance0`), zero at x = 0; the differences of sines are written as products, which are exact for small x.
+        """P (`pot_balance0`), zero at x = 0; the differences of sines are written as products,
+        which are exact for small x.
 
         Parameters
         ----------
         x
             The opening of the layer, rad; any shape.
         """
-        half, middle = np.sin(x / 2), self.beta0 + x / 2
+        half = np.sin(x / 2)
+        middle = self.beta0 + x / 2
         work = 2 * half * (self.outward * np.sin(middle) + self.vertical * np.cos(middle))
         return self.stiffness * x * x / 2 - work
 
@@ -106,10 +111,15 @@ class Layer:
         x
             The opening of the layer, rad; any shape.
         """
-        return self.stiffness - self.outward * np.cos(self.beta0 + x) + self.vertical * np.sin(self.beta0 + x)
+        return (
+            self.stiffness
+            - self.outward * np.cos(self.beta0 + x)
+            + self.vertical * np.sin(self.beta0 + x)
+        )
 
     def eigenvalues(self, curvature: float) -> tuple[complex, complex]:
-        """The eigenvalues of the motion linearised at an equilibrium with d2P/dx2 = `curvature`, the faster growing one first.
+        """The eigenvalues of the motion linearised at an equilibrium with d2P/dx2 = `curvature`,
+        the faster growing one first.
 
         Parameters
         ----------
@@ -132,7 +142,8 @@ class Layer:
 
 
 def open_layer(system: System, side: int) -> Layer:
-    """The layer of a metainterface that is open on `side` (+1 the lower one, -1 the upper one), under constant loads.
+    """The layer of a metainterface that is open on `side` (+1 the lower one, -1 the upper one),
+    under constant loads.
 
     Parameters
     ----------
@@ -189,9 +200,14 @@ def metainterface(system: System) -> Metainterface:
     """The system's model, refused unless it is an exact `Metainterface`."""
     model = system.model
     if not isinstance(model, Metainterface):
-        raise ParameterError(f"this closed form is for a Metainterface, got a {type(model).__name__}", "system")
+        raise ParameterError(
+            f"this closed form is for a Metainterface, got a {type(model).__name__}", "system"
+        )
     if model.smoothing is not None:
-        raise ParameterError("this closed form is for the exact sign of theta; drop the model's smoothing", "model.smoothing")
+        raise ParameterError(
+            "this closed form is for the exact sign of theta; drop the model's smoothing",
+            "model.smoothing",
+        )
     return model
 
 
@@ -206,15 +222,25 @@ def constant_loads(system: System) -> dict[str, float]:
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(
-                f"this closed form is for constant loads, but load.{name} varies in time; give it as a number", f"load.{name}"
+                (
+                    f"this closed form is for constant loads, but load.{name} varies in time; give "
+                    "it as a number"
+                ),
+                f"load.{name}",
             )
-    return {name: s.value for name, s in system.load.channels.items() if isinstance(s, Constant) and "ground" not in name}
+    return {
+        name: s.value
+        for name, s in system.load.channels.items()
+        if isinstance(s, Constant) and "ground" not in name
+    }
 
 
 def potential_energy(system: System, theta: Numbers) -> Any:
-    """P(theta) of `pot_balance0`, constant H and loads on the lower mass included, zero at theta = 0; any shape, over K2:
+    """P(theta) of `pot_balance0`, constant H and loads on the lower mass included, zero at theta =
+    0; any shape, over K2:
 
-        P = k^P theta^2 / 2 + V [sin(beta0) - sin(beta0 + abs(theta))] + s H [cos(beta0 + abs(theta)) - cos(beta0)]
+        P = k^P theta^2 / 2 + V [sin(beta0) - sin(beta0 + abs(theta))] + s H [cos(beta0 +
+        abs(theta)) - cos(beta0)]
 
     where V, H stand for (1+v)^P V, (1+h)^P H, and s for the sign of theta.
 
@@ -239,7 +265,8 @@ def potential_energy(system: System, theta: Numbers) -> Any:
 
 
 def potential_slope(system: System, theta: Numbers) -> Any:
-    """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided values. Any shape.
+    """dP/dtheta, minus the moment on the open layer; at theta = 0 the mean of its two one-sided
+    values. Any shape.
 
     Parameters
     ----------
@@ -257,8 +284,11 @@ def potential_slope(system: System, theta: Numbers) -> Any:
     return _by_side(system, theta, Layer.slope, odd=True)
 
 
-def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Numbers | None = None) -> Any:
-    """E = T + P over K2, with the kinetic energy of the moving layer, (1+m)^P theta'^2 / 2 on a ground at rest (`kin_eng`).
+def total_energy(
+    system: System, theta: Numbers, velocity: Numbers, side: Numbers | None = None
+) -> Any:
+    """E = T + P over K2, with the kinetic energy of the moving layer, (1+m)^P theta'^2 / 2 on a
+    ground at rest (`kin_eng`).
 
     Parameters
     ----------
@@ -284,7 +314,11 @@ def total_energy(system: System, theta: Numbers, velocity: Numbers, side: Number
     if side is None:
         if lower.mass != upper.mass and np.any((theta == 0) & (velocity != 0)):
             raise ParameterError(
-                "side must be given where theta is 0, since the layers' masses differ; it says which one moves", "side"
+                (
+                    "side must be given where theta is 0, since the layers' masses differ; it says "
+                    "which one moves"
+                ),
+                "side",
             )
         side = np.where(theta < 0, -1, 1)
     kinetic = system.model.kinetic_energy(0.0, theta, velocity, np.asarray(side), system.load)
@@ -326,8 +360,11 @@ class AmplitudeLimit:
     meaning: str
 
 
-def amplitude_limits(system: System, parameters: Mapping[str, Any] | None = None) -> tuple[AmplitudeLimit, ...]:
-    """The limits of the metainterface (erratum 20), pi - beta0 and 2 (pi - beta0); none are known for other models.
+def amplitude_limits(
+    system: System, parameters: Mapping[str, Any] | None = None
+) -> tuple[AmplitudeLimit, ...]:
+    """The limits of the metainterface (erratum 20), pi - beta0 and 2 (pi - beta0); none are known
+    for other models.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Equilibria under constant loads, their stability, and when a small disturbance of theta = 0 diverges."""
+"""Equilibria under constant loads, their stability, and when a small disturbance of theta = 0
+diverges.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from itertools import pairwise
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
 
-MOMENT_ROUNDING = 4e-15  # moments below this share of a layer's scale count as zero, such as V cos(beta0) at pi/2
+# moments below this share of a layer's scale count as zero, such as V cos(beta0) at pi/2
+MOMENT_ROUNDING = 4e-15
 
 
 class Stability(Enum):
@@ -67,10 +70,12 @@ class LoadedEquilibrium:
 
 
 def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
-    """Every equilibrium of the full equation within the kinematic limit 2 (pi - beta0), by increasing theta.
+    """Every equilibrium of the full equation within the kinematic limit 2 (pi - beta0), by
+    increasing theta.
 
-    They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the loads hold both layers
-    closed or push both open. Between the zeros of P'', known in closed form, P' is monotone, so none can be missed.
+    They are the zeros of P'(theta) (`pot_balance0`), stable where P'' > 0, and theta = 0 while the
+    loads hold both layers closed or push both open. Between the zeros of P'', known in closed form,
+    P' is monotone, so none can be missed.
 
     Parameters
     ----------
@@ -88,7 +93,9 @@ def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
     [-1.422524, -0.549847, 0.0, 0.549847, 1.422524]
     """
     lower, upper = layers(system)
-    found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [_deformed(upper, x) for x in zeros_of_slope(upper)]
+    found = [_deformed(lower, x) for x in zeros_of_slope(lower)] + [
+        _deformed(upper, x) for x in zeros_of_slope(upper)
+    ]
     undeformed = undeformed_stability(system)
     if undeformed is not None:
         found.append(LoadedEquilibrium(0.0, undeformed, 0.0, None, None, True))
@@ -98,9 +105,10 @@ def equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 def undeformed_stability(system: System) -> Stability | None:
     """Stability of theta = 0 (`stabeunstabletrivial`), or None where it is no equilibrium.
 
-    With H = 0 it is stable for V cos(beta0) < 0 and unstable for V cos(beta0) > 0; in general, stable if the loads close
-    both layers. If they push one open and the other closed the system leaves, and theta = 0 is no equilibrium.
-    At V cos(beta0) = 0 the curvature decides, k^P + V sin(beta0).
+    With H = 0 it is stable for V cos(beta0) < 0 and unstable for V cos(beta0) > 0; in general,
+    stable if the loads close both layers. If they push one open and the other closed the system
+    leaves, and theta = 0 is no equilibrium. At V cos(beta0) = 0 the curvature decides, k^P + V
+    sin(beta0).
 
     Parameters
     ----------
@@ -121,21 +129,26 @@ def undeformed_stability(system: System) -> Stability | None:
 
 
 def zeros_of_slope(layer: Layer) -> Iterator[float]:
-    """The openings 0 < x <= 2 (pi - beta0) where P'(x) = 0, increasing; a double zero is given once."""
+    """The openings 0 < x <= 2 (pi - beta0) where P'(x) = 0, increasing; a double zero is given
+    once.
+    """
     from scipy.optimize import brentq
 
     nodes = [0.0, *layer.inflections(), layer.kinematic_limit]
     signs = [slope_sign(layer), *(_sign(layer.slope(x), layer) for x in nodes[1:])]
     for (a, b), (before, after) in zip(pairwise(nodes), pairwise(signs), strict=True):
         if before * after < 0:
-            start = a if a > 0 or _sign(layer.slope(0.0), layer) else _past_contact(layer, b, before)
+            start = (
+                a if a > 0 or _sign(layer.slope(0.0), layer) else _past_contact(layer, b, before)
+            )
             yield float(brentq(layer.slope, start, b, xtol=1e-15, rtol=1e-15))
         elif after == 0:
             yield b
 
 
 def slope_sign(layer: Layer) -> int:
-    """The sign of P' at small openings: that of the first of P', P'', ... that is not zero at x = 0.
+    """The sign of P' at small openings: that of the first of P', P'', ... that is not zero at x =
+    0.
 
     P''' is the push, and if P', P'' and P''' vanish the next derivative is the stiffness, above 0.
     """
@@ -150,7 +163,9 @@ def _sign(value: float, layer: Layer) -> int:
 
 
 def _past_contact(layer: Layer, end: float, sign: int) -> float:
-    """A small opening beyond the zero at x = 0, at which P' has the `sign` that it has at small openings."""
+    """A small opening beyond the zero at x = 0, at which P' has the `sign` that it has at small
+    openings.
+    """
     x = end / 2
     while layer.slope(x) * sign <= 0:
         x /= 2
@@ -164,18 +179,25 @@ def _deformed(layer: Layer, x: float) -> LoadedEquilibrium:
         stability = Stability.FOLD
     within = x <= math.pi - layer.beta0
     return LoadedEquilibrium(
-        layer.side * x, stability, float(layer.potential(x)), curvature, layer.eigenvalues(curvature), within
+        layer.side * x,
+        stability,
+        float(layer.potential(x)),
+        curvature,
+        layer.eigenvalues(curvature),
+        within,
     )
 
 
 @dataclass(frozen=True, slots=True)
 class Divergence:
-    """The initial theta(0), at rest, from which the linearised motion does not return to theta = 0 (bullets after `minmin`).
+    """The initial theta(0), at rest, from which the linearised motion does not return to theta = 0
+    (bullets after `minmin`).
 
     Attributes
     ----------
     from_rest
-        Whether it diverges from every small theta(0) of at least one sign: theta = 0 is then unstable.
+        Whether it diverges from every small theta(0) of at least one sign: theta = 0 is then
+        unstable.
     above
         It diverges from every theta(0) above this one; None if never.
     below
@@ -193,13 +215,16 @@ class Divergence:
 
 
 def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
-    """The equilibria of `gov_eqn_constant_loading_lin`, by increasing theta: theta_B, 0 and theta_A, where they exist:
+    """The equilibria of `gov_eqn_constant_loading_lin`, by increasing theta: theta_B, 0 and
+    theta_A, where they exist:
 
-        theta_A = V cos(beta0) / (k + V sin(beta0)) > 0,   theta_B = -V cos(beta0) / (1 + V sin(beta0)) < 0   (`non-trivial`)
+        theta_A = V cos(beta0) / (k + V sin(beta0)) > 0,   theta_B = -V cos(beta0) / (1 + V
+        sin(beta0)) < 0   (`non-trivial`)
 
-    with P(theta) - P(0) = -(V cos(beta0))^2 / (2 (k^P + V sin(beta0))), so each is stable just where theta = 0 is not. For
-    V cos(beta0) < 0, both exist where V sin(beta0) < -max(1, k), one of them where V sin(beta0) < -min(1, k) (`minmin`,
-    errata 15). They approximate the equilibria of the full equation only for beta0 close to pi/2. A constant H is included.
+    with P(theta) - P(0) = -(V cos(beta0))^2 / (2 (k^P + V sin(beta0))), so each is stable just
+    where theta = 0 is not. For V cos(beta0) < 0, both exist where V sin(beta0) < -max(1, k), one of
+    them where V sin(beta0) < -min(1, k) (`minmin`, errata 15). They approximate the equilibria of
+    the full equation only for beta0 close to pi/2. A constant H is included.
 
     Parameters
     ----------
@@ -224,11 +249,13 @@ def linear_equilibria(system: System) -> tuple[LoadedEquilibrium, ...]:
 
 
 def divergence(system: System) -> Divergence:
-    """The divergence conditions under small rotations (bullets after `minmin`), any k, m and constant loads.
+    """The divergence conditions under small rotations (bullets after `minmin`), any k, m and
+    constant loads.
 
-    If the loads push a layer open at theta = 0 (V cos(beta0) > 0) the motion diverges from every disturbance to its side. If they
-    hold it closed (V cos(beta0) < 0) the motion diverges if k^P + V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B.
-    At beta0 = pi/2 both are 0: the motion diverges from theta(0) > 0 for V < -k, from theta(0) < 0 for V < -1.
+    If the loads push a layer open at theta = 0 (V cos(beta0) > 0) the motion diverges from every
+    disturbance to its side. If they hold it closed (V cos(beta0) < 0) the motion diverges if k^P +
+    V sin(beta0) < 0 and theta(0) lies beyond theta_A or theta_B. At beta0 = pi/2 both are 0: the
+    motion diverges from theta(0) > 0 for V < -k, from theta(0) < 0 for V < -1.
 
     Parameters
     ----------
@@ -246,24 +273,34 @@ def divergence(system: System) -> Divergence:
     Divergence(from_rest=False, above=None, below=None)
     """
     lower, upper = layers(system)
-    above, below = _threshold(lower), _threshold(upper)
+    above = _threshold(lower)
+    below = _threshold(upper)
     return Divergence(0.0 in (above, below), above, None if below is None else -below)
 
 
 def _threshold(layer: Layer) -> float | None:
-    """The opening beyond which the layer diverges or settles open; 0 if it does so from every opening, None if from none."""
+    """The opening beyond which the layer diverges or settles open; 0 if it does so from every
+    opening, None if from none.
+    """
     if slope_sign(layer) < 0:
         return 0.0
-    kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))
+    kappa = float(layer.curvature(0.0))
+    push = float(layer.push(0.0))
     return push / kappa if kappa < -MOMENT_ROUNDING * layer.scale else None
 
 
 def _linear_equilibrium(layer: Layer) -> LoadedEquilibrium | None:
-    kappa, push = float(layer.curvature(0.0)), float(layer.push(0.0))
+    kappa = float(layer.curvature(0.0))
+    push = float(layer.push(0.0))
     if min(abs(kappa), abs(push)) <= MOMENT_ROUNDING * layer.scale or push / kappa < 0:
         return None
     x = push / kappa
     stability = Stability.STABLE if kappa > 0 else Stability.UNSTABLE
     return LoadedEquilibrium(
-        layer.side * x, stability, -(push**2) / (2 * kappa), kappa, layer.eigenvalues(kappa), x <= math.pi - layer.beta0
+        layer.side * x,
+        stability,
+        -(push**2) / (2 * kappa),
+        kappa,
+        layer.eigenvalues(kappa),
+        x <= math.pi - layer.beta0,
     )

@@ -19,9 +19,11 @@ from saltus.theory.small_vibrations import vibration
 class Arc:
     """One smooth arc in the opening x of a layer, t counted from its start (`linsol_theta1`):
 
-        x(t) = centre + e^(-decay t) [(start - centre) cos(w t) + (velocity + decay (start - centre)) / w sin(w t)]
+        x(t) = centre + e^(-decay t) [(start - centre) cos(w t) + (velocity + decay (start -
+        centre)) / w sin(w t)]
 
-    It is evaluated as start (...) + velocity (...) + centre (1 - ...), which is accurate also for short t.
+    It is evaluated as start (...) + velocity (...) + centre (1 - ...), which is accurate also for
+    short t.
     """
 
     layer: Layer
@@ -33,28 +35,43 @@ class Arc:
 
     def position(self, t: Any) -> Any:
         """x(t)."""
-        sine, ratio = np.sin(self.frequency * t), self.decay / self.frequency
+        sine = np.sin(self.frequency * t)
+        ratio = self.decay / self.frequency
         shrink = np.exp(-self.decay * t)
-        lost = -np.expm1(-self.decay * t) + shrink * (2 * np.sin(self.frequency * t / 2) ** 2 - ratio * sine)
-        return self.start * (1 - lost) + self.velocity * shrink * sine / self.frequency + self.centre * lost
+        lost = -np.expm1(-self.decay * t) + shrink * (
+            2 * np.sin(self.frequency * t / 2) ** 2 - ratio * sine
+        )
+        return (
+            self.start * (1 - lost)
+            + self.velocity * shrink * sine / self.frequency
+            + self.centre * lost
+        )
 
     def speed(self, t: Any) -> Any:
         """x'(t)."""
-        sine, cosine = np.sin(self.frequency * t), np.cos(self.frequency * t)
+        sine = np.sin(self.frequency * t)
+        cosine = np.cos(self.frequency * t)
         pull = (self.centre - self.start) * (self.frequency + self.decay**2 / self.frequency)
-        return np.exp(-self.decay * t) * (self.velocity * (cosine - self.decay / self.frequency * sine) + pull * sine)
+        return np.exp(-self.decay * t) * (
+            self.velocity * (cosine - self.decay / self.frequency * sine) + pull * sine
+        )
 
     def impact_time(self) -> float | None:
         """The first t > 0 with x(t) = 0, or None if the layer stays open for good.
 
-        x' is zero every pi / w; the first minimum is the lowest one, so that x has no zero at all if it has none before it.
+        x' is zero every pi / w; the first minimum is the lowest one, so that x has no zero at all
+        if it has none before it.
         """
         from scipy.optimize import brentq
 
-        half, top = math.pi / self.frequency, 0.0
+        half = math.pi / self.frequency
+        top = 0.0
         if self.velocity > 0:
             pull = (self.centre - self.start) * (self.frequency + self.decay**2 / self.frequency)
-            top = math.atan2(self.velocity, self.velocity * self.decay / self.frequency - pull) / self.frequency
+            top = (
+                math.atan2(self.velocity, self.velocity * self.decay / self.frequency - pull)
+                / self.frequency
+            )
         bottom = top + half
         if self.position(bottom) >= 0:
             return None
@@ -75,8 +92,8 @@ class LinearMotion:
     velocity_after
         (n,): theta' just after.
     arcs
-        The motion between impacts: the first arc begins at 0, each other one at an impact; an impact that stops the motion begins
-        no arc.
+        The motion between impacts: the first arc begins at 0, each other one at an impact; an
+        impact that stops the motion begins no arc.
     end
         The time up to which it is known: the next impact, or infinity if none follows.
 
@@ -95,7 +112,8 @@ class LinearMotion:
     end: float
 
     def __call__(self, tau: Any) -> tuple[Any, Any]:
-        """theta and theta' at `tau`, any shape, from 0 to `end`; just after an impact the velocity is the one after it.
+        """theta and theta' at `tau`, any shape, from 0 to `end`; just after an impact the velocity
+        is the one after it.
 
         Raises
         ------
@@ -105,24 +123,33 @@ class LinearMotion:
         tau = np.asarray(tau, dtype=float)
         if np.any((tau < 0) | (tau > self.end)):
             raise ParameterError(
-                f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for more impacts", "tau"
+                (
+                    f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for "
+                    "more impacts"
+                ),
+                "tau",
             )
-        theta, velocity = np.empty_like(tau), np.empty_like(tau)
+        theta = np.empty_like(tau)
+        velocity = np.empty_like(tau)
         index = np.searchsorted(self.impact_times, tau, side="right")
         for i in np.unique(index):
             here = index == i
             if i < len(self.arcs):
-                arc, local = self.arcs[i], tau[here] - (self.impact_times[i - 1] if i else 0.0)
-                theta[here], velocity[here] = arc.layer.side * arc.position(local), arc.layer.side * arc.speed(local)
+                arc = self.arcs[i]
+                local = tau[here] - (self.impact_times[i - 1] if i else 0.0)
+                theta[here] = arc.layer.side * arc.position(local)
+                velocity[here] = arc.layer.side * arc.speed(local)
             else:
                 theta[here] = velocity[here] = 0.0
         return theta[()], velocity[()]
 
 
 def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
-    """The solution of `gov_eqn_constant_loading_lin` from theta0, at rest, through so many impacts (`linsol_theta1`).
+    """The solution of `gov_eqn_constant_loading_lin` from theta0, at rest, through so many impacts
+    (`linsol_theta1`).
 
-    Any k, m, c, e or r and either sign of theta0; a constant H acts through s H sin(beta0) and the stiffness -s H cos(beta0).
+    Any k, m, c, e or r and either sign of theta0; a constant H acts through s H sin(beta0) and the
+    stiffness -s H cos(beta0).
 
     Parameters
     ----------
@@ -136,8 +163,8 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
     Raises
     ------
     ParameterError
-        theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts asked for,
-        a load that varies in time.
+        theta0 = 0, a layer that is not subcritical (mu < 1 and k^P + V sin(beta0) > 0), no impacts
+        asked for, a load that varies in time.
 
     Examples
     --------
@@ -152,13 +179,20 @@ def linear_motion(system: System, theta0: float, impacts: int) -> LinearMotion:
         raise ParameterError(f"theta0 must not be 0, where nothing moves, got {theta0!r}", "theta0")
     by_side = {layer.side: layer for layer in layers(system)}
     side = 1 if theta0 > 0 else -1
-    arcs, times = [_arc(by_side[side], abs(theta0), 0.0)], [0.0]
+    arcs = [_arc(by_side[side], abs(theta0), 0.0)]
+    times = [0.0]
     before: list[float] = []
     after: list[float] = []
     while (t := arcs[-1].impact_time()) is not None and len(before) < impacts:
         times.append(times[-1] + t)
         before.append(side * float(arcs[-1].speed(t)))
-        after.append(float(system.impact.velocity_after(system.one_contact, times[-1], before[-1], side, -side, system.load)))
+        after.append(
+            float(
+                system.impact.velocity_after(
+                    system.one_contact, times[-1], before[-1], side, -side, system.load
+                )
+            )
+        )
         side = -side
         if after[-1] == 0:
             t = None
@@ -172,7 +206,11 @@ def _arc(layer: Layer, start: float, velocity: float) -> Arc:
     vib = vibration(layer)
     if vib.damping_ratio >= 1:
         raise ParameterError(
-            f"the damping must be subcritical (mu < 1) for vibrations, got mu = {vib.damping_ratio:.6g}", "model.damping"
+            (
+                "the damping must be subcritical (mu < 1) for vibrations, got mu = "
+                f"{vib.damping_ratio:.6g}"
+            ),
+            "model.damping",
         )
     decay = vib.damping_ratio * vib.frequency
     frequency = math.sqrt(1 - vib.damping_ratio**2) * vib.frequency

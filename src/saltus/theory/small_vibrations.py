@@ -1,5 +1,6 @@
-"""Small free vibrations under a constant vertical load: frequencies, period, decay by impacts; the upright
-cell, and the onset of the motion under a fast horizontal load, a closed form that the paper lacks (errata 28)."""
+"""Small free vibrations under a constant vertical load: frequencies, period, decay by impacts; the
+upright cell, and the onset of the motion under a fast horizontal load, a closed form that the paper
+lacks (errata 28)."""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ class Vibration:
 def vibrations(system: System) -> tuple[Vibration, Vibration]:
     """Omega_0 and mu on the lower layer (p = 1) and on the upper one (p = 2) (`fre_freq_xi`):
 
-        Omega_0 = sqrt(kappa / M),   mu = C_p / (2 sqrt(M kappa)),   kappa = k^P + V sin(beta0),  M = (1+m)^P,  C_p = c^P C
+        Omega_0 = sqrt(kappa / M),   mu = C_p / (2 sqrt(M kappa)),   kappa = k^P + V sin(beta0),  M
+        = (1+m)^P,  C_p = c^P C
 
     A constant H adds -s H cos(beta0) to kappa.
 
@@ -75,7 +77,10 @@ def vibration(layer: Layer) -> Vibration:
     if kappa <= 0:
         name = "lower" if layer.side > 0 else "upper"
         raise ParameterError(
-            f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = {kappa:.6g} must be above 0",
+            (
+                f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = "
+                f"{kappa:.6g} must be above 0"
+            ),
             "load.vertical",
         )
     frequency = math.sqrt(kappa / layer.mass)
@@ -86,9 +91,11 @@ def vibration(layer: Layer) -> Vibration:
 def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0(theta0) of the symmetric undamped system (`t-beta`; k = 1, m = C = 0, e = 1), any shape:
 
-        T0 = 4 / sqrt(kappa) arccos(1 / (1 - kappa abs(theta0) / (V cos(beta0)))),   kappa = 1 + V sin(beta0)
+        T0 = 4 / sqrt(kappa) arccos(1 / (1 - kappa abs(theta0) / (V cos(beta0)))),   kappa = 1 + V
+        sin(beta0)
 
-    continued to kappa <= 0, where it is an arccosh and grows without bound as abs(theta0) nears the saddle of `non-trivial`.
+    continued to kappa <= 0, where it is an arccosh and grows without bound as abs(theta0) nears the
+    saddle of `non-trivial`.
 
     Parameters
     ----------
@@ -102,7 +109,8 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     Raises
     ------
     ParameterError
-        V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past the saddle.
+        V cos(beta0) > 0 (theta = 0 is then unstable, `stabeunstabletrivial`), or theta0 at or past
+        the saddle.
 
     Examples
     --------
@@ -115,14 +123,22 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     if closing <= MOMENT_ROUNDING:
         if closing < -MOMENT_ROUNDING or kappa <= 0:
             raise ParameterError(
-                f"no vibration about theta = 0, stable only for V cos(beta0) below 0, got {-closing:.6g}", "vertical"
+                (
+                    "no vibration about theta = 0, stable only for V cos(beta0) below 0, got "
+                    f"{-closing:.6g}"
+                ),
+                "vertical",
             )
         period = np.full_like(size, 2 * math.pi / math.sqrt(kappa))
         return period if period.ndim else float(period)
     stretch = kappa * size / closing  # the argument of arccos is 1 / (1 + stretch)
     if np.any(stretch <= -1):
         raise ParameterError(
-            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges", "theta0"
+            (
+                f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
+                "motion diverges"
+            ),
+            "theta0",
         )
     tangent = np.sqrt(np.abs(stretch) * (2 + stretch))
     if kappa > 0:
@@ -137,7 +153,8 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
 def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """T0 for abs(theta0) << abs(V cos(beta0) / (1 + V sin(beta0))) (`t-beta_exp`), any shape:
 
-        T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa abs(theta0) / (V cos(beta0))
+        T0 = 4 sqrt(2 abs(theta0)) / sqrt(-V cos(beta0)), the next factor being 1 + 5/12 kappa
+        abs(theta0) / (V cos(beta0))
 
     Parameters
     ----------
@@ -161,12 +178,15 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """
     closing = _linear(beta0, vertical)[1]
     if closing <= MOMENT_ROUNDING:
-        raise ParameterError(f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}", "vertical")
+        raise ParameterError(
+            f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}", "vertical"
+        )
     return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
 
 
 def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
-    """T0 for beta0 close to pi/2 (`t-beta_exp2`), any shape; its error is of order (pi/2 - beta0)^2:
+    """T0 for beta0 close to pi/2 (`t-beta_exp2`), any shape; its error is of order (pi/2 -
+    beta0)^2:
 
         T0 = 4 / sqrt(1+V) arccos(1 / (1 - (1+V) / V abs(theta0) / (pi/2 - beta0)))
 
@@ -192,24 +212,39 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     """
     check_number("beta0", beta0, above=0.0, below=math.pi, unit="rad")
     check_number("vertical", vertical)
-    closing, kappa = -vertical * (math.pi / 2 - beta0), 1 + vertical
+    closing = -vertical * (math.pi / 2 - beta0)
+    kappa = 1 + vertical
     if closing <= 0 or kappa == 0:
         raise ParameterError(
-            f"this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = {vertical!r}", "vertical"
+            (
+                "this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = "
+                f"{vertical!r}"
+            ),
+            "vertical",
         )
     stretch = kappa * np.abs(numbers("theta0", theta0)) / closing
     if np.any(stretch <= -1):
         raise ParameterError(
-            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the motion diverges", "theta0"
+            (
+                f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
+                "motion diverges"
+            ),
+            "theta0",
         )
-    angle = np.arccos(1 / (1 + stretch)) / math.sqrt(kappa) if kappa > 0 else np.arccosh(1 / (1 + stretch)) / math.sqrt(-kappa)
+    angle = (
+        np.arccos(1 / (1 + stretch)) / math.sqrt(kappa)
+        if kappa > 0
+        else np.arccosh(1 / (1 + stretch)) / math.sqrt(-kappa)
+    )
     return 4 * angle
 
 
 def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
-    """Amplitude theta_D of the n-th cycle, from peak to peak (`approx1`, errata 8): e^(4 (n-1)) theta0, n = 1, 2, ...
+    """Amplitude theta_D of the n-th cycle, from peak to peak (`approx1`, errata 8): e^(4 (n-1))
+    theta0, n = 1, 2, ...
 
-    The paper prints e^(4n). Each impact multiplies the energy by e^2; small amplitudes are proportional to the energy.
+    The paper prints e^(4n). Each impact multiplies the energy by e^2; small amplitudes are
+    proportional to the energy.
 
     Parameters
     ----------
@@ -235,9 +270,11 @@ def decayed_amplitude(cycle: Numbers, *, theta0: float, e: float) -> Any:
 
 
 def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
-    """Duration T_D of the n-th cycle, from peak to peak (`reduced_period`): e^(2 (n-1)) (1+e)^2 T0 / 4, n = 1, 2, ...
+    """Duration T_D of the n-th cycle, from peak to peak (`reduced_period`): e^(2 (n-1)) (1+e)^2 T0
+    / 4, n = 1, 2, ...
 
-    Counted from impact to impact instead, the first lasts (1 + 2e) T0 / 4 from the start (errata 8).
+    Counted from impact to impact instead, the first lasts (1 + 2e) T0 / 4 from the start (errata
+    8).
 
     Parameters
     ----------
@@ -263,7 +300,8 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
 
 
 def final_time(*, period: float, e: float) -> float:
-    """The time at which small vibrations end (`finaltime`): (1+e) / (4 (1-e)) T0(theta0), the sum of all `decayed_period`.
+    """The time at which small vibrations end (`finaltime`): (1+e) / (4 (1-e)) T0(theta0), the sum
+    of all `decayed_period`.
 
     Parameters
     ----------
@@ -275,7 +313,8 @@ def final_time(*, period: float, e: float) -> float:
     Raises
     ------
     ParameterError
-        e out of [0, 1): without losses the vibration goes on for ever; a period that is not above 0.
+        e out of [0, 1): without losses the vibration goes on for ever; a period that is not above
+        0.
 
     Examples
     --------
@@ -305,8 +344,8 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
 
         theta'' + C theta' + theta = cos(theta) (H - zeta'') - sin(theta) (V - nu'')
 
-    The sign of theta drops out: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) + pi/2) = -sin(theta),
-    so that with e = 1 an impact changes nothing.
+    The sign of theta drops out: sin(abs(theta) + pi/2) = cos(theta) and sgn(theta) cos(abs(theta) +
+    pi/2) = -sin(theta), so that with e = 1 an impact changes nothing.
 
     Parameters
     ----------
@@ -329,36 +368,60 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
     >>> float(saltus.theory.pendulum_acceleration(linear, 0.0, 0.0, 0.0))
     0.0
     """
-    model, load = metainterface(system), system.load
-    if abs(model.beta0 - math.pi / 2) > 1e-15 or (model.stiffness_ratio, model.mass_ratio, model.dissipation_ratio) != (1, 0, 1):
-        raise ParameterError(f"the pendulum needs beta0 = pi/2 and equal layers (k = c = 1, m = 0), got {model!r}", "model.beta0")
+    model = metainterface(system)
+    load = system.load
+    if abs(model.beta0 - math.pi / 2) > 1e-15 or (
+        model.stiffness_ratio,
+        model.mass_ratio,
+        model.dissipation_ratio,
+    ) != (1, 0, 1):
+        raise ParameterError(
+            f"the pendulum needs beta0 = pi/2 and equal layers (k = c = 1, m = 0), got {model!r}",
+            "model.beta0",
+        )
     if any(name.startswith("lower_") for name in load.channels):
         raise ParameterError(
-            "the pendulum takes forces on the upper mass only; drop load.lower_horizontal and load.lower_vertical", "load"
+            (
+                "the pendulum takes forces on the upper mass only; drop load.lower_horizontal and "
+                "load.lower_vertical"
+            ),
+            "load",
         )
     across = load.horizontal(tau) - load.ground_horizontal.acceleration(tau)
     along = load.vertical(tau) - load.ground_vertical.acceleration(tau)
-    return np.cos(theta) * across - np.sin(theta) * along - model.damping * np.asarray(velocity) - theta
+    return (
+        np.cos(theta) * across
+        - np.sin(theta) * along
+        - model.damping * np.asarray(velocity)
+        - theta
+    )
 
 
-def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, damping: float, order: int = 1) -> Any:
-    """Hhat_LP, the least amplitude of H = Hhat sin(Omega tau) under which a period-1 motion exists beside theta = 0, any shape.
+def high_frequency_onset(
+    frequency: Numbers, *, beta0: float, vertical: float, damping: float, order: int = 1
+) -> Any:
+    """Hhat_LP, the least amplitude of H = Hhat sin(Omega tau) under which a period-1 motion exists
+    beside theta = 0, any shape.
 
-        order 1:  Hhat_LP = Hcr C pi^3 / (24 Omega),   Hcr = abs(V / tan(beta0)); relative error O(Omega^-2)
-        order 2:  the same times 1 + [(pi^2/5 - 1) kappa - (12 - pi^2)/4 A / tan(beta0) + (1/2 - pi^2/10) C^2] / Omega^2,
+        order 1:  Hhat_LP = Hcr C pi^3 / (24 Omega),   Hcr = abs(V / tan(beta0)); relative error
+        O(Omega^-2) order 2:  the same times 1 + [(pi^2/5 - 1) kappa - (12 - pi^2)/4 A / tan(beta0)
+        + (1/2 - pi^2/10) C^2] / Omega^2,
                   kappa = 1 + V sin(beta0), A = -V cos(beta0); relative error O(Omega^-4)
 
-    for the symmetric system (k = c = 1, m = 0, e = 1). Derivation. With u = Omega tau + phase and theta = x / Omega^2, to leading
-    order x'' = h sin(u + phi) - A sgn(x) - (C / Omega) x', h = Hhat sin(beta0). With h and C / Omega small the motion consists of
-    parabolas x = A u (pi - u) / 2 of duration pi, locked to half a forcing period, and phi is set by the energy balance over one:
+    for the symmetric system (k = c = 1, m = 0, e = 1). Derivation. With u = Omega tau + phase and
+    theta = x / Omega^2, to leading order x'' = h sin(u + phi) - A sgn(x) - (C / Omega) x', h = Hhat
+    sin(beta0). With h and C / Omega small the motion consists of parabolas x = A u (pi - u) / 2 of
+    duration pi, locked to half a forcing period, and phi is set by the energy balance over one:
 
         work of the load        integral of h sin(u + phi) x' du       = 2 h A sin(phi)
         loss in the dampers     (C / Omega) integral of x'^2 du        = (C / Omega) A^2 pi^3 / 12
 
-    so sin(phi) = A C pi^3 / (24 Omega h), which has two solutions (one stable) for h above the value at sin(phi) = 1, where they
-    meet in the fold; A / sin(beta0) is Hcr. Order 2 is the same balance on the arcs of x'' = -A - (kappa / Omega^2) x, whose
-    period is held at 2 pi; with the parametric term Hhat cos(beta0) abs(theta) of the load; and with the damped parabola solved
-    exactly, h = A J sqrt(1 + d^2) / (2 cosh(pi d / 2)), J = (pi cosh(pi d / 2) - 2 sinh(pi d / 2) / d) / d, d = C / Omega.
+    so sin(phi) = A C pi^3 / (24 Omega h), which has two solutions (one stable) for h above the
+    value at sin(phi) = 1, where they meet in the fold; A / sin(beta0) is Hcr. Order 2 is the same
+    balance on the arcs of x'' = -A - (kappa / Omega^2) x, whose period is held at 2 pi; with the
+    parametric term Hhat cos(beta0) abs(theta) of the load; and with the damped parabola solved
+    exactly, h = A J sqrt(1 + d^2) / (2 cosh(pi d / 2)), J = (pi cosh(pi d / 2) - 2 sinh(pi d / 2) /
+    d) / d, d = C / Omega.
 
     The amplitude there is theta = A pi^2 / (8 Omega^2), which must be small against 1.
 
@@ -378,7 +441,8 @@ def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, d
     Raises
     ------
     ParameterError
-        V cos(beta0) >= 0 or C <= 0 (no onset), Omega^2 <= max(kappa, C^2) (not fast), an order not 1 or 2.
+        V cos(beta0) >= 0 or C <= 0 (no onset), Omega^2 <= max(kappa, C^2) (not fast), an order not
+        1 or 2.
 
     Examples
     --------
@@ -394,10 +458,16 @@ def high_frequency_onset(frequency: Numbers, *, beta0: float, vertical: float, d
         -vertical * math.cos(beta0),
     )
     if closing <= 0:
-        raise ParameterError(f"the onset needs a stable undeformed state, V cos(beta0) below 0, got {-closing:.6g}", "vertical")
+        raise ParameterError(
+            f"the onset needs a stable undeformed state, V cos(beta0) below 0, got {-closing:.6g}",
+            "vertical",
+        )
     slowest = math.sqrt(max(stiffness, damping**2))
     if not np.all(frequency > slowest):
-        raise ParameterError(f"the onset is for high frequency, far above {slowest:.6g} here, got {frequency!r}", "frequency")
+        raise ParameterError(
+            f"the onset is for high frequency, far above {slowest:.6g} here, got {frequency!r}",
+            "frequency",
+        )
     if order not in (1, 2):
         raise ParameterError(f"order must be 1 or 2, got {order!r}", "order")
     onset = closing / math.sin(beta0) * damping * math.pi**3 / (24 * frequency)

@@ -1,7 +1,8 @@
-"""A system as its page knows it: names, numbers with their ranges, and where everything is in the memory of the page's engine.
+"""A system as its page knows it: names, numbers with their ranges, and where everything is in the
+memory of the page's engine.
 
-All of it is read from the model's own declaration and from the types with which the kernels are compiled, so that a user's own
-model has a page without a line of JavaScript.
+All of it is read from the model's own declaration and from the types with which the kernels are
+compiled, so that a user's own model has a page without a line of JavaScript.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
     """
     motion = PortableMotion(system)
     several = motion.kernel.several
-    called = [argument["name"] for argument in motion.kernel.arguments if argument["kind"] == "function"]
+    called = [
+        argument["name"] for argument in motion.kernel.arguments if argument["kind"] == "function"
+    ]
     objects = [kernel_object(several), structure_object(motion.functions())]
     layout = motion.layout()
     own = ["drawing"] if layout["drawing"] else []
@@ -42,7 +45,8 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
 
 def description(motion: PortableMotion) -> dict[str, Any]:
     """The names and numbers of a system."""
-    system, model = motion.system, motion.system.model
+    system = motion.system
+    model = motion.system.model
     entries = {number["path"]: number for number in _numbers(system)}
     states = state_names(model.coordinates)
     size = len(model.coordinates)
@@ -51,13 +55,22 @@ def description(motion: PortableMotion) -> dict[str, Any]:
     def below(part: Any, where: str) -> list[str]:
         return [path for path, _ in numbers(part, where)]
 
-    frequency = [{"channel": "", "kind": "frequency", "parameters": [FREQUENCY]}] if FREQUENCY in entries else []
+    frequency = (
+        [{"channel": "", "kind": "frequency", "parameters": [FREQUENCY]}]
+        if FREQUENCY in entries
+        else []
+    )
     return {
         "version": saltus.__version__,
         "model": {
             "name": type(model).__name__,
             "coordinates": [
-                {"name": name, "velocity": f"{name}_velocity", "python_velocity": states[size + i], "unit": units[i]}
+                {
+                    "name": name,
+                    "velocity": f"{name}_velocity",
+                    "python_velocity": states[size + i],
+                    "unit": units[i],
+                }
                 for i, name in enumerate(model.coordinates)
             ],
             "parameters": below(model, "model"),
@@ -68,10 +81,17 @@ def description(motion: PortableMotion) -> dict[str, Any]:
                 for name in model.margin_names(system.load)
             ],
         },
-        "impact": {"name": type(system.impact).__name__, "parameters": below(system.impact, "impact")},
+        "impact": {
+            "name": type(system.impact).__name__,
+            "parameters": below(system.impact, "impact"),
+        },
         "load": frequency
         + [
-            {"channel": name, "kind": type(signal).__name__, "parameters": below(signal, f"load.{name}")}
+            {
+                "channel": name,
+                "kind": type(signal).__name__,
+                "parameters": below(signal, f"load.{name}"),
+            }
             for name, signal in system.load.channels.items()
         ],
         "numbers": list(entries.values()),
@@ -104,5 +124,9 @@ def _unit(system: System, path: str) -> str:
     *above, name = path.split(".")
     for part in above:
         node = children(node)[part]
-    fields = {field.name: field for field in dataclasses.fields(node)} if dataclasses.is_dataclass(node) else {}
+    fields = (
+        {field.name: field for field in dataclasses.fields(node)}
+        if dataclasses.is_dataclass(node)
+        else {}
+    )
     return str(fields[name].metadata.get("unit", "")) if name in fields else ""

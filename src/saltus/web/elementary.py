@@ -1,10 +1,13 @@
-"""The elementary functions of the page: equal in every browser to the last bit, as they are built from sums and products alone.
+"""The elementary functions of the page: equal in every browser to the last bit, as they are built
+from sums and products alone.
 
-Browsers round sines, exponentials and powers differently, and a page must show the same motion in all of them. Errors are below
-one unit in the last place, of tanh below 2.1 (`tests/web/test_elementary.py` compares with 40 digits). Arguments of sine and
-cosine are reduced by as many digits of pi as they need. All constants are computed here, in whole numbers.
+Browsers round sines, exponentials and powers differently, and a page must show the same motion in
+all of them. Errors are below one unit in the last place, of tanh below 2.1
+(`tests/web/test_elementary.py` compares with 40 digits). Arguments of sine and cosine are reduced
+by as many digits of pi as they need. All constants are computed here, in whole numbers.
 
-The compiled part goes into one module with LLVM's text of the kernels (`objects.py`), under the names of the C library.
+The compiled part goes into one module with LLVM's text of the kernels (`objects.py`), under the
+names of the C library.
 """
 
 from __future__ import annotations
@@ -21,7 +24,10 @@ from saltus.taylor import jit
 def _arctangent(x: Fraction) -> Fraction:
     """atan x of a small fraction, by its series in fixed point."""
     unit = 1 << 1400  # pi is needed to 1300 bits for the largest arguments
-    power, square, total, k = int(unit * x), x * x, 0, 0
+    power = int(unit * x)
+    square = x * x
+    total = 0
+    k = 0
     while power:
         total += (-1) ** k * (power // (2 * k + 1))
         power, k = power * square.numerator // square.denominator, k + 1
@@ -29,8 +35,11 @@ def _arctangent(x: Fraction) -> Fraction:
 
 
 def _pieces(value: Fraction, sizes: tuple[int, ...]) -> tuple[float, ...]:
-    """Doubles whose sum is a number: the first ones have so many bits each, and the last one all that a double has."""
-    pieces, left = [], value
+    """Doubles whose sum is a number: the first ones have so many bits each, and the last one all
+    that a double has.
+    """
+    pieces = []
+    left = value
     for size in sizes:
         unit = Fraction(2) ** (math.floor(math.log2(abs(left))) + 1 - size)
         pieces.append(float(left // unit * unit))
@@ -43,8 +52,10 @@ def _pi() -> Fraction:
     return 16 * _arctangent(Fraction(1, 5)) - 4 * _arctangent(Fraction(1, 239))  # Machin
 
 
-_LOG_2 = sum((Fraction(2, (2 * k + 1) * 3 ** (2 * k + 1)) for k in range(60)), Fraction(0))  # 2 atanh(1 / 3)
-HALF_PI = _pieces(_pi() / 2, (33, 33, 33))  # a multiple by a whole number below 2^20 is exact in each but the last
+# 2 atanh(1 / 3)
+_LOG_2 = sum((Fraction(2, (2 * k + 1) * 3 ** (2 * k + 1)) for k in range(60)), Fraction(0))
+# a multiple by a whole number below 2^20 is exact in each but the last
+HALF_PI = _pieces(_pi() / 2, (33, 33, 33))
 HALF_PI_PAIR = _pieces(_pi() / 2, (53,))
 LOG_2 = _pieces(_LOG_2, (33,))
 THIRD = _pieces(Fraction(1, 3), (53,))
@@ -52,12 +63,18 @@ TWO_OVER_PI = np.array(
     [int(digits * 2 ** (24 * (i + 1))) & 0xFFFFFF for digits in [2 / _pi()] for i in range(66)]
 )  # its binary digits, 24 by 24
 ANGLES = tuple(
-    _pieces(a, (53,)) for a in (_arctangent(Fraction(1, 2)), _pi() / 4, _pi() / 4 + _arctangent(Fraction(1, 5)), _pi() / 2)
+    _pieces(a, (53,))
+    for a in (
+        _arctangent(Fraction(1, 2)),
+        _pi() / 4,
+        _pi() / 4 + _arctangent(Fraction(1, 5)),
+        _pi() / 2,
+    )
 )
 FACTORIALS = tuple(1.0 / math.factorial(n) for n in range(24))
 ODD = tuple(1.0 / (2 * n + 1) for n in range(30))
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
@@ -139,7 +156,8 @@ def exp_function(x):
 @jit
 def small_sinh(x):
     """sinh x by its series, for |x| < 1."""
-    z, value = x * x, FACTORIALS[21]
+    z = x * x
+    value = FACTORIALS[21]
     for n in range(19, 1, -2):
         value = value * z + FACTORIALS[n]
     return x + x * z * value
@@ -185,7 +203,9 @@ def tanh_function(x):
 
 @jit
 def logarithm(x):
-    """log x of a positive number as a sum of two numbers: k log 2 + 2 atanh s with x = 2^k (1 + f) and s = f / (2 + f)."""
+    """log x of a positive number as a sum of two numbers: k log 2 + 2 atanh s with x = 2^k (1 + f)
+    and s = f / (2 + f).
+    """
     k = 0
     if x < 2.2250738585072014e-308:
         x, k = x * 18014398509481984.0, -54
@@ -264,16 +284,20 @@ def pow_function(x, y):
 @jit
 def digits_at(number, place):
     """24 binary digits of a number, given 24 by 24, from a place on."""
-    limb, shift = place // 24, place % 24
+    limb = place // 24
+    shift = place % 24
     above = number[limb + 1] if limb + 1 < number.size else 0
     return ((number[limb] >> shift) | (above << (24 - shift))) & 0xFFFFFF
 
 
 @jit
 def far_quadrant(x):
-    """`quadrant` of a large positive number, from its product with 240 digits of 2 / pi (Payne and Hanek, 1983)."""
+    """`quadrant` of a large positive number, from its product with 240 digits of 2 / pi (Payne and
+    Hanek, 1983).
+    """
     pattern = bits_of(x)
-    power, m = (pattern >> 52) - 1075, (pattern & 0xFFFFFFFFFFFFF) | (1 << 52)
+    power = (pattern >> 52) - 1075
+    m = (pattern & 0xFFFFFFFFFFFFF) | (1 << 52)
     first = max((power - 2) // 24, 0)
     power -= 24 * first
     number = np.zeros(14, np.int64)
@@ -286,7 +310,9 @@ def far_quadrant(x):
         number[i] &= 0xFFFFFF
     place = 240 - power
     n = digits_at(number, place) & 3
-    high, low, unit = 0.0, 0.0, 1.0
+    high = 0.0
+    low = 0.0
+    unit = 1.0
     for i in range(6):
         digits, unit = digits_at(number, place - 24 * (i + 1)), unit / 16777216.0
         if i == 0 and digits >= 8388608:
@@ -300,7 +326,9 @@ def far_quadrant(x):
 
 @jit
 def quadrant(x):
-    """n and r, a sum of two numbers, with x = n pi / 2 + r and |r| <= pi / 4, for x >= 0; n modulo 4."""
+    """n and r, a sum of two numbers, with x = n pi / 2 + r and |r| <= pi / 4, for x >= 0; n modulo
+    4.
+    """
     if x > 100000.0:
         return far_quadrant(x)
     n = np.floor(x / HALF_PI_PAIR[0] + 0.5)
@@ -313,7 +341,8 @@ def quadrant(x):
 @jit
 def near_sine(r, low):
     """sin(r + low) for |r| <= pi / 4."""
-    z, value = r * r, FACTORIALS[19]
+    z = r * r
+    value = FACTORIALS[19]
     for n in range(17, 1, -2):
         value = FACTORIALS[n] - value * z
     return r + (low * (1.0 - 0.5 * z) - r * z * value)
@@ -322,7 +351,8 @@ def near_sine(r, low):
 @jit
 def near_cosine(r, low):
     """cos(r + low) for |r| <= pi / 4."""
-    z, value = r * r, FACTORIALS[20]
+    z = r * r
+    value = FACTORIALS[20]
     for n in range(18, 2, -2):
         value = FACTORIALS[n] - value * z
     half = 0.5 * z
@@ -361,7 +391,8 @@ def cos_function(x):
 @jit
 def near_angle(t):
     """atan(t) - t for |t| < 0.45, by its series."""
-    z, value = t * t, ODD[24]
+    z = t * t
+    value = ODD[24]
     for n in range(23, 0, -1):
         value = ODD[n] - value * z
     return -t * z * value
@@ -374,13 +405,17 @@ def atan_function(x):
     if x != x or size < 0.4375:
         return x + near_angle(x)
     if size < 0.6875:
-        k, t = 0, (2.0 * size - 1.0) / (2.0 + size)
+        k = 0
+        t = (2.0 * size - 1.0) / (2.0 + size)
     elif size < 1.1875:
-        k, t = 1, (size - 1.0) / (size + 1.0)
+        k = 1
+        t = (size - 1.0) / (size + 1.0)
     elif size < 2.4375:
-        k, t = 2, (size - 1.5) / (1.0 + 1.5 * size)
+        k = 2
+        t = (size - 1.5) / (1.0 + 1.5 * size)
     else:
-        k, t = 3, -1.0 / size
+        k = 3
+        t = -1.0 / size
     high, low = two_sum(ANGLES[k][0], t)
     return np.copysign(high + (low + (ANGLES[k][1] + near_angle(t))), x)
 

@@ -1,10 +1,12 @@
-"""Object files for WebAssembly, which LLVM makes, linked into one module: the work of a linker, of which a user has none.
+"""Object files for WebAssembly, which LLVM makes, linked into one module: the work of a linker, of
+which a user has none.
 
-An object file is a module with holes (the conventions are in "WebAssembly Object File Linking" of the tool conventions of
-WebAssembly). It imports its memory, its table of functions and its stack pointer, and says in its sections `linking` and
-`reloc.*` which places of its code and of its data hold the number of a function, of a type or of a global, a place in the table
-or an address in memory. Here all functions that are reached from those asked for are numbered, memory is laid out (data, then the
-stack, then what the page puts there), and these places are filled in.
+An object file is a module with holes (the conventions are in "WebAssembly Object File Linking" of
+the tool conventions of WebAssembly). It imports its memory, its table of functions and its stack
+pointer, and says in its sections `linking` and `reloc.*` which places of its code and of its data
+hold the number of a function, of a type or of a global, a place in the table or an address in
+memory. Here all functions that are reached from those asked for are numbered, memory is laid out
+(data, then the stack, then what the page puts there), and these places are filled in.
 """
 
 from __future__ import annotations
@@ -13,9 +15,22 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from saltus.errors import SaltusError
-from saltus.web.object_files import OF_FUNCTION, DataPiece, ObjectFile, Part, Relocation, RelocationKind, Symbol, signed, unsigned
+from saltus.web.object_files import (
+    OF_FUNCTION,
+    DataPiece,
+    ObjectFile,
+    Part,
+    Relocation,
+    RelocationKind,
+    Symbol,
+    signed,
+    unsigned,
+)
 
-FIRST_ADDRESS, STACK, PAGE = 1024, 1 << 18, 1 << 16  # bytes: no data below, for the stack, and the unit of memory
+# bytes: no data below, for the stack, and the unit of memory
+FIRST_ADDRESS = 1024
+STACK = 1 << 18
+PAGE = 1 << 16
 SIGNED = (RelocationKind.TABLE_PLACE, RelocationKind.SIGNED_ADDRESS)
 WORDS = (RelocationKind.TABLE_PLACE_WORD, RelocationKind.ADDRESS_WORD)
 
@@ -47,7 +62,8 @@ class Linker:
         self._end = FIRST_ADDRESS
 
     def link(self, exported: Iterable[str], pointed: Iterable[str]) -> Linked:
-        """The module with the exported functions and, in its table, those of which the page needs the places.
+        """The module with the exported functions and, in its table, those of which the page needs
+        the places.
 
         Raises
         ------
@@ -73,7 +89,9 @@ class Linker:
         if symbol.defined:
             return number, symbol
         if (symbol.kind, symbol.name) not in self._known:
-            raise SaltusError(f"a page has no function {symbol.name[:60]!r}, which these equations need")
+            raise SaltusError(
+                f"a page has no function {symbol.name[:60]!r}, which these equations need"
+            )
         return self._known[symbol.kind, symbol.name]
 
     def _reach(self, number: int, index: int) -> int:
@@ -106,7 +124,8 @@ class Linker:
         """What is put into a place."""
         if hole.kind == RelocationKind.TYPE:
             return self._type(self._objects[number].types[hole.index])
-        if hole.kind in (RelocationKind.GLOBAL, RelocationKind.TABLE):  # there is one of each: the stack pointer, and the table
+        # there is one of each: the stack pointer, and the table
+        if hole.kind in (RelocationKind.GLOBAL, RelocationKind.TABLE):
             return 0
         owner, symbol = self._resolved(number, hole.index)
         if hole.kind == RelocationKind.FUNCTION:
@@ -127,15 +146,27 @@ class Linker:
             if hole.kind in WORDS:
                 out[hole.at : hole.at + 4] = value.to_bytes(4, "little")
             else:
-                out[hole.at : hole.at + 5] = signed(value, 5) if hole.kind in SIGNED else unsigned(value, 5)
+                out[hole.at : hole.at + 5] = (
+                    signed(value, 5) if hole.kind in SIGNED else unsigned(value, 5)
+                )
         return bytes(out)
 
     def _module(self, exports: dict[str, int], heap: int) -> bytes:
-        functions = [(number, self._objects[number].functions[index]) for number, index in self._chosen]
-        kinds = [self._type(self._objects[number].types[function.type]) for number, function in functions]
-        bodies = [self._filled(number, function.body, function.holes) for number, function in functions]
-        data = [(each.address, self._filled(number, each.content, each.holes)) for number, each in self._data]
-        pages, size = unsigned(-(-heap // PAGE) + 16), unsigned(len(self._table) + 1)
+        functions = [
+            (number, self._objects[number].functions[index]) for number, index in self._chosen
+        ]
+        kinds = [
+            self._type(self._objects[number].types[function.type]) for number, function in functions
+        ]
+        bodies = [
+            self._filled(number, function.body, function.holes) for number, function in functions
+        ]
+        data = [
+            (each.address, self._filled(number, each.content, each.holes))
+            for number, each in self._data
+        ]
+        pages = unsigned(-(-heap // PAGE) + 16)
+        size = unsigned(len(self._table) + 1)
         places = [self._places[each] for each in self._table]
         sections = [
             (Part.TYPE, _vector(self._types)),
@@ -143,12 +174,31 @@ class Linker:
             (Part.TABLE, _vector([b"\x70\0" + size])),
             (Part.MEMORY, _vector([b"\0" + pages])),
             (Part.GLOBAL, _vector([b"\x7f\1\x41" + signed(heap) + b"\x0b"])),
-            (Part.EXPORT, _vector([_name("memory") + b"\2\0", *(_name(n) + b"\0" + unsigned(i) for n, i in exports.items())])),
-            (Part.ELEMENT, _vector([b"\0\x41\1\x0b" + _vector(map(unsigned, places))] if places else [])),
+            (
+                Part.EXPORT,
+                _vector(
+                    [
+                        _name("memory") + b"\2\0",
+                        *(_name(n) + b"\0" + unsigned(i) for n, i in exports.items()),
+                    ]
+                ),
+            ),
+            (
+                Part.ELEMENT,
+                _vector([b"\0\x41\1\x0b" + _vector(map(unsigned, places))] if places else []),
+            ),
             (Part.CODE, _vector(unsigned(len(body)) + body for body in bodies)),
-            (Part.DATA, _vector(b"\0\x41" + signed(at) + b"\x0b" + unsigned(len(each)) + each for at, each in data)),
+            (
+                Part.DATA,
+                _vector(
+                    b"\0\x41" + signed(at) + b"\x0b" + unsigned(len(each)) + each
+                    for at, each in data
+                ),
+            ),
         ]
-        return b"\0asm\1\0\0\0" + b"".join(bytes([kind]) + unsigned(len(content)) + content for kind, content in sections)
+        return b"\0asm\1\0\0\0" + b"".join(
+            bytes([kind]) + unsigned(len(content)) + content for kind, content in sections
+        )
 
 
 def _vector(parts: Iterable[bytes]) -> bytes:

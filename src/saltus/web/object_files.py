@@ -1,4 +1,6 @@
-"""Object files for WebAssembly, as LLVM writes them: their functions and data, and the places in both that a linker fills in."""
+"""Object files for WebAssembly, as LLVM writes them: their functions and data, and the places in
+both that a linker fills in.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +42,14 @@ class RelocationKind(IntEnum):
 
 
 WITH_ADDEND = (RelocationKind.ADDRESS, RelocationKind.SIGNED_ADDRESS, RelocationKind.ADDRESS_WORD)
-LOCAL, UNDEFINED, EXPLICIT_NAME = 0x2, 0x10, 0x40  # flags of symbols
-OF_FUNCTION, OF_DATA, OF_SECTION = 0, 1, 3  # kinds of symbols
+# flags of symbols
+LOCAL = 0x2
+UNDEFINED = 0x10
+EXPLICIT_NAME = 0x40
+# kinds of symbols
+OF_FUNCTION = 0
+OF_DATA = 1
+OF_SECTION = 3
 
 
 @dataclass(frozen=True)
@@ -94,7 +102,7 @@ class Symbol:
         return self.defined and not self.flags & LOCAL
 
 
-# --- numbers ---------------------------------------------------------------------------------------------------------------
+# --- numbers -----------------------------------------------------------------
 
 
 def unsigned(value: int, width: int = 0) -> bytes:
@@ -119,7 +127,8 @@ class FileSection:
     """Reads an object file from its beginning."""
 
     def __init__(self, content: bytes) -> None:
-        self.content, self.at = content, 0
+        self.content = content
+        self.at = 0
 
     def __bool__(self) -> bool:
         return self.at < len(self.content)
@@ -159,7 +168,7 @@ class FileSection:
             self.number()
 
 
-# --- an object file --------------------------------------------------------------------------------------------------------
+# --- an object file ----------------------------------------------------------
 
 
 class ObjectFile:
@@ -171,12 +180,17 @@ class ObjectFile:
         self.functions: list[CodePiece] = []
         self.data: list[DataPiece] = []
         self.symbols: list[Symbol] = []
-        reader, kinds, starts = FileSection(content), list[int](), dict[int, list[tuple[int, int, list[Relocation]]]]()
+        reader = FileSection(content)
+        kinds = list[int]()
+        starts = dict[int, list[tuple[int, int, list[Relocation]]]]()
         if reader.take(8) != b"\0asm\1\0\0\0":
-            raise SaltusError("LLVM made no object file for WebAssembly; its version may be too old")
+            raise SaltusError(
+                "LLVM made no object file for WebAssembly; its version may be too old"
+            )
         number = -1
         while reader:
-            kind, size = reader.take(1)[0], reader.number()
+            kind = reader.take(1)[0]
+            size = reader.number()
             section, number = FileSection(reader.take(size)), number + 1
             if kind == Part.TYPE:
                 self.types = list(_types(section))
@@ -198,7 +212,8 @@ class ObjectFile:
     def _read_imports(self, section: FileSection) -> None:
         for _ in range(section.number()):
             section.text()
-            name, kind = section.text(), section.take(1)[0]
+            name = section.text()
+            kind = section.take(1)[0]
             if kind == 0:
                 section.number()
                 self.imported.append(name)
@@ -210,7 +225,9 @@ class ObjectFile:
             else:
                 section.take(2)
 
-    def _read_code(self, section: FileSection, kinds: list[int]) -> list[tuple[int, int, list[Relocation]]]:
+    def _read_code(
+        self, section: FileSection, kinds: list[int]
+    ) -> list[tuple[int, int, list[Relocation]]]:
         starts = []
         for kind in kinds[: section.number()]:
             size = section.number()
@@ -235,25 +252,30 @@ class ObjectFile:
     def _read_linking(self, section: FileSection) -> None:
         section.number()  # the version of the conventions
         while section:
-            kind, size = section.take(1)[0], section.number()
+            kind = section.take(1)[0]
+            size = section.number()
             part = FileSection(section.take(size))
             if kind == 8:
                 self.symbols = [self._symbol(part) for _ in range(part.number())]
 
     def _symbol(self, part: FileSection) -> Symbol:
-        kind, flags = part.take(1)[0], part.number()
+        kind = part.take(1)[0]
+        flags = part.number()
         defined = not flags & UNDEFINED
         if kind == OF_DATA:
             name = part.text()
             if not defined:
                 return Symbol(kind, name, flags, 0)
-            index, offset = part.number(), part.number()
+            index = part.number()
+            offset = part.number()
             part.number()
             return Symbol(kind, name, flags, index, offset)
         index = part.number()
         named = kind != OF_SECTION and (defined or flags & EXPLICIT_NAME)
         name = part.text() if named else self.imported[index] if kind == OF_FUNCTION else ""
-        return Symbol(kind, name, flags, index - len(self.imported) if kind == OF_FUNCTION else index)
+        return Symbol(
+            kind, name, flags, index - len(self.imported) if kind == OF_FUNCTION else index
+        )
 
 
 def _types(section: FileSection) -> Iterator[bytes]:
@@ -265,11 +287,15 @@ def _types(section: FileSection) -> Iterator[bytes]:
         yield section.content[begin : section.at]
 
 
-def _read_holes(section: FileSection, starts: dict[int, list[tuple[int, int, list[Relocation]]]]) -> None:
+def _read_holes(
+    section: FileSection, starts: dict[int, list[tuple[int, int, list[Relocation]]]]
+) -> None:
     pieces = iter(starts.get(section.number(), []))
     begin, end, holes = next(pieces, (0, 0, []))
     for _ in range(section.number()):
-        kind, at, index = RelocationKind(section.take(1)[0]), section.number(), section.number()
+        kind = RelocationKind(section.take(1)[0])
+        at = section.number()
+        index = section.number()
         addend = section.signed_number() if kind in WITH_ADDEND else 0
         while at >= end:
             begin, end, holes = next(pieces)

@@ -1,7 +1,9 @@
-"""Object files for WebAssembly, of the kernels and of a structure's functions, made by LLVM and linked in Python.
+"""Object files for WebAssembly, of the kernels and of a structure's functions, made by LLVM and
+linked in Python.
 
-A kernel is compiled once and kept in the cache of compiled code; a structure's functions are compiled anew for each page, in some
-tenths of a second. The text of a kernel is written in a process of its own: numba must not optimise it for this machine.
+A kernel is compiled once and kept in the cache of compiled code; a structure's functions are
+compiled anew for each page, in some tenths of a second. The text of a kernel is written in a
+process of its own: numba must not optimise it for this machine.
 """
 
 from __future__ import annotations
@@ -21,17 +23,27 @@ from llvmlite import binding
 
 from saltus.errors import SaltusError
 from saltus.flow import PortableKernel
-from saltus.taylor import WrittenFunction, compiled_part, digest, kept_bytes, llvm_of, llvm_text, source_of
+from saltus.taylor import (
+    WrittenFunction,
+    compiled_part,
+    digest,
+    kept_bytes,
+    llvm_of,
+    llvm_text,
+    source_of,
+)
 from saltus.web import elementary
 
 TARGET = "wasm32-unknown-unknown"
-FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+mutable-globals"  # all browsers of the last years have them
+# all browsers of the last years have them
+FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+mutable-globals"
 C_FUNCTIONS = {
     **dict.fromkeys(("sin", "cos", "exp", "log", "sinh", "cosh", "tanh", "atan"), 1),
     "pow": 2,
     "numba_nextafter": 2,
 }
-# What numba's code calls besides: memory that is never given back, but used again by the next call, and a root.
+# What numba's code calls besides: memory that is never given back, but used again by the next call,
+# and a root.
 RUNTIME = """
 @heap = global i32 0
 define void @rewind(i32 %to) {
@@ -93,12 +105,15 @@ def machine() -> Any:
 
 
 def object_code(texts: list[str], public: list[str]) -> bytes:
-    """The object file of LLVM's texts together, of which only the public functions are seen from outside."""
+    """The object file of LLVM's texts together, of which only the public functions are seen from
+    outside.
+    """
     target = machine()
     whole: Any = None
     for text in texts:
         part = binding.parse_assembly(_for_page(text))
-        part.triple, part.data_layout = TARGET, str(target.target_data)
+        part.triple = TARGET
+        part.data_layout = str(target.target_data)
         part.verify()
         if whole is None:
             whole = part
@@ -116,21 +131,31 @@ def object_code(texts: list[str], public: list[str]) -> bytes:
 
 
 def _for_page(text: str) -> str:
-    """LLVM's text without what belongs to this machine, and without counts of references, as nothing is given back."""
+    """LLVM's text without what belongs to this machine, and without counts of references, as
+    nothing is given back.
+    """
     text = re.sub(r"^target (datalayout|triple) = .*$", "", text, flags=re.M)
     text = re.sub(r"= common (local_unnamed_addr )?global", "= internal global", text)
-    text = text.replace("@llvm.smul.with.overflow.i64", "@product_of_sizes")  # it would need numbers of 128 bits
+    # it would need numbers of 128 bits
+    text = text.replace("@llvm.smul.with.overflow.i64", "@product_of_sizes")
     counts = r"^(define linkonce_odr void @NRT_(?:incref|decref)\(ptr[^{]*)\{.*?^\}"
     return re.sub(counts, lambda found: found[1] + "{\n  ret void\n}", text, flags=re.M | re.S)
 
 
-# --- the kernels --------------------------------------------------------------------------------------------------------------
+# --- the kernels -------------------------------------------------------------
 
 
 def kernel_object(several: bool) -> bytes:
     """The object file of a kernel, with the elementary functions: from the cache, or made."""
-    sources = [PortableKernel(several).source, source_of(elementary), source_of(sys.modules[__name__])]
-    return kept_bytes(f"page_{digest(*sources, binding.llvm_version_info.__repr__())}.o", lambda: _made_elsewhere(several))
+    sources = [
+        PortableKernel(several).source,
+        source_of(elementary),
+        source_of(sys.modules[__name__]),
+    ]
+    return kept_bytes(
+        f"page_{digest(*sources, binding.llvm_version_info.__repr__())}.o",
+        lambda: _made_elsewhere(several),
+    )
 
 
 def _made_elsewhere(several: bool) -> bytes:
@@ -139,7 +164,9 @@ def _made_elsewhere(several: bool) -> bytes:
     with tempfile.TemporaryDirectory(prefix="saltus-page-") as folder:
         path = Path(folder) / "kernel.o"
         code = f"from saltus.web import objects; objects.make_kernel({several!r}, {str(path)!r})"
-        done = subprocess.run([sys.executable, "-c", code], env=os.environ | settings, capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=os.environ | settings, capture_output=True, text=True
+        )
         if done.returncode or not path.exists():
             last = (done.stderr.strip().splitlines() or ["it gave no reason"])[-1]
             raise SaltusError(f"the kernel could not be compiled for a page: {last:.200}")
@@ -157,7 +184,9 @@ def make_kernel(several: bool, path: str) -> None:
 
 
 def _written(source: str) -> list[tuple[str, str]]:
-    """LLVM's text, and the name there, of each function of a kernel's source that is called from outside."""
+    """LLVM's text, and the name there, of each function of a kernel's source that is called from
+    outside.
+    """
     made: list[tuple[str, str]] = []
 
     def cached_jit(signature: Any, **options: Any) -> Any:
@@ -169,12 +198,17 @@ def _written(source: str) -> list[tuple[str, str]]:
 
     module = ModuleType("saltus_page")
     vars(module)["cached_jit"] = cached_jit
-    exec(compile(source.replace("import cached_jit, ", "import "), "saltus_page", "exec"), vars(module))
+    exec(
+        compile(source.replace("import cached_jit, ", "import "), "saltus_page", "exec"),
+        vars(module),
+    )
     return made
 
 
 def _elementary_texts() -> Iterator[tuple[str, str]]:
-    """LLVM's text of each elementary function, and that of the function of the C library's name which calls it."""
+    """LLVM's text of each elementary function, and that of the function of the C library's name
+    which calls it.
+    """
     space: dict[str, Any] = dict(vars(elementary))
     source = "from saltus.taylor.private_numba import jit\n" + compiled_part(elementary)
     exec(compile(source, "saltus_elementary", "exec"), space)
@@ -199,26 +233,33 @@ define double @{name}({values}) {{
 
 
 def advance_text(inner: str, arguments: list[dict[str, Any]]) -> str:
-    """LLVM's text of `advance(request)`, which calls the kernel with the arrays that a request describes.
+    """LLVM's text of `advance(request)`, which calls the kernel with the arrays that a request
+    describes.
 
-    The request has, for each argument, the address of an array and its lengths, or a place in the table of functions, in words of
-    8 bytes.
+    The request has, for each argument, the address of an array and its lengths, or a place in the
+    table of functions, in words of 8 bytes.
     """
-    lines, values, place = list[str](), list[str](), 0
+    lines = list[str]()
+    values = list[str]()
+    place = 0
 
     def word(at: int) -> str:
-        lines.append(f"  %p{at} = getelementptr i64, ptr %request, i32 {at}\n  %w{at} = load i64, ptr %p{at}")
+        lines.append(
+            f"  %p{at} = getelementptr i64, ptr %request, i32 {at}\n  %w{at} = load i64, ptr %p{at}"
+        )
         return f"%w{at}"
 
     for argument in arguments:
-        address, count = word(place), argument["dimensions"]
+        address = word(place)
+        count = argument["dimensions"]
         if argument["kind"] == "function":
             values.append(f"i64 {address}")
             place += 1
             continue
         lengths = [word(place + 1 + i) for i in range(count)]
         lines.append(f"  %a{place} = inttoptr i64 {address} to ptr")
-        size, strides = str(argument["size"]), [str(argument["size"])]
+        size = str(argument["size"])
+        strides = [str(argument["size"])]
         for i in range(count - 1, -1, -1):
             lines.append(f"  %s{place}_{i} = mul i64 {strides[0]}, {lengths[i]}")
             strides.insert(0, f"%s{place}_{i}")
@@ -243,10 +284,12 @@ define i32 @advance(ptr %request) {{
 }}"""
 
 
-# --- a structure's functions --------------------------------------------------------------------------------------------------
+# --- a structure's functions -------------------------------------------------
 
 
 def structure_object(functions: list[WrittenFunction]) -> bytes:
-    """The object file of a structure's functions; WebAssembly has no fused multiply-adds, with which series divide faster."""
+    """The object file of a structure's functions; WebAssembly has no fused multiply-adds, with
+    which series divide faster.
+    """
     functions = [replace(each, arithmetic=each.arithmetic.unfused()) for each in functions]
     return object_code([llvm_text(functions)], [function.name for function in functions])

@@ -1,4 +1,6 @@
-"""One HTML file of all that a page needs: markup, style, modules, the description of a system and its compiled code."""
+"""One HTML file of all that a page needs: markup, style, modules, the description of a system and
+its compiled code.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,13 @@ from pathlib import Path
 from typing import Any
 
 PAGE = Path(__file__).parent / "page"  # the page's own sources
-LOADER = (PAGE / "loader.js").read_text()  # unpacks the joined modules, which are a fifth as long when packed, and runs them
+# unpacks the joined modules, which are a fifth as long when packed, and runs them
+LOADER = (PAGE / "loader.js").read_text()
 IMPORT = re.compile(r'^import \{([^}]*)\} from "\./([\w]+)\.js";\n', re.MULTILINE)
 EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
 COMMENT = re.compile(r"[ \t]*/\*\*.*?\*/\n?", re.DOTALL)
-LINE = re.compile(r"^\s*//.*\n|^[ \t]+|(?<=[;,{]) // .*$", re.MULTILINE)  # lines of comments, indents, comments behind code
+# lines of comments, indents, comments behind code
+LINE = re.compile(r"^\s*//.*\n|^[ \t]+|(?<=[;,{]) // .*$", re.MULTILINE)
 
 
 def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE / "boot.js") -> str:
@@ -28,13 +32,15 @@ def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE 
     Parameters
     ----------
     description
-        What `engine.js` and the page are told of the system; it is put in as JSON, so that no text of a study is markup.
+        What `engine.js` and the page are told of the system; it is put in as JSON, so that no text
+        of a study is markup.
     wasm
         The compiled code of the system's kernel and model.
     entry
         The module with which the page begins.
     """
-    script, style = joined(entry), (PAGE / "page.css").read_text()
+    script = joined(entry)
+    style = (PAGE / "page.css").read_text()
     worker = joined(PAGE / "worker.js") if (PAGE / "worker.js").exists() else ""
     parts = {
         "policy": _policy(LOADER, style),
@@ -52,18 +58,24 @@ def one_file(description: Mapping[str, Any], wasm: bytes, *, entry: Path = PAGE 
 
 @cache
 def joined(entry: Path) -> str:
-    """A module with all that it imports as one text: each module a function that returns what it exports, in their order."""
+    """A module with all that it imports as one text: each module a function that returns what it
+    exports, in their order.
+    """
     texts: dict[Path, str] = {}
     _collect(entry, texts, ())
     text = "\n".join(_wrapped(path, source) for path, source in texts.items())
     if re.search("</script|<!--", text, re.IGNORECASE):
-        raise ValueError(f"{entry.name}: a module must not contain the end of its own script element")
+        raise ValueError(
+            f"{entry.name}: a module must not contain the end of its own script element"
+        )
     return text
 
 
 def _collect(path: Path, texts: dict[Path, str], above: tuple[Path, ...]) -> None:
     if path in above:
-        raise ValueError(f"{path.name} imports itself through {', '.join(each.name for each in above)}")
+        raise ValueError(
+            f"{path.name} imports itself through {', '.join(each.name for each in above)}"
+        )
     if path in texts:
         return
     source = LINE.sub("", COMMENT.sub("", path.read_text()))
@@ -79,9 +91,13 @@ def _beside(path: Path, name: str) -> Path:
 
 
 def _wrapped(path: Path, source: str) -> str:
-    body = IMPORT.sub(lambda found: f"const {{{' '.join(found[1].split())}}} = module_{found[2]};\n", source)
+    body = IMPORT.sub(
+        lambda found: f"const {{{' '.join(found[1].split())}}} = module_{found[2]};\n", source
+    )
     if re.search(r"^import\b|^export (?:default|\{|\*)", body, re.MULTILINE):
-        raise ValueError(f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations can be joined")
+        raise ValueError(
+            f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations can be joined"
+        )
     names = EXPORT.findall(body)
     body = re.sub(r"^export (?!\{)", "", body, flags=re.MULTILINE)
     return f"const module_{path.stem} = (() => {{\n{body.strip()}\nreturn {{{', '.join(names)}}};\n}})();"
@@ -92,7 +108,9 @@ def _packed(content: bytes) -> str:
 
 
 def _policy(script: str, style: str) -> str:
-    """What the page may do: run its own script and style, what it has unpacked, compile its own code, and start workers."""
+    """What the page may do: run its own script and style, what it has unpacked, compile its own
+    code, and start workers.
+    """
     own = {name: _hash(text) for name, text in (("script", script), ("style", style))}
     return (
         f"default-src 'none'; script-src {own['script']} blob: 'wasm-unsafe-eval'; style-src {own['style']}; worker-src blob:; "

@@ -1,7 +1,8 @@
-"""Results of saltus as JSON for a page: diagrams with their orbits, charts, basins and curves of the phase plane.
+"""Results of saltus as JSON for a page: diagrams with their orbits, charts, basins and curves of
+the phase plane.
 
-Each result carries its system's numbers, so that a page whose numbers have been moved says that they are not those of the result,
-and a click sets them all.
+Each result carries its system's numbers, so that a page whose numbers have been moved says that
+they are not those of the result, and a click sets them all.
 """
 
 from __future__ import annotations
@@ -38,18 +39,25 @@ MEANINGS = {
 
 def digest(system: System) -> str:
     """A short text that is a page's own: its links and its results carry it."""
-    return hashlib.sha256(json.dumps([system.to_dict(), identity(system)], sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(
+        json.dumps([system.to_dict(), identity(system)], sort_keys=True).encode()
+    ).hexdigest()[:16]
 
 
 def results_as_json(results: Iterable[Any], system: System) -> list[dict[str, Any]]:
-    """What a page of a system shows of results, each a Dataset, a DataTree, or an object with `to_xarray`.
+    """What a page of a system shows of results, each a Dataset, a DataTree, or an object with
+    `to_xarray`.
 
     Raises
     ------
     ParameterError
-        A result of another system, of other equations or of another version of saltus, or of a kind that a page does not show.
+        A result of another system, of other equations or of another version of saltus, or of a kind
+        that a page does not show.
     """
-    entries = [_one(result.to_xarray() if hasattr(result, "to_xarray") else result, system) for result in results]
+    entries = [
+        _one(result.to_xarray() if hasattr(result, "to_xarray") else result, system)
+        for result in results
+    ]
     return list(_joined(entries))
 
 
@@ -57,7 +65,9 @@ def _joined(entries: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """Results of which branches along one parameter, with the same other numbers, are one diagram."""
     diagrams: dict[str, dict[str, Any]] = {}
     for entry in entries:
-        others = {path: value for path, value in entry["values"].items() if path != entry.get("path")}
+        others = {
+            path: value for path, value in entry["values"].items() if path != entry.get("path")
+        }
         key = json.dumps([entry["title"], entry.get("path"), others]) if "dots" not in entry else ""
         if entry["kind"] == "diagram" and key in diagrams:
             for name in ("branches", "special"):
@@ -71,13 +81,23 @@ def _joined(entries: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 def _one(data: Any, system: System) -> dict[str, Any]:
     kind = str(data.attrs.get("kind", "dataset"))
     if kind not in READERS:
-        raise ParameterError(f"a page shows {', '.join(sorted(READERS))}, not a result of the kind {kind!r}", "results")
+        raise ParameterError(
+            f"a page shows {', '.join(sorted(READERS))}, not a result of the kind {kind!r}",
+            "results",
+        )
     own = _system_of(data.attrs)
     check_provenance(data.attrs, own, f"the {kind.replace('_', ' ')}")
     if not differ_in_numbers(own, system):
-        raise ParameterError(f"the {kind.replace('_', ' ')} is of another system: its loads or impact law differ", "results")
+        raise ParameterError(
+            f"the {kind.replace('_', ' ')} is of another system: its loads or impact law differ",
+            "results",
+        )
     title = str(data.attrs.get("title", ""))
-    title = kind.replace("_", " ").capitalize() if title.endswith("computed by saltus") or not title else title
+    title = (
+        kind.replace("_", " ").capitalize()
+        if title.endswith("computed by saltus") or not title
+        else title
+    )
     common = {"title": title, "digest": digest(system), "values": dict(numbers(own))}
     return common | READERS[kind](data)
 
@@ -96,16 +116,23 @@ def _system_of(attributes: Any) -> System:
     except ParameterError:
         raise  # such as of a model that is not registered
     except (KeyError, TypeError, ValueError) as error:
-        raise ParameterError("the result does not say of which system it is; compute it again", "results") from error
+        raise ParameterError(
+            "the result does not say of which system it is; compute it again", "results"
+        ) from error
 
 
 def _diagram(tree: Any) -> dict[str, Any]:
-    branches, special = [], []
+    branches = []
+    special = []
     for _, branch in branches_of(tree):
         branches.append(_branch(branch))
         special += list(_special(branch))
     dots = tree["attractors"].dataset
-    bands = [tree["bands"].dataset[name].values for name in ("low", "high")] if "bands" in tree.children else [[], []]
+    bands = (
+        [tree["bands"].dataset[name].values for name in ("low", "high")]
+        if "bands" in tree.children
+        else [[], []]
+    )
     return {
         "kind": "diagram",
         "path": str(tree.attrs["path"]),
@@ -134,10 +161,17 @@ def _branch(branch: Any) -> dict[str, Any]:
         "amplitude": _listed(branch["amplitude"].values),
         "stable": [int(orbit.stable) for orbit in orbits],
         "period": [int(orbit.period) for orbit in orbits],
-        "start": [[float(start[name]) for name in coordinates] + _velocities(start) for start in starts],
+        "start": [
+            [float(start[name]) for name in coordinates] + _velocities(start) for start in starts
+        ],
         "time": [float(start.get("time", 0.0)) for start in starts],
-        "multipliers": [[[float(m.real), float(m.imag)] for m in orbit.multipliers if np.isfinite(m)] for orbit in orbits],
-        "evidence": [_evidence(orbit.residual, defect) for orbit, defect in zip(orbits, defects, strict=True)],
+        "multipliers": [
+            [[float(m.real), float(m.imag)] for m in orbit.multipliers if np.isfinite(m)]
+            for orbit in orbits
+        ],
+        "evidence": [
+            _evidence(orbit.residual, defect) for orbit, defect in zip(orbits, defects, strict=True)
+        ],
     }
 
 
@@ -146,7 +180,11 @@ def _velocities(start: Any) -> list[float]:
 
 
 def _evidence(residual: float, defect: float | None) -> str:
-    confirmed = "" if defect is None or not np.isfinite(defect) else f", {defect:.1g} from itself after a period of simulation"
+    confirmed = (
+        ""
+        if defect is None or not np.isfinite(defect)
+        else f", {defect:.1g} from itself after a period of simulation"
+    )
     return f"residual {residual:.1g}{confirmed}"
 
 
@@ -156,7 +194,12 @@ def _special(branch: Any) -> Iterator[dict[str, Any]]:
     rows = (branch[name].values for name in ("kind", "special_parameter", "special_amplitude"))
     for kind, parameter, amplitude in zip(*rows, strict=True):
         text = MEANINGS.get(str(kind), str(kind).replace("_", " "))
-        yield {"kind": str(kind), "parameter": float(parameter), "amplitude": float(amplitude), "text": text}
+        yield {
+            "kind": str(kind),
+            "parameter": float(parameter),
+            "amplitude": float(amplitude),
+            "text": text,
+        }
 
 
 def _chart(data: Any) -> dict[str, Any]:
@@ -166,7 +209,13 @@ def _chart(data: Any) -> dict[str, Any]:
     amplitude = data["amplitude"].transpose("horizontal", "vertical").values
     motions = data.transpose("horizontal", "vertical", "motion", ...)
     largest = np.argmax(np.nan_to_num(motions["motion_amplitude"].values, nan=-1.0), axis=-1)
-    states = np.stack([np.take_along_axis(motions[name].values, largest[..., None], -1)[..., 0] for name in columns], axis=-1)
+    states = np.stack(
+        [
+            np.take_along_axis(motions[name].values, largest[..., None], -1)[..., 0]
+            for name in columns
+        ],
+        axis=-1,
+    )
     return {
         "kind": "chart",
         "paths": [first, second],
@@ -189,8 +238,14 @@ def _state(values: np.ndarray) -> list[float] | None:
 def _basins(data: Any) -> dict[str, Any]:
     x, y = (str(name) for name in data.attrs["plane"])
     label = data["label"].transpose(x, y).values
-    names = [f"period {int(p)}, amplitude {float(a):.4g}" for p, a in zip(data.attractor_period, data.amplitude, strict=True)]
-    attractors = [{"label": int(n) - 1, "name": name} for n, name in zip(data["attractor"].values, names, strict=True)]
+    names = [
+        f"period {int(p)}, amplitude {float(a):.4g}"
+        for p, a in zip(data.attractor_period, data.amplitude, strict=True)
+    ]
+    attractors = [
+        {"label": int(n) - 1, "name": name}
+        for n, name in zip(data["attractor"].values, names, strict=True)
+    ]
     return {
         "kind": "basins",
         "plane": _plane(x, y),
@@ -198,7 +253,9 @@ def _basins(data: Any) -> dict[str, Any]:
         "y": _listed(data[y].values),
         "cells": [[int(each) - 1 for each in row] for row in label],
         "attractors": attractors,
-        "curves": [_points("boundary", True, data, [f"boundary_{x}", f"boundary_{y}"])] if f"boundary_{x}" in data else [],
+        "curves": [_points("boundary", True, data, [f"boundary_{x}", f"boundary_{y}"])]
+        if f"boundary_{x}" in data
+        else [],
     }
 
 
@@ -212,7 +269,11 @@ def _curve(data: Any) -> dict[str, Any]:
 def _points(name: str, stable: bool, data: Any, columns: list[str]) -> dict[str, Any]:
     """A curve of the phase plane; it is interrupted where a number is nan."""
     points = np.column_stack([data[column].values for column in columns])
-    return {"name": name, "stable": stable, "points": [[_number(a), _number(b)] for a, b in points.tolist()]}
+    return {
+        "name": name,
+        "stable": stable,
+        "points": [[_number(a), _number(b)] for a, b in points.tolist()],
+    }
 
 
 def _plane(x: str, y: str) -> list[str]:

@@ -1,7 +1,9 @@
-"""A claim: a number or statement of the paper, what a figure measured for it, and the verdict that follows.
+"""A claim: a number or statement of the paper, what a figure measured for it, and the verdict that
+follows.
 
-The statements of the paper are in the tables beside this file (see `claim_tables`); a figure or section gives one `Measured` for
-each of its claims, and `judge` joins both. `ledger` counts the verdicts.
+The statements of the paper are in the tables beside this file (see `claim_tables`); a figure or
+section gives one `Measured` for each of its claims, and `judge` joins both. `ledger` counts the
+verdicts.
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ class Claim:
     evidence: str
     erratum: int | None = None
     headline: str = ""
-    table: tuple[tuple[str, ...], ...] = ()  # a part of the evidence; its first row are the headings
+    # a part of the evidence; its first row are the headings
+    table: tuple[tuple[str, ...], ...] = ()
     beside_table: str = ""  # the evidence without the part that is in the table
 
     def to_dict(self) -> dict[str, Any]:
@@ -54,7 +57,14 @@ class Claim:
     def from_dict(cls, row: Mapping[str, Any]) -> Claim:
         """The claim that `to_dict` wrote."""
         table = tuple(tuple(map(str, line)) for line in row["table"])
-        return cls(**{**row, "verdict": ClaimVerdict(row["verdict"]), "origin": Origin(row["origin"]), "table": table})
+        return cls(
+            **{
+                **row,
+                "verdict": ClaimVerdict(row["verdict"]),
+                "origin": Origin(row["origin"]),
+                "table": table,
+            }
+        )
 
     @property
     def verdict_text(self) -> str:
@@ -68,9 +78,10 @@ class Claim:
 class Measured:
     """What was computed for one claim.
 
-    For a claim with a printed number, `outcome` is the number found. For a formula or a statement as printed it is a residual
-    that must vanish, or whether it holds; `corrected` is the same for the claim as its erratum corrects it, and `second` the same
-    for the correction by an independent kind of evidence. An outcome of None decides nothing.
+    For a claim with a printed number, `outcome` is the number found. For a formula or a statement
+    as printed it is a residual that must vanish, or whether it holds; `corrected` is the same for
+    the claim as its erratum corrects it, and `second` the same for the correction by an independent
+    kind of evidence. An outcome of None decides nothing.
     """
 
     outcome: float | bool | None
@@ -79,11 +90,17 @@ class Measured:
     fields: Mapping[str, Any]  # the fields of the evidence's template
 
 
-Measures = Mapping[str, Measured | None]  # by the claim's id; None if the data at hand say nothing about it
+# by the claim's id; None if the data at hand say nothing about it
+Measures = Mapping[str, Measured | None]
 
 
 def measured(
-    outcome: float | bool | None, corrected: float | bool | None = None, /, *, second: float | bool | None = None, **fields: Any
+    outcome: float | bool | None,
+    corrected: float | bool | None = None,
+    /,
+    *,
+    second: float | bool | None = None,
+    **fields: Any,
 ) -> Measured:
     """A `Measured` with the fields of the claim's evidence."""
     return Measured(outcome, corrected, second, fields)
@@ -95,52 +112,72 @@ def with_fields(fields: Mapping[str, Any], measures: Mapping[str, Measured]) -> 
 
 
 def judge(part: str, measures: Measures) -> list[Claim]:
-    """The claims of a part of the paper, such as "fig04", in the order of its table; without those that rest on other claims.
+    """The claims of a part of the paper, such as "fig04", in the order of its table; without those
+    that rest on other claims.
 
     Raises
     ------
     SaltusError
         A claim of the table that was not measured, or a measured one that is in no table.
     """
-    entries = {id: entry for id, entry in claim_tables().get(part, {}).items() if not entry.rests_on}
+    entries = {
+        id: entry for id, entry in claim_tables().get(part, {}).items() if not entry.rests_on
+    }
     to_measure = {id for id, entry in entries.items() if entry.is_measured}
-    missing, unknown = to_measure - measures.keys(), measures.keys() - to_measure
+    missing = to_measure - measures.keys()
+    unknown = measures.keys() - to_measure
     if missing:
         raise SaltusError(f"{part} did not measure its claims {', '.join(sorted(missing))}")
     if unknown:
-        raise SaltusError(f"{part} measures what no claim of its table asks for: {', '.join(sorted(unknown))}")
+        raise SaltusError(
+            f"{part} measures what no claim of its table asks for: {', '.join(sorted(unknown))}"
+        )
     claims = []
     for id, entry in entries.items():
         one = measures.get(id)
         if not entry.is_measured:
-            claims.append(_row(id, entry, ("as stated", "", ClaimVerdict.NOT_CHECKED), entry.not_checked))
+            claims.append(
+                _row(id, entry, ("as stated", "", ClaimVerdict.NOT_CHECKED), entry.not_checked)
+            )
         elif one is not None:
             claims.append(judge_claim(id, entry, one))
     return claims
 
 
 def judge_claim(id: str, entry: ClaimEntry, measured: Measured) -> Claim:
-    """One claim: a number against the printed one, or a formula or statement by its residual or whether it holds."""
+    """One claim: a number against the printed one, or a formula or statement by its residual or
+    whether it holds.
+    """
     if measured.outcome is None:
-        judged, templates = ("as stated", "", ClaimVerdict.UNDECIDED), [entry.undecided, entry.evidence]
+        judged = ("as stated", "", ClaimVerdict.UNDECIDED)
+        templates = [entry.undecided, entry.evidence]
     else:
-        judged, templates = (_compared if entry.printed is not None else _checked)(entry, measured), [entry.evidence]
+        judged = (_compared if entry.printed is not None else _checked)(entry, measured)
+        templates = [entry.evidence]
     if judged[2] is ClaimVerdict.CORRECTED:
         # A proof is the name of a test and not a template, but holds no braces.
         templates += [f"independently: {one}" for one in (entry.proof, entry.second) if one]
-        if entry.second and (measured.second is None or not _holds(measured.second, entry.tolerance)):
-            judged = *judged[:2], ClaimVerdict.UNDECIDED  # one kind of evidence against the paper is not enough
-    template, table = "; ".join(filter(None, templates)), entry.table(measured.fields)
+        if entry.second and (
+            measured.second is None or not _holds(measured.second, entry.tolerance)
+        ):
+            # one kind of evidence against the paper is not enough
+            judged = *judged[:2], ClaimVerdict.UNDECIDED
+    template = "; ".join(filter(None, templates))
+    table = entry.table(measured.fields)
     return replace(
         _row(id, entry, judged, entry.filled(template, measured.fields)),
         headline="" if measured.outcome is None else entry.filled(entry.headline, measured.fields),
         table=tuple(map(tuple, table)),
-        beside_table=_without_list(entry.filled(template, measured.fields, beside_table=True)) if table else "",
+        beside_table=_without_list(entry.filled(template, measured.fields, beside_table=True))
+        if table
+        else "",
     )
 
 
 def _without_list(evidence: str) -> str:
-    """The evidence with the reference to the table, without the comma or colon that led to the list."""
+    """The evidence with the reference to the table, without the comma or colon that led to the
+    list.
+    """
     return re.sub(rf"[,:;]?( ?{re.escape(BESIDE_TABLE)})", r"\1", evidence)
 
 
@@ -162,11 +199,28 @@ def _row(id: str, entry: ClaimEntry, judged: tuple[str, str, ClaimVerdict], evid
 
 
 def with_summaries(claims: Iterable[Claim]) -> list[Claim]:
-    """The claims and the summaries that rest on them: a summary has the gravest verdict of its claims, once all are judged."""
+    """The claims and the summaries that rest on them: a summary has the gravest verdict of its
+    claims, once all are judged.
+    """
     known = {claim.id: claim for claim in claims}
-    entries = {id: entry for part in claim_tables().values() for id, entry in part.items() if entry.rests_on}
-    ready = {id: entry for id, entry in entries.items() if all(other in known for other in entry.rests_on)}
-    return [*known.values(), *(_summary(id, entry, [known[other] for other in entry.rests_on]) for id, entry in ready.items())]
+    entries = {
+        id: entry
+        for part in claim_tables().values()
+        for id, entry in part.items()
+        if entry.rests_on
+    }
+    ready = {
+        id: entry
+        for id, entry in entries.items()
+        if all(other in known for other in entry.rests_on)
+    }
+    return [
+        *known.values(),
+        *(
+            _summary(id, entry, [known[other] for other in entry.rests_on])
+            for id, entry in ready.items()
+        ),
+    ]
 
 
 def _summary(id: str, entry: ClaimEntry, parts: list[Claim]) -> Claim:
@@ -175,11 +229,16 @@ def _summary(id: str, entry: ClaimEntry, parts: list[Claim]) -> Claim:
     verdict = _true(entry) if gravest.verdict is ClaimVerdict.HOLDS else gravest.verdict
     evidence = "rests on " + ", ".join(f"{claim.id} ({claim.verdict_text})" for claim in parts)
     row = _row(id, entry, ("as stated", "see the claims it rests on", verdict), evidence)
-    return replace(row, erratum=entry.erratum or (gravest.erratum if verdict is ClaimVerdict.CORRECTED else None))
+    return replace(
+        row,
+        erratum=entry.erratum or (gravest.erratum if verdict is ClaimVerdict.CORRECTED else None),
+    )
 
 
 def _compared(entry: ClaimEntry, measured: Measured) -> tuple[str, str, ClaimVerdict]:
-    """Numbers agree within one unit of the last printed digit, so that a digit may have been rounded or cut."""
+    """Numbers agree within one unit of the last printed digit, so that a digit may have been
+    rounded or cut.
+    """
     unit = f" {entry.unit}" if entry.unit else ""
     verdict = ClaimVerdict.DISAGREES
     if _same_number(measured.outcome, entry.printed):
@@ -194,7 +253,11 @@ def _true(entry: ClaimEntry) -> ClaimVerdict:
 
 
 def _same_number(value: float | None, printed: str | None) -> bool:
-    return value is not None and printed is not None and abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9)
+    return (
+        value is not None
+        and printed is not None
+        and abs(value - float(printed)) < printed_unit(printed) * (1 + 1e-9)
+    )
 
 
 def printed_unit(printed: str) -> float:
@@ -203,13 +266,28 @@ def printed_unit(printed: str) -> float:
 
 
 def _checked(entry: ClaimEntry, measured: Measured) -> tuple[str, str, ClaimVerdict]:
-    """A residual vanishes within the tolerance; the erratum counts only where the claim as printed fails."""
-    printed, corrected = measured.outcome, measured.corrected
-    agrees, mended = (one is not None and _holds(one, entry.tolerance) for one in (printed, corrected))
-    verdict = _true(entry) if agrees else ClaimVerdict.CORRECTED if mended and entry.erratum else ClaimVerdict.DISAGREES
+    """A residual vanishes within the tolerance; the erratum counts only where the claim as printed
+    fails.
+    """
+    printed = measured.outcome
+    corrected = measured.corrected
+    agrees, mended = (
+        one is not None and _holds(one, entry.tolerance) for one in (printed, corrected)
+    )
+    verdict = (
+        _true(entry)
+        if agrees
+        else ClaimVerdict.CORRECTED
+        if mended and entry.erratum
+        else ClaimVerdict.DISAGREES
+    )
     if corrected is None or agrees:  # what holds as printed needs no correction beside it
         return "as stated", _outcome_text(printed), verdict
-    return f"as printed: {_outcome_text(printed)}", f"corrected: {_outcome_text(corrected)}", verdict
+    return (
+        f"as printed: {_outcome_text(printed)}",
+        f"corrected: {_outcome_text(corrected)}",
+        verdict,
+    )
 
 
 def _holds(outcome: float | bool, tolerance: float) -> bool:
@@ -221,4 +299,8 @@ def _is_bool(outcome: Any) -> bool:
 
 
 def _outcome_text(outcome: Any) -> str:
-    return ("holds" if outcome else "does not hold") if _is_bool(outcome) else f"residual {float(outcome):.1e}"
+    return (
+        ("holds" if outcome else "does not hold")
+        if _is_bool(outcome)
+        else f"residual {float(outcome):.1e}"
+    )

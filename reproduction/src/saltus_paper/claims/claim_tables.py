@@ -1,25 +1,26 @@
-"""The tables of claims: the paper's statements as data, in one TOML file for each section and in the paper's order.
+"""The tables of claims: the paper's statements as data, in one TOML file for each section and in
+the paper's order.
 
-A file begins with the `section` of the paper, its number, and its `title`. A table `[part.claim-id]` holds, for the claim that
-the part (a figure, table or group of statements) bears on:
+A file begins with the `section` of the paper, its number, and its `title`. A table
+`[part.claim-id]` holds, for the claim that the part (a figure, table or group of statements) bears
+on:
 
-    place        equation label, section or figure
-    statement    in our own words
-    origin       "paper", or "ours" for a check of our own that the paper does not state; "paper" unless it is given
-    printed      the printed number, as a string; left out where the claim is a formula or a statement
-    corrected    the erratum's number
-    unit         of both numbers
-    tolerance    of the residual of a formula, 1e-9 unless it is given
-    erratum      the number of the erratum that corrects the claim
-    evidence     a template: `{name:format}` is a field that the part measured
-    second       a template of the second, independent kind of evidence for the correction, which the part measures as `second`
-    proof        the test that shows the correction in another way, as file::name
-    undecided    a template of the reason for which the numbers decide nothing; the part then measures None
-    not_checked  the reason for which the statement is not checked: nothing is measured for it
-    rests_on     the ids of the claims of which this one is a summary: nothing is measured for it either
-    headline     a template of what the report says on its first page, for the claims that `highlights.toml` lists
-    lists        how a field that is a list is written: `each` row of fields or value (then as `{}`), what stands `between`, and
-                 what if there is `none`; if the report shows it as a table, the templates of its `columns` by their headings
+    place        equation label, section or figure statement    in our own words origin
+    "paper", or "ours" for a check of our own that the paper does not state; "paper" unless it is
+    given printed      the printed number, as a string; left out where the claim is a formula or a
+    statement corrected    the erratum's number unit         of both numbers tolerance    of the
+    residual of a formula, 1e-9 unless it is given erratum      the number of the erratum that
+    corrects the claim evidence     a template: `{name:format}` is a field that the part measured
+    second       a template of the second, independent kind of evidence for the correction, which
+    the part measures as `second` proof        the test that shows the correction in another way, as
+    file::name undecided    a template of the reason for which the numbers decide nothing; the part
+    then measures None not_checked  the reason for which the statement is not checked: nothing is
+    measured for it rests_on     the ids of the claims of which this one is a summary: nothing is
+    measured for it either headline     a template of what the report says on its first page, for
+    the claims that `highlights.toml` lists lists        how a field that is a list is written:
+    `each` row of fields or value (then as `{}`), what stands `between`, and
+                 what if there is `none`; if the report shows it as a table, the templates of its
+                 `columns` by their headings
     like         another claim, whose keys are taken where this one has none
 """
 
@@ -33,7 +34,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-BESIDE_TABLE = "(see the table)"  # replaces a list in the evidence where the table is shown beside it
+# replaces a list in the evidence where the table is shown beside it
+BESIDE_TABLE = "(see the table)"
 
 
 class Origin(StrEnum):
@@ -45,7 +47,9 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListForm:
-    """How rows of fields are written one after the other, and the templates of their columns by heading."""
+    """How rows of fields are written one after the other, and the templates of their columns by
+    heading.
+    """
 
     each: str
     between: str = ", "
@@ -81,7 +85,9 @@ class ClaimEntry:
         return not (self.not_checked or self.rests_on)
 
     def filled(self, template: str, fields: Mapping[str, Any], beside_table: bool = False) -> str:
-        """A template, such as the evidence, with the fields put in; with `beside_table` without the lists that `table` shows."""
+        """A template, such as the evidence, with the fields put in; with `beside_table` without the
+        lists that `table` shows.
+        """
         forms = {name: form for name, form in self.lists.items() if name in fields}
         texts = {name: self._listed(form, fields[name]) for name, form in forms.items()}
         if beside_table:
@@ -92,11 +98,20 @@ class ClaimEntry:
         """The headings and rows of the list that has columns; nothing if no list has any."""
         for name, form in self.lists.items():
             if form.columns and name in fields:
-                return [list(form.columns), *([self.filled(cell, row) for cell in form.columns.values()] for row in fields[name])]
+                return [
+                    list(form.columns),
+                    *(
+                        [self.filled(cell, row) for cell in form.columns.values()]
+                        for row in fields[name]
+                    ),
+                ]
         return []
 
     def _listed(self, form: ListForm, rows: Iterable[Any]) -> str:
-        texts = (self.filled(form.each, row) if isinstance(row, Mapping) else form.each.format(row) for row in rows)
+        texts = (
+            self.filled(form.each, row) if isinstance(row, Mapping) else form.each.format(row)
+            for row in rows
+        )
         return form.between.join(texts) or form.none
 
 
@@ -128,9 +143,14 @@ def _read() -> tuple[dict[str, str], dict[str, dict[str, ClaimEntry]]]:
             section = tables.pop("section")
             titles[section] = tables.pop("title")
             for part, claims in tables.items():
-                parts.setdefault(part, {}).update({id: {**keys, "section": section} for id, keys in claims.items()})
+                parts.setdefault(part, {}).update(
+                    {id: {**keys, "section": section} for id, keys in claims.items()}
+                )
     everything = {id: entry for claims in parts.values() for id, entry in claims.items()}
-    return titles, {part: {id: _entry(claims[id], everything) for id in claims} for part, claims in parts.items()}
+    return titles, {
+        part: {id: _entry(claims[id], everything) for id in claims}
+        for part, claims in parts.items()
+    }
 
 
 def _entry(own: Mapping[str, Any], everything: Mapping[str, Mapping[str, Any]]) -> ClaimEntry:

@@ -1,4 +1,6 @@
-"""The ledger: how many of the paper's statements hold as printed, are corrected or are not checked, section by section."""
+"""The ledger: how many of the paper's statements hold as printed, are corrected or are not checked,
+section by section.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,11 @@ class SectionCount:
         """A row of the ledger's table, under `HEADINGS`."""
         counts = [self.paper.total(), *(self.paper[verdict] for verdict in PAPER_VERDICTS)]
         own = self.ours.total()
-        return self.name, *map(str, counts), f"{self.ours[ClaimVerdict.HOLDS]} of {own}" if own else "–"
+        return (
+            self.name,
+            *map(str, counts),
+            f"{self.ours[ClaimVerdict.HOLDS]} of {own}" if own else "–",
+        )
 
 
 HEADINGS = ("section", "total", *map(str, PAPER_VERDICTS), "own checks")
@@ -40,8 +46,14 @@ def ledger(claims: Iterable[Claim]) -> list[SectionCount]:
     """One count for each section that has claims, in the paper's order, and one of all sections."""
     claims, titles = list(claims), section_titles()
     order = list(titles)
-    sections = sorted({claim.section for claim in claims}, key=lambda s: order.index(s) if s in order else len(order))
-    rows = [_count(f"{s} {titles.get(s, '')}".strip(), (c for c in claims if c.section == s)) for s in sections]
+    sections = sorted(
+        {claim.section for claim in claims},
+        key=lambda s: order.index(s) if s in order else len(order),
+    )
+    rows = [
+        _count(f"{s} {titles.get(s, '')}".strip(), (c for c in claims if c.section == s))
+        for s in sections
+    ]
     return [*rows, _count("all", claims)]
 
 
@@ -55,7 +67,8 @@ def _count(name: str, claims: Iterable[Claim]) -> SectionCount:
 def tally(claims: Iterable[Claim]) -> str:
     """How many claims carry each verdict, in words."""
     total = ledger(claims)[-1]
-    paper, ours = total.paper, total.ours
+    paper = total.paper
+    ours = total.ours
     return (
         f"{paper.total()} statements of the paper: as printed {paper[ClaimVerdict.AS_PRINTED]}, "
         f"corrected by an erratum {paper[ClaimVerdict.CORRECTED]}, undecided {paper[ClaimVerdict.UNDECIDED]}, "
@@ -84,7 +97,9 @@ def to_markdown(claims: Iterable[Claim]) -> str:
 
 def _claims_table(claims: Iterable[Claim]) -> list[str]:
     rows = [("id", "where", "claim", "paper", "here", "verdict", "evidence")]
-    rows += [(c.id, c.where, _statement(c), c.paper, c.value, c.verdict_text, c.evidence) for c in claims]
+    rows += [
+        (c.id, c.where, _statement(c), c.paper, c.value, c.verdict_text, c.evidence) for c in claims
+    ]
     return _table(rows)
 
 
@@ -93,5 +108,7 @@ def _statement(claim: Claim) -> str:
 
 
 def _table(rows: Iterable[tuple[str, ...]]) -> list[str]:
-    first, *rest = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+    first, *rest = [
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows
+    ]
     return [first, "|" + "---|" * (first.count(" | ") + 1), *rest]

@@ -25,28 +25,60 @@ JUMP = {"alpha": 20.0, "e": 0.8}
 
 
 def compute(samples: int = 160) -> Any:
-    """Periods over theta0 / alpha by every formula and by simulation; the energy jump over the ground's velocity."""
-    checks = scalar_dataset(residuals(np.random.default_rng(1)), what="residuals of the formulas, as printed and as corrected")
-    groups = {"period": _periods(samples), "jump": _jump(np.deg2rad(JUMP["alpha"]), JUMP["e"]), "checks": checks}
+    """Periods over theta0 / alpha by every formula and by simulation; the energy jump over the
+    ground's velocity.
+    """
+    checks = scalar_dataset(
+        residuals(np.random.default_rng(1)),
+        what="residuals of the formulas, as printed and as corrected",
+    )
+    groups = {
+        "period": _periods(samples),
+        "jump": _jump(np.deg2rad(JUMP["alpha"]), JUMP["e"]),
+        "checks": checks,
+    }
     return tree(groups, what="the rigid rocking block (appendix A), times in 1/p", tol=TOLERANCE)
 
 
 def _periods(samples: int) -> Any:
-    share = np.concatenate([np.geomspace(1e-3, 0.05, samples // 4), np.linspace(0.05, 0.995, samples)[1:]])
+    share = np.concatenate(
+        [np.geomspace(1e-3, 0.05, samples // 4), np.linspace(0.05, 0.995, samples)[1:]]
+    )
     forms = (rocking_period, short_rocking_period, slender_rocking_period)
-    curves = [np.array([form(share * a, alpha=a) for a in np.deg2rad(SLENDERNESS_ANGLES)]) for form in forms]
+    curves = [
+        np.array([form(share * a, alpha=a) for a in np.deg2rad(SLENDERNESS_ANGLES)])
+        for form in forms
+    ]
     simulated = np.empty((len(SLENDERNESS_ANGLES), len(DOT_ANGLES)))
     for i, alpha in enumerate(np.deg2rad(SLENDERNESS_ANGLES)):
         for j, dot in enumerate(DOT_ANGLES):
             expected = float(rocking_period(dot * alpha, alpha=alpha))
-            motion = simulate(block(float(alpha)), theta=float(dot * alpha), velocity=0.0, duration=1.6 * expected, tol=TOLERANCE)
+            motion = simulate(
+                block(float(alpha)),
+                theta=float(dot * alpha),
+                velocity=0.0,
+                duration=1.6 * expected,
+                tol=TOLERANCE,
+            )
             simulated[i, j] = motion.impacts.time[2] - motion.impacts.time[0]
     names = ("exact", "short", "slender")
-    meanings = ("closed form with an elliptic integral", "4 sqrt(2 theta0 / sin(alpha))", "4 arccosh(1 / (1 - theta0 / alpha))")
+    meanings = (
+        "closed form with an elliptic integral",
+        "4 sqrt(2 theta0 / sin(alpha))",
+        "4 arccosh(1 / (1 - theta0 / alpha))",
+    )
     return dataset(
         {
-            **{n: (("alpha", "share"), c, "1/p", m) for n, c, m in zip(names, curves, meanings, strict=True)},
-            "simulated": (("alpha", "dot"), simulated, "1/p", "time from the first to the third impact of the motion"),
+            **{
+                n: (("alpha", "share"), c, "1/p", m)
+                for n, c, m in zip(names, curves, meanings, strict=True)
+            },
+            "simulated": (
+                ("alpha", "dot"),
+                simulated,
+                "1/p",
+                "time from the first to the third impact of the motion",
+            ),
         },
         {
             "alpha": ("alpha", np.deg2rad(SLENDERNESS_ANGLES), "rad", "slenderness angle"),
@@ -58,18 +90,33 @@ def _periods(samples: int) -> Any:
 
 
 def _jump(alpha: float, e: float) -> Any:
-    """[[T]] / (T of the rotation before) over zeta' / theta', from the formula and from the model's kinetic energy."""
+    """[[T]] / (T of the rotation before) over zeta' / theta', from the formula and from the model's
+    kinetic energy.
+    """
     ground = np.linspace(-2.0, 2.0, 201)
     dots = ground[10::20]
     impact: dict[str, Any] = {"alpha": alpha, "e": e, "ground_velocity": ground}
     computed = np.array([_model_jump(alpha, e, g) for g in dots])
     return dataset(
         {
-            "jump": ("ground", 2 * rocking_energy_jump(1.0, **impact), "1", "[[T]] over theta'-^2 / 2"),
-            "decreases": ("ground", rocking_energy_decreases(1.0, **impact), "1", "either condition holds"),
+            "jump": (
+                "ground",
+                2 * rocking_energy_jump(1.0, **impact),
+                "1",
+                "[[T]] over theta'-^2 / 2",
+            ),
+            "decreases": (
+                "ground",
+                rocking_energy_decreases(1.0, **impact),
+                "1",
+                "either condition holds",
+            ),
             "computed": ("dot", 2 * computed, "1", "the same from the model's energies"),
         },
-        {"ground": ("ground", ground, "1", "zeta' / theta'-"), "dot": ("dot", dots, "1", "zeta' / theta'-")},
+        {
+            "ground": ("ground", ground, "1", "zeta' / theta'-"),
+            "dot": ("dot", dots, "1", "zeta' / theta'-"),
+        },
         what="energy jump at an impact",
         alpha=alpha,
         e=e,
@@ -78,10 +125,15 @@ def _jump(alpha: float, e: float) -> Any:
 
 
 def _model_jump(alpha: float, e: float, ground: float) -> float:
-    """T after less T before an impact from theta' = 1 while the ground moves with velocity `ground`."""
-    load = Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=float(ground)))  # zeta'(0) = amplitude
+    """T after less T before an impact from theta' = 1 while the ground moves with velocity
+    `ground`.
+    """
+    # zeta'(0) = amplitude
+    load = Load(frequency=1.0, ground_horizontal=Harmonic(amplitude=float(ground)))
     model = RockingBlock(alpha=alpha)
-    return float(model.kinetic_energy(0.0, 0.0, e, -1, load) - model.kinetic_energy(0.0, 0.0, 1.0, 1, load))
+    return float(
+        model.kinetic_energy(0.0, 0.0, e, -1, load) - model.kinetic_energy(0.0, 0.0, 1.0, 1, load)
+    )
 
 
 @styled
@@ -97,16 +149,27 @@ def draw(data: Any) -> Any:
     return figure
 
 
-SHORT_DASHES, SLENDER_DASHES = (0, (1, 1.3)), (0, (5, 2))
+SHORT_DASHES = (0, (1, 1.3))
+SLENDER_DASHES = (0, (5, 2))
 
 
 def draw_periods(ax: Any, data: Any) -> None:
-    """p T0 over theta0 / alpha: closed form, simulated dots, and the arccosh, which is the same curve for every alpha."""
+    """p T0 over theta0 / alpha: closed form, simulated dots, and the arccosh, which is the same
+    curve for every alpha.
+    """
     for i, colour in enumerate(shades(data.sizes["alpha"])):
         name = rf"$\alpha={np.rad2deg(float(data['alpha'][i])):.0f}^\circ$"
         ax.plot(data["share"], data["exact"][i], color=colour, lw=1.2, label=name)
         ax.plot(data["dot"], data["simulated"][i], color=colour, ls="none", marker="o", ms=3)
-    ax.plot(data["share"], data["slender"][0], color=LOOK.ink, ls=SLENDER_DASHES, lw=0.9, label="arccosh", zorder=1)
+    ax.plot(
+        data["share"],
+        data["slender"][0],
+        color=LOOK.ink,
+        ls=SLENDER_DASHES,
+        lw=0.9,
+        label="arccosh",
+        zorder=1,
+    )
     ax.set_xlim(0, 1)
     ax.set_ylim(0, 22)
     ax.set_yticks(range(0, 21, 5))
@@ -133,7 +196,8 @@ def draw_errors(ax: Any, data: Any) -> None:
 
 def draw_jump(ax: Any, data: Any) -> None:
     """The energy jump over the ground's velocity, the range of growth shaded."""
-    ground, jump = data["ground"].values, data["jump"].values
+    ground = data["ground"].values
+    jump = data["jump"].values
     bound = float(data.attrs["bound"])
     ax.axvspan(ground[0], -bound, color="#ececec", lw=0, zorder=0)
     ax.axhline(0.0, color=LOOK.faint, lw=0.8)
@@ -143,7 +207,14 @@ def draw_jump(ax: Any, data: Any) -> None:
     ax.set_xlim(ground[0], ground[-1])
     ax.set_xlabel(r"$\dot\zeta/\dot\theta^-$")
     ax.set_ylabel(r"$[\![\mathcal{T}\,]\!]$ / energy of rotation before")
-    ax.text((ground[0] - bound) / 2, jump.min() + 0.06, "energy\ngrows", ha="center", va="bottom", fontsize=8)
+    ax.text(
+        (ground[0] - bound) / 2,
+        jump.min() + 0.06,
+        "energy\ngrows",
+        ha="center",
+        va="bottom",
+        fontsize=8,
+    )
 
 
 FIGURE = paper_figure("appendix", compute=compute, draw=draw, measure=measure)

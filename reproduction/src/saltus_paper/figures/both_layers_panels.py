@@ -1,4 +1,6 @@
-"""The figure that compares the reduced model with both layers: spectra, a diagram, fates of attractors, where it is exact."""
+"""The figure that compares the reduced model with both layers: spectra, a diagram, fates of
+attractors, where it is exact.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,11 @@ import numpy as np
 from saltus.plots import LOOK, new_figure, panel_label, styled
 from saltus_paper.figures.harmonic_loads import AMPLITUDE, FREQUENCY
 
-REDUCED, FULL = "0.65", "#b2182b"  # grey and dark red
-COLOURS = ("#1b7837", "#7fbf7b", "#d9f0d3", "#c2a5cf", "#762a83", "#fdb863", "#4d4d4d")  # of the fates, in their order
+# grey and dark red
+REDUCED = "0.65"
+FULL = "#b2182b"
+# of the fates, in their order
+COLOURS = ("#1b7837", "#7fbf7b", "#d9f0d3", "#c2a5cf", "#762a83", "#fdb863", "#4d4d4d")
 MEANINGS = (
     "exact",
     "within 1 %",
@@ -24,7 +29,11 @@ MEANINGS = (
 
 @styled
 def draw(data: Any) -> Any:
-    """(a, b) Fig. 9, (c) Fig. 11, (d) fates in every variant, (e) where the reduced model is exact, (f) Fig. 14 at Omega = 1."""
+    """(a, b) Fig.
+
+    9, (c) Fig. 11, (d) fates in every variant, (e) where the reduced model is exact, (f) Fig. 14 at
+    Omega = 1.
+    """
     figure = new_figure(LOOK.double_column, 215.0)
     axes = figure.subplots(3, 2).ravel()
     reference = _reference(data["fig09"])
@@ -53,18 +62,42 @@ def draw(data: Any) -> Any:
 
 def _reference(group: Any) -> int:
     """The variant that is shown: m = 0.001, e = g = 0."""
-    chosen = (group["mass_ratio"].values == 0.001) & (group["e"].values == 0.0) & (group["transfer"].values == 0.0)
+    chosen = (
+        (group["mass_ratio"].values == 0.001)
+        & (group["e"].values == 0.0)
+        & (group["transfer"].values == 0.0)
+    )
     return int(np.flatnonzero(chosen)[0])
 
 
 def _points(ax: Any, group: Any, fixed: str, value: float, along: str, variant: int) -> None:
-    """The largest opening of the lower layer over a parameter: the reduced attractors, and the full motions from their states."""
+    """The largest opening of the lower layer over a parameter: the reduced attractors, and the full
+    motions from their states.
+    """
     here = np.isclose(group[fixed].values, value)
-    x, full = group[along].values[here], group["full"].values[variant][here]
-    ax.plot(x, group["reduced"].values[here], "o", ms=3.2, mfc="none", mec=REDUCED, mew=0.7, label="reduced model")
+    x = group[along].values[here]
+    full = group["full"].values[variant][here]
+    ax.plot(
+        x,
+        group["reduced"].values[here],
+        "o",
+        ms=3.2,
+        mfc="none",
+        mec=REDUCED,
+        mew=0.7,
+        label="reduced model",
+    )
     ax.plot(x, full, ".", ms=2.6, color=FULL, label="both layers")
     lost = ~np.isfinite(full)
-    ax.plot(x[lost], group["reduced"].values[here][lost], "x", ms=3.0, mew=0.6, color="k", label="no periodic motion left")
+    ax.plot(
+        x[lost],
+        group["reduced"].values[here][lost],
+        "x",
+        ms=3.0,
+        mew=0.6,
+        color="k",
+        label="no periodic motion left",
+    )
     ax.set_ylabel(r"$\max_\tau\theta_1$ (rad)")
     ax.set_ylim(0.0, None)
 
@@ -77,7 +110,9 @@ def _bars(ax: Any, group: Any) -> None:
     for share, colour in zip(counts, COLOURS, strict=True):
         ax.barh(places, share, left=left, color=colour, height=0.8)
         left += share
-    columns = zip(group["mass_ratio"].values, group["e"].values, group["transfer"].values, strict=True)
+    columns = zip(
+        group["mass_ratio"].values, group["e"].values, group["transfer"].values, strict=True
+    )
     ax.set_yticks(places, [f"{m:g}, {e:g}, {g:g}" for m, e, g in columns])
     ax.tick_params(axis="y", labelsize=6)
     ax.set_ylabel("mass $m$, restitution $e$, transfer $g$", fontsize=7)
@@ -86,19 +121,28 @@ def _bars(ax: Any, group: Any) -> None:
 
 
 def _plane(ax: Any, group: Any, paths: tuple[str, str], variant: int) -> None:
-    """The worst fate of the reduced attractors of each cell of a plane; white where there are none beside rest."""
+    """The worst fate of the reduced attractors of each cell of a plane; white where there are none
+    beside rest.
+    """
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     x, y = (np.unique(group[path].values) for path in paths)
     cells = np.full((y.size, x.size), np.nan)
-    columns, rows = (np.searchsorted(axis, group[path].values) for axis, path in zip((x, y), paths, strict=True))
+    columns, rows = (
+        np.searchsorted(axis, group[path].values) for axis, path in zip((x, y), paths, strict=True)
+    )
     np.fmax.at(cells, (rows, columns), group["fate"].values[variant].astype(float))
     norm = BoundaryNorm(np.arange(-0.5, len(COLOURS)), len(COLOURS))
-    ax.pcolormesh(x, y, cells, cmap=ListedColormap(COLOURS), norm=norm, shading="nearest", rasterized=True)
+    ax.pcolormesh(
+        x, y, cells, cmap=ListedColormap(COLOURS), norm=norm, shading="nearest", rasterized=True
+    )
 
 
 def _legend(figure: Any) -> None:
     from matplotlib.patches import Patch
 
-    handles = [Patch(facecolor=colour, label=meaning) for colour, meaning in zip(COLOURS, MEANINGS, strict=True)]
+    handles = [
+        Patch(facecolor=colour, label=meaning)
+        for colour, meaning in zip(COLOURS, MEANINGS, strict=True)
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=7, frameon=False)

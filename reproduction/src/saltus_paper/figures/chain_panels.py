@@ -1,4 +1,6 @@
-"""The figure of the chain of cells: waves and where they grow, which cells move, states, and the least loads."""
+"""The figure of the chain of cells: waves and where they grow, which cells move, states, and the
+least loads.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ COUPLING = r"coupling $\kappa$"
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) multipliers of waves, (b) which grows, (c) which cells move, (d) states, (e, f) waves, (g) least loads, (h) checks."""
+    """(a) multipliers of waves, (b) which grows, (c) which cells move, (d) states, (e, f) waves,
+    (g) least loads, (h) checks.
+    """
     figure = new_figure(LOOK.double_column, 262.0)
     axes = figure.subplots(4, 2).ravel()
     _multipliers(axes[0], data["modes"])
@@ -39,9 +43,13 @@ def _bar(ax: Any, mesh: Any, label: str, **options: Any) -> None:
 
 
 def _multipliers(ax: Any, modes: Any) -> None:
-    """The largest modulus of the multipliers over the stiffness of a wave and the load; black where it is 1."""
+    """The largest modulus of the multipliers over the stiffness of a wave and the load; black where
+    it is 1.
+    """
     sigma, loads, modulus = (modes[name].values for name in ("stiffness", "amplitude", "modulus"))
-    mesh = ax.pcolormesh(sigma, loads, modulus, cmap="RdBu_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True)
+    mesh = ax.pcolormesh(
+        sigma, loads, modulus, cmap="RdBu_r", vmin=0.5, vmax=1.5, shading="nearest", rasterized=True
+    )
     ax.contour(sigma, loads, modulus, levels=[1.0], colors="k", linewidths=0.9)
     ax.set_xscale("log")
     ax.set_xlabel(r"stiffness of a wave $\sigma=\kappa\,\mu_q$")
@@ -59,7 +67,15 @@ def _growing(ax: Any, modes: Any) -> None:
     colours = ["#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee8866", "#ee6677", "#aa3377"]
     norm = BoundaryNorm(np.arange(0.5, CELLS), CELLS - 1)
     loads = modes["amplitude"].values
-    mesh = ax.pcolormesh(kappa, loads, wave, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
+    mesh = ax.pcolormesh(
+        kappa,
+        loads,
+        wave,
+        cmap=ListedColormap(colours),
+        norm=norm,
+        shading="nearest",
+        rasterized=True,
+    )
     ax.axhline(CRITICAL, color="#762a83", lw=0.9)
     ax.axhline(SETTINGS.load, color="k", lw=0.7, ls=":")
     ax.set_xscale("log")
@@ -74,7 +90,14 @@ def _cells(ax: Any, cells: Any) -> None:
 
     size = np.where(cells["size"].values > 0.01, cells["size"].values, np.nan).T
     colours = colormaps["viridis"].with_extremes(bad="0.85")
-    mesh = ax.pcolormesh(cells["coupling"].values, cells["cell"].values, size, cmap=colours, vmin=0.0, shading="nearest")
+    mesh = ax.pcolormesh(
+        cells["coupling"].values,
+        cells["cell"].values,
+        size,
+        cmap=colours,
+        vmin=0.0,
+        shading="nearest",
+    )
     ax.set_xscale("log")
     ax.set_xlabel(COUPLING)
     ax.set_ylabel("cell")
@@ -82,7 +105,9 @@ def _cells(ax: Any, cells: Any) -> None:
 
 
 def _states(ax: Any, states: Any) -> None:
-    """From how many starts the cells that begin to move are those that go on, and how many sets of cells there are at last."""
+    """From how many starts the cells that begin to move are those that go on, and how many sets of
+    cells there are at last.
+    """
 
     same, sets = kept_states(states)
     kappa = states["coupling"].values
@@ -96,11 +121,20 @@ def _states(ax: Any, states: Any) -> None:
 
 
 def _wave(ax: Any, wave: Any) -> None:
-    """How far each cell is from the motion that all began with, at one phase of the load, period after period."""
+    """How far each cell is from the motion that all began with, at one phase of the load, period
+    after period.
+    """
     apart = wave["theta"].values - wave["theta"].values[:, 0].mean()
     most = float(np.abs(apart).max())
     mesh = ax.pcolormesh(
-        wave["period"].values, wave["cell"].values, apart, cmap="PuOr", vmin=-most, vmax=most, shading="nearest", rasterized=True
+        wave["period"].values,
+        wave["cell"].values,
+        apart,
+        cmap="PuOr",
+        vmin=-most,
+        vmax=most,
+        shading="nearest",
+        rasterized=True,
     )
     ax.set_xlabel(rf"forcing periods, $\kappa={float(wave['coupling']):g}$")
     ax.set_ylabel("cell")
@@ -112,7 +146,15 @@ def _least(ax: Any, least: Any, modes: Any) -> None:
 
     for i, (mark, colour) in enumerate((("o-", "#2166ac"), ("s--", "#b2182b"))):
         name = str(least["begin"].values[i])
-        ax.plot(least["coupling"].values, least["least"].values[i], mark, ms=3.2, lw=1.0, color=colour, label=f"from {name}")
+        ax.plot(
+            least["coupling"].values,
+            least["least"].values[i],
+            mark,
+            ms=3.2,
+            lw=1.0,
+            color=colour,
+            label=f"from {name}",
+        )
     ax.axhline(CRITICAL, color="#762a83", lw=0.9, label=r"$\widehat{\mathcal{H}}_{cr}$")
     ax.axhline(float(modes["fold"]), color="k", lw=0.9, ls=":", label="fold of one cell")
     ax.set_xscale("log")
@@ -124,7 +166,8 @@ def _least(ax: Any, least: Any, modes: Any) -> None:
 
 def _checks(ax: Any, traces: Any) -> None:
     """Traces of the waves' maps from a motion of eight cells, over those from the equations of one."""
-    expected, found = traces["expected"].values, traces["found"].values
+    expected = traces["expected"].values
+    found = traces["found"].values
     ends = [math.floor(expected.min() * 2) / 2, math.ceil(expected.max() * 2) / 2]
     ax.plot(ends, ends, color="0.6", lw=0.9)
     ax.plot(expected, found, "o", ms=4, color="#2166ac")

@@ -1,4 +1,8 @@
-"""Fig. 1c: motions of the damped tristable metainterface in the space of rotation, angular velocity and total energy."""
+"""Fig.
+
+1c: motions of the damped tristable metainterface in the space of rotation, angular velocity and
+total energy.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,20 @@ MOTION_DURATION = 70.0
 
 
 def compute(samples: int = 1600) -> Any:
-    """The data of Fig. 4c (k = 1, m = 0, C = 0.1, e = 1) from three starts, one for each attractor; energies; potential."""
+    """The data of Fig.
+
+    4c (k = 1, m = 0, C = 0.1, e = 1) from three starts, one for each attractor; energies;
+    potential.
+    """
     damped = constant_load(damping=0.1)
     data = portrait(damped, STARTS, MOTION_DURATION, 2.6, samples)
     theta = np.linspace(-2.5, 2.5, 251)
     data = data.assign_coords(potential_theta=("potential_point", theta, {"units": "rad"}))
-    data["potential"] = ("potential_point", potential_energy(damped, theta), {"units": "K2", "long_name": "potential energy"})
+    data["potential"] = (
+        "potential_point",
+        potential_energy(damped, theta),
+        {"units": "K2", "long_name": "potential energy"},
+    )
     return tree({"space": data}, what="motions in the space theta, theta', energy", tol=TOLERANCE)
 
 
@@ -52,12 +64,16 @@ def measure(data: Any) -> dict[str, Measured]:
             duration=MOTION_DURATION,
             circled=[len(c) for c in circled(space)],
         ),
-        "fig01c-energy": measured(bool(rise < 1e-13), rise=rise, loss=np.nanmax(energy) - np.nanmin(energy)),
+        "fig01c-energy": measured(
+            bool(rise < 1e-13), rise=rise, loss=np.nanmax(energy) - np.nanmin(energy)
+        ),
     }
 
 
 def draw_space(ax: Any, data: Any) -> None:
-    """Trajectories with their starts and attractors, the plane theta = 0, and the potential energy in the plane theta' = 0."""
+    """Trajectories with their starts and attractors, the plane theta = 0, and the potential energy
+    in the plane theta' = 0.
+    """
     reach = 1.05 * float(np.nanmax(abs(data["velocity"].values)))
     top = 1.08 * float(np.nanmax(data["energy"].values))
     floor = min(0.0, float(data["potential"].min())) - 0.02
@@ -68,9 +84,12 @@ def draw_space(ax: Any, data: Any) -> None:
         ax.plot(theta, velocity, energy, color=colour, ls=LOOK.dashes[0], lw=0.8, zorder=5 + i)
         ax.plot(theta[:1], velocity[:1], energy[:1], color=colour, marker="D", ms=3.5, zorder=9)
     potential = data["potential"].values
-    ax.plot(data["potential_theta"].values, 0 * potential, potential, color=LOOK.ink, lw=0.6, zorder=4)
+    ax.plot(
+        data["potential_theta"].values, 0 * potential, potential, color=LOOK.ink, lw=0.6, zorder=4
+    )
     stable = data["stable"].values.astype(bool)
-    points, levels = data["equilibrium"].values[stable], data["equilibrium_energy"].values[stable]
+    points = data["equilibrium"].values[stable]
+    levels = data["equilibrium_energy"].values[stable]
     ax.plot(points, 0 * points, levels, color=LOOK.stable, ls="none", marker="o", ms=5, zorder=10)
     ax.set(xlim=(-2.6, 2.6), ylim=(-reach, reach), zlim=(floor, top))
     ax.set_xlabel(r"$\theta$ (rad)", labelpad=-1)
@@ -89,7 +108,16 @@ def draw_space(ax: Any, data: Any) -> None:
 def _plane(ax: Any, reach: float, floor: float, top: float) -> None:
     """theta = 0, transparent grey."""
     velocity, energy = np.meshgrid([-reach, reach], [floor, top])
-    ax.plot_surface(0 * velocity, velocity, energy, color="#9a9a9a", alpha=0.28, shade=False, zorder=1, linewidth=0)
+    ax.plot_surface(
+        0 * velocity,
+        velocity,
+        energy,
+        color="#9a9a9a",
+        alpha=0.28,
+        shade=False,
+        zorder=1,
+        linewidth=0,
+    )
 
 
 FIGURE = paper_figure("fig01c", compute=compute, draw=draw, measure=measure)

@@ -1,4 +1,8 @@
-"""Fig. 2: the unit cell, undeformed and deformed, and the claims of the kinematics (section "Mechanical model")."""
+"""Fig.
+
+2: the unit cell, undeformed and deformed, and the claims of the kinematics (section "Mechanical
+model").
+"""
 
 from __future__ import annotations
 
@@ -21,10 +25,17 @@ STATES = {"undeformed": (0.0, 0.0), "deformed": (12.0, -8.0)}  # theta_1, theta_
 
 
 def compute(alpha0: float = 38.0, beta0: float = 75.0) -> Any:
-    """Positions of every point and the angles of both layers in both states; `alpha0` and `beta0` in degrees."""
+    """Positions of every point and the angles of both layers in both states; `alpha0` and `beta0`
+    in degrees.
+    """
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=np.deg2rad(beta0))
     groups = {name: _state(cell, *np.deg2rad(angles)) for name, angles in STATES.items()}
-    return tree(groups, what="the two-layer unit cell undeformed and deformed", alpha0_degrees=alpha0, beta0_degrees=beta0)
+    return tree(
+        groups,
+        what="the two-layer unit cell undeformed and deformed",
+        alpha0_degrees=alpha0,
+        beta0_degrees=beta0,
+    )
 
 
 def _state(cell: Any, theta_1: float, theta_2: float) -> Any:
@@ -33,20 +44,44 @@ def _state(cell: Any, theta_1: float, theta_2: float) -> Any:
     theta = np.array([theta_1, theta_2])
     points = layout.points
     angles = {
-        "alpha": ("layer", cell.alpha(theta), "rad", "angle between the base and the line joining the diagonal's ends"),
+        "alpha": (
+            "layer",
+            cell.alpha(theta),
+            "rad",
+            "angle between the base and the line joining the diagonal's ends",
+        ),
         "beta": ("layer", cell.beta(theta), "rad", "angle between the base and the inclined bar"),
         "phi": ("layer", signs * cell.phi(theta), "rad", "misalignment at the slider"),
         "theta": ("layer", theta, "rad", "difference angle"),
     }
     return dataset(
         {
-            "position": (("point", "axis"), np.array(list(points.values())), "l", "place in the frame of the base"),
+            "position": (
+                ("point", "axis"),
+                np.array(list(points.values())),
+                "l",
+                "place in the frame of the base",
+            ),
             "bar": (("bar", "end"), np.array(layout.bars), "1", "the two ends of each bar"),
-            "slider": (("slider_number", "end"), np.array(layout.sliders), "1", "the two faces of each slider"),
-            "spring": (("hinge",), np.array(list(layout.springs.values())), "1", "the visco-elastic hinges A and B"),
+            "slider": (
+                ("slider_number", "end"),
+                np.array(layout.sliders),
+                "1",
+                "the two faces of each slider",
+            ),
+            "spring": (
+                ("hinge",),
+                np.array(list(layout.springs.values())),
+                "1",
+                "the visco-elastic hinges A and B",
+            ),
             **angles,
         },
-        {"point": ("point", list(points)), "axis": ("axis", ["x", "y"]), "layer": ("layer", [1, 2])},
+        {
+            "point": ("point", list(points)),
+            "axis": ("axis", ["x", "y"]),
+            "layer": ("layer", [1, 2]),
+        },
         what="one state of the unit cell",
     )
 

@@ -16,13 +16,17 @@ SPAN = 1.5  # of time before the impact
 
 
 def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
-    """theta, phi and their rates until the first impact from theta = 0.4 at rest, beta0 = 80 deg; `alpha0` in degrees."""
+    """theta, phi and their rates until the first impact from theta = 0.4 at rest, beta0 = 80 deg;
+    `alpha0` in degrees.
+    """
     beta0 = np.deg2rad(80.0)
     cell = UnitCell(alpha0=np.deg2rad(alpha0), beta0=beta0)
     system = System(model=Metainterface(beta0=beta0, damping=0.1), load=Load(vertical=-0.5))
     motion = simulate(system, theta=0.4, velocity=0.0, duration=4.0, tol=TOLERANCE)
     impact = float(motion.impacts.time[0])
-    to_go = np.concatenate([np.linspace(SPAN, 0.05, samples), np.geomspace(0.05, 1e-8, samples)[1:]])
+    to_go = np.concatenate(
+        [np.linspace(SPAN, 0.05, samples), np.geomspace(0.05, 1e-8, samples)[1:]]
+    )
     theta, velocity = motion.at(impact - to_go)
     data = dataset(
         {
@@ -42,7 +46,9 @@ def compute(alpha0: float = 45.0, samples: int = 400) -> Any:
         psi=cell.psi,
         sin_beta0=float(np.sin(beta0)),
     )
-    return tree({"approach": data}, what="misalignment and difference angle before an impact", tol=TOLERANCE)
+    return tree(
+        {"approach": data}, what="misalignment and difference angle before an impact", tol=TOLERANCE
+    )
 
 
 @styled
@@ -61,10 +67,13 @@ def measure(data: Any) -> dict[str, Measured]:
     """The square-root law and the singular velocity."""
     d = data["approach"]
     near = d["to_go"].values < 1e-4
-    to_go, rate = d["to_go"].values[near], abs(d["phi_velocity"].values[near])
+    to_go = d["to_go"].values[near]
+    rate = abs(d["phi_velocity"].values[near])
     slope = float(np.polyfit(np.log(to_go), np.log(rate), 1)[0])
     ratio = d["phi_small"].values / d["phi"].values - 1
-    product = 2 * d.attrs["psi"] / d.attrs["sin_beta0"] * d["phi"].values * abs(d["phi_velocity"].values)
+    product = (
+        2 * d.attrs["psi"] / d.attrs["sin_beta0"] * d["phi"].values * abs(d["phi_velocity"].values)
+    )
     velocity = abs(d["theta_velocity"].values)
     return {
         "fundamental-property": measured(
@@ -74,9 +83,15 @@ def measure(data: Any) -> dict[str, Measured]:
             error_at_end=abs(ratio[-1]),
             theta_at_end=d["theta"].values[-1],
         ),
-        "fundamental-velocity": measured(float(product[-1] / velocity[-1] - 1), to_go=d["to_go"].values[-1]),
+        "fundamental-velocity": measured(
+            float(product[-1] / velocity[-1] - 1), to_go=d["to_go"].values[-1]
+        ),
         "phi-singular": measured(
-            bool(abs(slope + 0.5) < 1e-3), slope=slope, to_go=to_go[-1], phi_velocity=rate[-1], theta_velocity=-velocity[-1]
+            bool(abs(slope + 0.5) < 1e-3),
+            slope=slope,
+            to_go=to_go[-1],
+            phi_velocity=rate[-1],
+            theta_velocity=-velocity[-1],
         ),
     }
 
@@ -99,9 +114,12 @@ def draw_history(ax: Any, data: Any) -> None:
 
 
 def draw_phase(ax: Any, data: Any, highest: float = 3.2) -> None:
-    """The rates against the angles, cut off at the rate `highest`, which phi' passes on its way to infinity."""
+    """The rates against the angles, cut off at the rate `highest`, which phi' passes on its way to
+    infinity.
+    """
     for name, style, label in (("phi", PHI, r"$|\varphi|$"), ("theta", THETA, r"$|\theta|$")):
-        angle, rate = abs(data[name].values), abs(data[f"{name}_velocity"].values)
+        angle = abs(data[name].values)
+        rate = abs(data[f"{name}_velocity"].values)
         ax.plot(angle, rate, label=label, **style)
         arrow_along(ax, angle, rate, 250, style["color"], size=8)
     ax.set_xlim(-0.02, None)

@@ -24,8 +24,27 @@ from saltus_paper.figures.phase_portraits import (
 STIFFNESS = {"a": 0.5, "b": 1.1}
 AXES = {"a": ((-2.6, 3.8), (-1.75, 1.75)), "b": ((-2.45, 2.45), (-0.95, 0.95))}
 STARTS: dict[str, list[tuple[float, float]]] = {
-    "a": [(-0.13, 0.0), (-0.42, 0.0), (0.5, 0.0), (1.0, 0.0), (1.7, 0.0), (-0.72, 0.0), (-1.1, 0.0), (-2.05, 0.0)],
-    "b": [(0.25, 0.0), (0.42, 0.0), (0.62, 0.0), (-0.68, 0.0), (-1.05, 0.0), (0.84, 0.0), (1.0, 0.0), (-2.1, 0.0), (-2.25, 0.0)],
+    "a": [
+        (-0.13, 0.0),
+        (-0.42, 0.0),
+        (0.5, 0.0),
+        (1.0, 0.0),
+        (1.7, 0.0),
+        (-0.72, 0.0),
+        (-1.1, 0.0),
+        (-2.05, 0.0),
+    ],
+    "b": [
+        (0.25, 0.0),
+        (0.42, 0.0),
+        (0.62, 0.0),
+        (-0.68, 0.0),
+        (-1.05, 0.0),
+        (0.84, 0.0),
+        (1.0, 0.0),
+        (-2.1, 0.0),
+        (-2.25, 0.0),
+    ],
 }
 MOTION_DURATION = 40.0
 
@@ -33,10 +52,15 @@ MOTION_DURATION = 40.0
 def compute(samples: int = 1200) -> Any:
     """Both portraits, and one with k = 1 to compare its separatrix."""
     groups = {
-        name: portrait(constant_load(stiffness=k), STARTS[name], MOTION_DURATION, 4.0, samples) for name, k in STIFFNESS.items()
+        name: portrait(constant_load(stiffness=k), STARTS[name], MOTION_DURATION, 4.0, samples)
+        for name, k in STIFFNESS.items()
     }
     groups["symmetric"] = portrait(constant_load(), [(0.3, 0.0)], 1.0, 4.0, 10)
-    return tree(groups, what="phase portraits of non-symmetric conservative systems, V = -1.5 / sin(beta0)", tol=TOLERANCE)
+    return tree(
+        groups,
+        what="phase portraits of non-symmetric conservative systems, V = -1.5 / sin(beta0)",
+        tol=TOLERANCE,
+    )
 
 
 @styled
@@ -54,11 +78,17 @@ def draw(data: Any) -> Any:
 def measure(data: Any) -> dict[str, Measured]:
     """theta_I (erratum 9), the separatrix regions, and the motion round two equilibria."""
     found = {name: _summary(data[name]) for name in ("a", "b", "symmetric")}
-    (soft, _, soft_area), (stiff, _, stiff_area), (_, _, area) = (found[n] for n in ("a", "b", "symmetric"))
-    largest, limit = float(np.nanmax(data["a"]["separatrix_theta"].values)), float(data["a"]["kinematic_limit"])
-    misprint, wrong = 1.384, data["a"]["wrong_reaction"].values
+    (soft, _, soft_area), (stiff, _, stiff_area), (_, _, area) = (
+        found[n] for n in ("a", "b", "symmetric")
+    )
+    largest = float(np.nanmax(data["a"]["separatrix_theta"].values))
+    limit = float(data["a"]["kinematic_limit"])
+    misprint = 1.384
+    wrong = data["a"]["wrong_reaction"].values
     stiffness = VERTICAL * float(np.cos(BETA0 + misprint)) / misprint
-    shifts = {side: max(_loop_shift(data[n], data["symmetric"], side) for n in "ab") for side in (1, -1)}
+    shifts = {
+        side: max(_loop_shift(data[n], data["symmetric"], side) for n in "ab") for side in (1, -1)
+    }
     rest = np.array(circled(data["a"])[1]), np.array(circled(data["b"])[2])
     return {
         "fig05a-theta-i": measured(soft),
@@ -89,7 +119,9 @@ def measure(data: Any) -> dict[str, Measured]:
 
 
 def _loop_shift(panel: Any, other: Any, side: int) -> float:
-    """The largest distance between the separatrices round the deformed equilibria on a side, or between these equilibria."""
+    """The largest distance between the separatrices round the deformed equilibria on a side, or
+    between these equilibria.
+    """
     ends = [float((side * p["equilibrium"]).max()) for p in (panel, other)]
     loops = [next(curve for curve in outward(p) if side * curve[0, 0] > 0) for p in (panel, other)]
     count = min(len(loop) for loop in loops)
@@ -98,7 +130,8 @@ def _loop_shift(panel: Any, other: Any, side: int) -> float:
 
 def _summary(panel: Any) -> tuple[float, float, float]:
     """theta_I, theta_II and the area of the separatrix round theta_I."""
-    points, stable = panel["equilibrium"].values, panel["stable"].values.astype(bool)
+    points = panel["equilibrium"].values
+    stable = panel["stable"].values.astype(bool)
     saddle = points[~stable][-1]
     return float(points[stable][-1]), float(points[stable][0]), loop_area(panel, float(saddle))
 

@@ -1,4 +1,8 @@
-"""Fig. 7: the peak ratio against the stiffness ratio, from the energy balance, with points of the exact motion laid over."""
+"""Fig.
+
+7: the peak ratio against the stiffness ratio, from the energy balance, with points of the exact
+motion laid over.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,9 @@ CYCLES = 4
 
 
 def compute(samples: int = 49) -> Any:
-    """P_R over k for both panels, and at four values of k from the simulated motion; theta0 < 0, so the upper layer starts."""
+    """P_R over k for both panels, and at four values of k from the simulated motion; theta0 < 0, so
+    the upper layer starts.
+    """
     stiffness = np.geomspace(1.0, STIFFEST, samples)
     groups = {
         "a": _panel(stiffness, [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES]),
@@ -32,16 +38,25 @@ def compute(samples: int = 49) -> Any:
         "limit": _limits(),
         "disturbed": _disturbed(),
     }
-    return tree(groups, what="peak ratio of conservative motion, beta0 = 80 deg, m = 0, C = 0, e = 1", tol=TOLERANCE)
+    return tree(
+        groups,
+        what="peak ratio of conservative motion, beta0 = 80 deg, m = 0, C = 0, e = 1",
+        tol=TOLERANCE,
+    )
 
 
 def system(stiffness: float, vertical: float) -> Any:
     """The conservative system of Fig. 7."""
-    return System(model=Metainterface(beta0=np.deg2rad(80.0), stiffness_ratio=stiffness), load=Load(vertical=vertical))
+    return System(
+        model=Metainterface(beta0=np.deg2rad(80.0), stiffness_ratio=stiffness),
+        load=Load(vertical=vertical),
+    )
 
 
 def simulated_peak(system: Any, theta0: float) -> float:
-    """The other peak of the exact motion from theta0 at rest: without losses it comes midway between the first two impacts."""
+    """The other peak of the exact motion from theta0 at rest: without losses it comes midway
+    between the first two impacts.
+    """
     period = peaks(system, theta0).period
     motion = simulate(system, theta=theta0, velocity=0.0, duration=period, tol=TOLERANCE)
     first, second = motion.impacts.time[:2]
@@ -58,7 +73,12 @@ def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
             simulated[i, j] = min(peak / -start, -start / peak)
     return dataset(
         {
-            "ratio": (("curve", "stiffness_ratio"), ratio, "1", "P_R from the energy balance (erratum 6)"),
+            "ratio": (
+                ("curve", "stiffness_ratio"),
+                ratio,
+                "1",
+                "P_R from the energy balance (erratum 6)",
+            ),
             "simulated": (("curve", "dot"), simulated, "1", "P_R of the simulated motion"),
         },
         {
@@ -73,8 +93,12 @@ def _panel(stiffness: np.ndarray, curves: list[tuple[float, float]]) -> Any:
 
 
 def _limits() -> Any:
-    """P_R sqrt(k) over its limit sqrt(2 P(theta0)) / abs(theta0) for large k on every curve, and P_R of motions for small k."""
-    curves = [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES] + [(-load, -np.deg2rad(5.0)) for load in LOADS]
+    """P_R sqrt(k) over its limit sqrt(2 P(theta0)) / abs(theta0) for large k on every curve, and
+    P_R of motions for small k.
+    """
+    curves = [(-0.5, -np.deg2rad(angle)) for angle in LOAD_ANGLES] + [
+        (-load, -np.deg2rad(5.0)) for load in LOADS
+    ]
     errors = np.empty((len(curves), len(FAR)))
     for i, (vertical, start) in enumerate(curves):
         limit = np.sqrt(2 * potential_energy(system(1.0, vertical), start)) / -start
@@ -85,10 +109,30 @@ def _limits() -> Any:
     stiff = simulated_peak(system(FAR[1], vertical), start) / -start
     return dataset(
         {
-            "error": (("curve", "stiffness_ratio"), errors, "1", "P_R sqrt(k) over its limit, less 1"),
-            "soft_ratio": ("stiffness_ratio", np.array(soft), "1", "P_R of the simulated motion from theta_max at 1/k, V/k"),
-            "soft_error": ("stiffness_ratio", np.array(soft) * np.sqrt(FAR) / limit - 1, "1", "the same over its limit, less 1"),
-            "stiff_error": ((), stiff * np.sqrt(FAR[1]) / limit - 1, "1", "of the simulated motion at the second k"),
+            "error": (
+                ("curve", "stiffness_ratio"),
+                errors,
+                "1",
+                "P_R sqrt(k) over its limit, less 1",
+            ),
+            "soft_ratio": (
+                "stiffness_ratio",
+                np.array(soft),
+                "1",
+                "P_R of the simulated motion from theta_max at 1/k, V/k",
+            ),
+            "soft_error": (
+                "stiffness_ratio",
+                np.array(soft) * np.sqrt(FAR) / limit - 1,
+                "1",
+                "the same over its limit, less 1",
+            ),
+            "stiff_error": (
+                (),
+                stiff * np.sqrt(FAR[1]) / limit - 1,
+                "1",
+                "of the simulated motion at the second k",
+            ),
         },
         {"stiffness_ratio": ("stiffness_ratio", np.array(FAR), "1", "k")},
         what="the limits of P_R",
@@ -97,36 +141,64 @@ def _limits() -> Any:
 
 
 def _disturbed() -> Any:
-    """The ratio of the mean peaks of both sides of motions with a damping, a loss at impacts, or a horizontal force."""
-    start, stiffness = np.deg2rad(-5.0), np.array([1.0, 10.0, 100.0, STIFFEST])
+    """The ratio of the mean peaks of both sides of motions with a damping, a loss at impacts, or a
+    horizontal force.
+    """
+    start = np.deg2rad(-5.0)
+    stiffness = np.array([1.0, 10.0, 100.0, STIFFEST])
     changes: dict[str, dict[str, Any]] = {
         "C = 0.05": {"model.damping": 0.05},
         "e = 0.95": {"impact": VelocityReduction(0.95)},
-        "H = 0.01 sin τ": {"load": Load(frequency=1.0, horizontal=Harmonic(amplitude=0.01), vertical=-0.5)},
+        "H = 0.01 sin τ": {
+            "load": Load(frequency=1.0, horizontal=Harmonic(amplitude=0.01), vertical=-0.5)
+        },
     }
     ratios = np.empty((len(changes), stiffness.size))
     for i, change in enumerate(changes.values()):
         for j, k in enumerate(stiffness):
             plain = system(float(k), -0.5)
             parts = {name: value for name, value in change.items() if name in ("impact", "load")}
-            disturbed = replace(plain, **parts).with_({n: v for n, v in change.items() if n not in parts})
+            disturbed = replace(plain, **parts).with_(
+                {n: v for n, v in change.items() if n not in parts}
+            )
             motion = simulate(
-                disturbed, theta=start, velocity=0.0, duration=2 * CYCLES * peaks(plain, start).period, tol=TOLERANCE
+                disturbed,
+                theta=start,
+                velocity=0.0,
+                duration=2 * CYCLES * peaks(plain, start).period,
+                tol=TOLERANCE,
             )
             times = motion.impacts.time[: 2 * CYCLES + 1]
-            tops = [float(abs(motion.at(np.linspace(a, b, 201))[0]).max()) for a, b in pairwise(times)]
-            first, second = np.mean(tops[::2]), np.mean(tops[1::2])
+            tops = [
+                float(abs(motion.at(np.linspace(a, b, 201))[0]).max()) for a, b in pairwise(times)
+            ]
+            first = np.mean(tops[::2])
+            second = np.mean(tops[1::2])
             ratios[i, j] = min(first / second, second / first)
     return dataset(
-        {"ratio": (("change", "stiffness_ratio"), ratios, "1", "ratio of the mean peaks of both sides")},
-        {"change": ("change", list(changes)), "stiffness_ratio": ("stiffness_ratio", stiffness, "1", "k")},
+        {
+            "ratio": (
+                ("change", "stiffness_ratio"),
+                ratios,
+                "1",
+                "ratio of the mean peaks of both sides",
+            )
+        },
+        {
+            "change": ("change", list(changes)),
+            "stiffness_ratio": ("stiffness_ratio", stiffness, "1", "k"),
+        },
         what="bouncing-like motion with losses and a load that varies",
         system=system(1.0, -0.5),
     )
 
 
-def _balance(stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.deg2rad(-10.0)) -> Any:
-    """Both peaks of one simulated motion started on either side, for the balance as printed and corrected; the reciprocity."""
+def _balance(
+    stiffness: float = 5.0, vertical: float = -0.5, theta0: float = np.deg2rad(-10.0)
+) -> Any:
+    """Both peaks of one simulated motion started on either side, for the balance as printed and
+    corrected; the reciprocity.
+    """
     reference = system(stiffness, vertical)
     twin, start = reciprocal(reference, theta0)
     values = {
@@ -160,14 +232,19 @@ def draw(data: Any) -> Any:
 def measure(data: Any) -> dict[str, Measured]:
     """The balance (erratum 6), the monotonic decrease, the limit, the reciprocity."""
     b = scalars(data["balance"])
-    k, v, low, high, b0 = b["stiffness_ratio"], b["vertical"], b["theta_min"], b["theta_max"], np.deg2rad(80.0)
+    k = b["stiffness_ratio"]
+    v = b["vertical"]
+    low = b["theta_min"]
+    high = b["theta_max"]
+    b0 = np.deg2rad(80.0)
     printed = k * low**2 / 2 - v * np.sin(b0 + low) - (high**2 / 2 - v * np.sin(b0 - high))
     corrected = k * high**2 / 2 - v * np.sin(b0 + high) - (low**2 / 2 - v * np.sin(b0 + abs(low)))
     deviation = max(_deviation(data["a"]), _deviation(data["b"]))
     unloaded = data["b"]["ratio"][0]
     falls = all((np.diff(data[p]["ratio"].values, axis=1) < 0).all() for p in "ab")
     twin = b["twin_theta_max"] / -b["twin_theta_min"]
-    here, there = high / -low, b["other_side_theta_max"] / -b["other_side_theta_min"]
+    here = high / -low
+    there = b["other_side_theta_max"] / -b["other_side_theta_min"]
     return {
         "pot-balance": measured(printed, corrected, k=k, v=v, theta_min=low, theta_max=high),
         "pot-balance-side": measured(
@@ -178,9 +255,15 @@ def measure(data: Any) -> dict[str, Measured]:
             upper_first=min(here, 1 / here),
             lower_first=min(there, 1 / there),
         ),
-        "fig07-unloaded": measured(float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max())),
-        "fig07-simulated": measured(deviation, motions=sum(data[p]["simulated"].size for p in "ab")),
-        "fig07-monotonic": measured(falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=STIFFEST),
+        "fig07-unloaded": measured(
+            float(np.abs(unloaded - unloaded["stiffness_ratio"] ** -0.5).max())
+        ),
+        "fig07-simulated": measured(
+            deviation, motions=sum(data[p]["simulated"].size for p in "ab")
+        ),
+        "fig07-monotonic": measured(
+            falls, curves=data["a"].sizes["curve"] + data["b"].sizes["curve"], largest_k=STIFFEST
+        ),
         **_far(data["limit"], data["disturbed"]),
         "reciprocity": measured(min(here, 1 / here) - min(twin, 1 / twin)),
     }
@@ -188,8 +271,10 @@ def measure(data: Any) -> dict[str, Measured]:
 
 def _far(limit: Any, disturbed: Any) -> dict[str, Measured]:
     """The limits of k, and the motions with losses and a load that varies."""
-    errors, k = np.abs(limit["error"].values).max(axis=0), limit["stiffness_ratio"].values
-    soft, soft_errors = limit["soft_ratio"].values, np.abs(limit["soft_error"].values)
+    errors = np.abs(limit["error"].values).max(axis=0)
+    k = limit["stiffness_ratio"].values
+    soft = limit["soft_ratio"].values
+    soft_errors = np.abs(limit["soft_error"].values)
     ratios = disturbed["ratio"].values
     stiffness = disturbed["stiffness_ratio"].values
     return {
@@ -215,11 +300,29 @@ def _deviation(panel: Any) -> float:
 
 
 def draw_family(ax: Any, family: Any, names: list[str], title: str) -> None:
-    """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), which differ in shade and dashes."""
+    """Curves ratio(curve, stiffness_ratio) with dots simulated(curve, dot), which differ in shade
+    and dashes.
+    """
     colours = shades(family.sizes["curve"])
     for i, (name, colour) in enumerate(zip(names, colours, strict=True)):
-        ax.plot(family["stiffness_ratio"], family["ratio"][i], color=colour, ls=LOOK.dashes[i], lw=1.2, label=name)
-        ax.plot(family["dot"], family["simulated"][i], color=colour, ls="none", marker="o", ms=3.2, clip_on=False, zorder=4)
+        ax.plot(
+            family["stiffness_ratio"],
+            family["ratio"][i],
+            color=colour,
+            ls=LOOK.dashes[i],
+            lw=1.2,
+            label=name,
+        )
+        ax.plot(
+            family["dot"],
+            family["simulated"][i],
+            color=colour,
+            ls="none",
+            marker="o",
+            ms=3.2,
+            clip_on=False,
+            zorder=4,
+        )
     ax.set_xscale("log")
     ax.set_xlim(1, float(family["stiffness_ratio"][-1]))
     ax.set_ylim(0, 1.03)

@@ -40,9 +40,17 @@ ZOOMED = {"a": (0.1, 0.46), "b": (0.1, 0.34)}  # Omega of the superharmonic reso
 
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
-    """One spectrum for each amplitude, those that take longest first; options are those of `response_spectrum`."""
-    systems = {name: under_force(amplitude=amplitude) for name, amplitude in reversed(list(amplitudes.items()))}
-    return {name: partial(spectrum, system, FREQUENCY_RANGE, **options) for name, system in systems.items()}
+    """One spectrum for each amplitude, those that take longest first; options are those of
+    `response_spectrum`.
+    """
+    systems = {
+        name: under_force(amplitude=amplitude)
+        for name, amplitude in reversed(list(amplitudes.items()))
+    }
+    return {
+        name: partial(spectrum, system, FREQUENCY_RANGE, **options)
+        for name, system in systems.items()
+    }
 
 
 def join(made: Mapping[str, Any]) -> Any:
@@ -52,13 +60,21 @@ def join(made: Mapping[str, Any]) -> Any:
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) to (f), a panel for each amplitude, those with the most branches over the full width; details in insets."""
+    """(a) to (f), a panel for each amplitude, those with the most branches over the full width;
+    details in insets.
+    """
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     rows: Any = _rows(list(panels))
     figure = new_figure(LOOK.double_column, 25.0 + 54.0 * len(rows))
     axes = figure.subplot_mosaic(rows)
     for name, tree in panels.items():
-        draw_panel(axes[name], tree, name, rf"$\widehat{{\mathcal{{H}}}}={AMPLITUDES[name]:g}$", r"\theta_{\rm st}")
+        draw_panel(
+            axes[name],
+            tree,
+            name,
+            rf"$\widehat{{\mathcal{{H}}}}={AMPLITUDES[name]:g}$",
+            r"\theta_{\rm st}",
+        )
         if name in ZOOMED:
             zoom(axes[name], tree, ZOOMED[name])
         if name in LOOPS:
@@ -70,15 +86,23 @@ def draw(data: Any) -> Any:
 
 
 def _rows(names: list[str]) -> list[list[str]]:
-    """The panels' names in rows of two columns; a wide panel, or one without a neighbour, fills a row."""
+    """The panels' names in rows of two columns; a wide panel, or one without a neighbour, fills a
+    row.
+    """
     narrow = [name for name in names if name not in WIDE]
     pairs = [narrow[i : i + 2] for i in range(0, len(narrow), 2)]
-    return [*(pair if len(pair) == 2 else pair * 2 for pair in pairs), *([name] * 2 for name in names if name in WIDE)]
+    return [
+        *(pair if len(pair) == 2 else pair * 2 for pair in pairs),
+        *([name] * 2 for name in names if name in WIDE),
+    ]
 
 
 def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
-    """A spectrum in units of its scale, over the range of the study, with the limits of the mechanism."""
-    scale, (low, high) = tree.attrs["scale"], tree.attrs["bounds"]
+    """A spectrum in units of its scale, over the range of the study, with the limits of the
+    mechanism.
+    """
+    scale = tree.attrs["scale"]
+    (low, high) = tree.attrs["bounds"]
     ax.set_xlim(0.0, high)
     ax.set_ylim(0.0, 1.08 * highest(tree, low, high) / scale)
     ax.set_ylabel(rf"$\max_\tau|\theta|/{unit}$")
@@ -90,11 +114,14 @@ def draw_panel(ax: Any, tree: Any, name: str, title: str, unit: str) -> None:
 
 
 def closed_loop(ax: Any, tree: Any) -> None:
-    """An inset, over a logarithmic axis, with the closed loop that reaches farthest beyond the range."""
+    """An inset, over a logarithmic axis, with the closed loop that reaches farthest beyond the
+    range.
+    """
     closed = [branch for _, branch in detached(tree) if branch.attrs["closed"]]
     if not closed:
         return
-    loop, scale = max(closed, key=lambda branch: float(branch["parameter"].max())), tree.attrs["scale"]
+    loop = max(closed, key=lambda branch: float(branch["parameter"].max()))
+    scale = tree.attrs["scale"]
     inset = ax.inset_axes((0.335, 0.52, 0.215, 0.40))
     inset.set_xscale("log")
     inset.set_xlim(0.9 * float(loop["parameter"].min()), 1.2 * float(loop["parameter"].max()))
@@ -123,8 +150,12 @@ def measure(data: Any) -> dict[str, Measured | None]:
 
 
 def static_unit(panels: Mapping[float, Any]) -> Measured:
-    """The moment (`gov_eqn_theta_long`, k = 1) at theta_st, the `scale` of the spectra, where it first rises through 0."""
-    beta0, residuals, rows = np.deg2rad(BETA0), [], []
+    """The moment (`gov_eqn_theta_long`, k = 1) at theta_st, the `scale` of the spectra, where it
+    first rises through 0.
+    """
+    beta0 = np.deg2rad(BETA0)
+    residuals = []
+    rows = []
     for load, tree in panels.items():
         scale = float(tree.attrs["scale"])
         theta = scale * np.append(np.linspace(0.0, 1.0 - 1e-6, 2000)[1:], (1.0, 1.0 + 1e-6))
@@ -136,4 +167,12 @@ def static_unit(panels: Mapping[float, Any]) -> Measured:
 
 
 PAGE = partial(diagrams_page, name="Fig. 9", first="b")
-FIGURE = paper_figure("fig09", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure, page=PAGE)
+FIGURE = paper_figure(
+    "fig09",
+    quick={"effort": "quick"},
+    panels=panels,
+    join=join,
+    draw=draw,
+    measure=measure,
+    page=PAGE,
+)

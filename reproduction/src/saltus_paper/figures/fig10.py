@@ -1,4 +1,7 @@
-"""Fig. 10: response spectra under load (ii), a harmonic horizontal ground motion, for two amplitudes."""
+"""Fig.
+
+10: response spectra under load (ii), a harmonic horizontal ground motion, for two amplitudes.
+"""
 
 from __future__ import annotations
 
@@ -24,24 +27,39 @@ from saltus_paper.panel_work import Panels
 
 AMPLITUDES = {"a": 0.25, "b": 0.5}  # zetahat
 FREQUENCY_RANGE = (0.1, 4.0)  # Omega: up to chaos
-MOTIONS, HORIZONS = 96, (500, 2000, 8000)  # number of motions, and forcing periods after which settled ones are counted
+# number of motions, and forcing periods after which settled ones are counted
+MOTIONS = 96
+HORIZONS = (500, 2000, 8000)
 
 
 def panels(amplitudes: Mapping[str, float] = AMPLITUDES, **options: Any) -> Panels:
-    """One spectrum for each amplitude, and what becomes of chaos; options are those of `response_spectrum`."""
-    systems = {name: on_ground(amplitude=amplitude) for name, amplitude in reversed(list(amplitudes.items()))}
-    spectra = {name: partial(spectrum, system, FREQUENCY_RANGE, **options) for name, system in systems.items()}
+    """One spectrum for each amplitude, and what becomes of chaos; options are those of
+    `response_spectrum`.
+    """
+    systems = {
+        name: on_ground(amplitude=amplitude)
+        for name, amplitude in reversed(list(amplitudes.items()))
+    }
+    spectra = {
+        name: partial(spectrum, system, FREQUENCY_RANGE, **options)
+        for name, system in systems.items()
+    }
     return {**spectra, "transients": transients}
 
 
 def join(made: Mapping[str, Any]) -> Any:
     """The spectra in the order of the figure, then what becomes of chaos."""
     spectra = {name: tree for name, tree in sorted(made.items()) if name in AMPLITUDES}
-    return with_groups(joined(spectra, what="response spectrum under load (ii)"), {"transients": made["transients"]})
+    return with_groups(
+        joined(spectra, what="response spectrum under load (ii)"),
+        {"transients": made["transients"]},
+    )
 
 
 def transients() -> Any:
-    """How many of some motions at the highest frequency and the largest amplitude have settled after some forcing periods."""
+    """How many of some motions at the highest frequency and the largest amplitude have settled
+    after some forcing periods.
+    """
     system = on_ground(frequency=FREQUENCY_RANGE[1], amplitude=max(AMPLITUDES.values()))
     states = np.random.default_rng(0).uniform(-4.0, 4.0, (MOTIONS, 2))
     found = find_recurrence(system, states, HORIZONS[-1], kept=0)
@@ -51,7 +69,12 @@ def transients() -> Any:
         {
             "settled": ("horizon", np.array(settled), "1", "motions that have settled"),
             "motions": ((), MOTIONS, "1", "of so many"),
-            "returned": ((), int((~again.periodic).sum()), "1", "of the settled ones, that wander again later"),
+            "returned": (
+                (),
+                int((~again.periodic).sum()),
+                "1",
+                "of the settled ones, that wander again later",
+            ),
         },
         {"periods": ("horizon", np.array(HORIZONS), "1", "forcing periods")},
         what="motions that wander at a high frequency",
@@ -61,15 +84,21 @@ def transients() -> Any:
 
 @styled
 def draw(data: Any) -> Any:
-    """(a) and (b), a row for each amplitude; beside each the motions between rest and the main branch."""
+    """(a) and (b), a row for each amplitude; beside each the motions between rest and the main
+    branch.
+    """
     panels = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     figure = new_figure(LOOK.double_column, 25.0 + 70.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])
     for (ax, beside), (name, tree) in zip(axes, panels.items(), strict=True):
         draw_panel(ax, tree, name, rf"$\widehat{{\zeta}}={AMPLITUDES[name]:g}$", r"\theta_{\rm eq}")
-        begin, scale = float(main_branch(tree)["parameter"].min()), tree.attrs["scale"]
-        low, high = 0.96 * begin, 1.26 * begin
-        draw_beside(beside, ax, tree, (low, high, 0.0, 0.6 * highest(tree, low, high) / scale), scale=scale)
+        begin = float(main_branch(tree)["parameter"].min())
+        scale = tree.attrs["scale"]
+        low = 0.96 * begin
+        high = 1.26 * begin
+        draw_beside(
+            beside, ax, tree, (low, high, 0.0, 0.6 * highest(tree, low, high) / scale), scale=scale
+        )
         beside.set_title("detail", pad=4)
     for ax in axes[-1]:
         ax.set_xlabel(r"frequency $\Omega$")
@@ -81,9 +110,14 @@ def measure(data: Any) -> dict[str, Measured | None]:
     """Every feature that the text names."""
     drawn = {name: tree for name, tree in data.children.items() if name in AMPLITUDES}
     panels = {AMPLITUDES[name]: tree for name, tree in drawn.items()}
-    found = {**response_measures.ground_spectra(panels), **chaos_measures.ground_spectra(panels, data["transients"])}
+    found = {
+        **response_measures.ground_spectra(panels),
+        **chaos_measures.ground_spectra(panels, data["transients"]),
+    }
     found |= {"fig10-equivalent": response_measures.equivalent_rotation(panels)}
     return {**found, "fig10-validity": validity("Fig. 10", drawn)}
 
 
-FIGURE = paper_figure("fig10", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure)
+FIGURE = paper_figure(
+    "fig10", quick={"effort": "quick"}, panels=panels, join=join, draw=draw, measure=measure
+)

@@ -1,4 +1,7 @@
-"""Fig. 11: bifurcation diagrams under load (i), a harmonic horizontal force, for two low frequencies."""
+"""Fig.
+
+11: bifurcation diagrams under load (i), a harmonic horizontal force, for two low frequencies.
+"""
 
 from __future__ import annotations
 
@@ -9,4 +12,6 @@ from saltus_paper.measures import chaos_measures
 FREQUENCIES = {"a": 0.5, "b": 1.0}
 LARGEST = {0.5: 4.0, 1.0: 4.0}
 
-FIGURE = force_figure("fig11", FREQUENCIES, LARGEST, chaos_measures.force_diagrams, zoomed=0.2, module=__name__)
+FIGURE = force_figure(
+    "fig11", FREQUENCIES, LARGEST, chaos_measures.force_diagrams, zoomed=0.2, module=__name__
+)

@@ -1,4 +1,7 @@
-"""Fig. 12: bifurcation diagrams under load (i), a harmonic horizontal force, for two high frequencies."""
+"""Fig.
+
+12: bifurcation diagrams under load (i), a harmonic horizontal force, for two high frequencies.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The systems of Figs. 9 to 15: the paper's metainterface at V = -0.5 under its harmonic loads (i) to (iii)."""
+"""The systems of Figs.
+
+9 to 15: the paper's metainterface at V = -0.5 under its harmonic loads (i) to (iii).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,23 @@ import math
 
 from saltus import Harmonic, Load, Metainterface, System
 
-BETA0, DAMPING, VERTICAL = 80.0, 0.1, -0.5  # degrees, C, Vbar
+# degrees, C, Vbar
+BETA0 = 80.0
+DAMPING = 0.1
+VERTICAL = -0.5
 SWING = 0.25  # Vhat of load (iii)
-FREQUENCY, AMPLITUDE, GROUND_AMPLITUDE = "load.frequency", "load.horizontal.amplitude", "load.ground_horizontal.amplitude"
+FREQUENCY = "load.frequency"
+AMPLITUDE = "load.horizontal.amplitude"
+GROUND_AMPLITUDE = "load.ground_horizontal.amplitude"
 
 
-def under_force(frequency: float = 1.0, amplitude: float = 1.0, *, beta0: float = BETA0, damping: float = DAMPING) -> System:
+def under_force(
+    frequency: float = 1.0,
+    amplitude: float = 1.0,
+    *,
+    beta0: float = BETA0,
+    damping: float = DAMPING,
+) -> System:
     """Load (i), `loadpatha`: a horizontal force; `beta0` in degrees."""
     load = Load(frequency=frequency, horizontal=Harmonic(amplitude=amplitude), vertical=VERTICAL)
     return System(model=Metainterface(beta0=math.radians(beta0), damping=damping), load=load)
@@ -19,7 +33,9 @@ def under_force(frequency: float = 1.0, amplitude: float = 1.0, *, beta0: float 
 
 def on_ground(frequency: float = 1.0, amplitude: float = 1.0) -> System:
     """Load (ii), `loadpathaa`: a horizontal motion of the ground."""
-    load = Load(frequency=frequency, ground_horizontal=Harmonic(amplitude=amplitude), vertical=VERTICAL)
+    load = Load(
+        frequency=frequency, ground_horizontal=Harmonic(amplitude=amplitude), vertical=VERTICAL
+    )
     return System(model=Metainterface(beta0=math.radians(BETA0), damping=DAMPING), load=load)
 
 

@@ -1,4 +1,7 @@
-"""The panels of Figs. 11 to 13: bifurcation diagrams over the amplitude of the horizontal load, and what becomes of rest."""
+"""The panels of Figs.
+
+11 to 13: bifurcation diagrams over the amplitude of the horizontal load, and what becomes of rest.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,9 @@ from saltus_paper.panel_work import Panels
 
 LEAST = 1e-3  # Hhat at which the diagrams begin: without a load nothing moves
 NEAR = 1e-3  # relative distance from Hcr at which rest is tried
-WAIT, LAST = 300, 10  # forcing periods
+# forcing periods
+WAIT = 300
+LAST = 10
 
 
 def force_figure(
@@ -46,16 +51,21 @@ def force_figure(
     zoomed: float,
     module: str,
 ) -> PaperFigure:
-    """A figure with a diagram under load (i) for each frequency Omega, up to the amplitude for it; `chaos` measures its bands.
+    """A figure with a diagram under load (i) for each frequency Omega, up to the amplitude for it;
+    `chaos` measures its bands.
 
-    Beside each panel is its part up to the amplitude `zoomed`, about Hcr. Options of the panels are those of
-    `bifurcation_diagram`.
+    Beside each panel is its part up to the amplitude `zoomed`, about Hcr. Options of the panels are
+    those of `bifurcation_diagram`.
     """
 
     def measure(data: Any) -> Measures:
         panels = {frequencies[label]: tree for label, tree in data.children.items()}
         shares = validity(f"Fig. {name[3:]}", data.children)
-        return {**response_measures.force_diagrams(name, panels), **chaos(panels), f"{name}-validity": shares}
+        return {
+            **response_measures.force_diagrams(name, panels),
+            **chaos(panels),
+            f"{name}-validity": shares,
+        }
 
     return paper_figure(
         name,
@@ -69,23 +79,43 @@ def force_figure(
     )
 
 
-def _panels(frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any) -> Panels:
-    return {name: partial(_panel, frequency, largest[frequency], **options) for name, frequency in frequencies.items()}
+def _panels(
+    frequencies: Mapping[str, float], largest: Mapping[float, float], **options: Any
+) -> Panels:
+    return {
+        name: partial(_panel, frequency, largest[frequency], **options)
+        for name, frequency in frequencies.items()
+    }
 
 
 def _panel(frequency: float, largest: float, **options: Any) -> Any:
     """A diagram, with the fate of rest on both sides of Hcr."""
     system = under_force(frequency=frequency)
     tree = diagram(system, (LEAST, largest), **options)
-    return with_groups(tree, {"undeformed": undeformed(system, tree.attrs["critical"]), "birth": birth(tree)})
+    return with_groups(
+        tree, {"undeformed": undeformed(system, tree.attrs["critical"]), "birth": birth(tree)}
+    )
 
 
 def undeformed(system: Any, critical: float) -> Any:
-    """Motions from rest at theta = 0 just below and just above Hcr: whether they stay there, and how far they move much later."""
+    """Motions from rest at theta = 0 just below and just above Hcr: whether they stay there, and
+    how far they move much later.
+    """
     amplitudes = critical * np.array([1 - NEAR, 1 + NEAR])
-    ends = simulate_many(system, theta=0.0, parameters={AMPLITUDE: amplitudes}, periods=WAIT, sample=("extrema",), last=LAST)
+    ends = simulate_many(
+        system,
+        theta=0.0,
+        parameters={AMPLITUDE: amplitudes},
+        periods=WAIT,
+        sample=("extrema",),
+        last=LAST,
+    )
     moved = np.maximum(ends["overall_largest_theta"].values, -ends["overall_smallest_theta"].values)
-    values = {"held_below": int(moved[0] == 0.0), "held_above": int(moved[1] == 0.0), "later": float(largest_angle(ends)[1])}
+    values = {
+        "held_below": int(moved[0] == 0.0),
+        "held_above": int(moved[1] == 0.0),
+        "later": float(largest_angle(ends)[1]),
+    }
     return scalar_dataset(values, what="rest beside Hcr", system=system)
 
 

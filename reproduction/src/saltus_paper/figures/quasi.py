@@ -1,4 +1,6 @@
-"""The bands that the paper calls quasi-periodic, resolved (errata 22): stroboscopic points and Lyapunov exponents."""
+"""The bands that the paper calls quasi-periodic, resolved (errata 22): stroboscopic points and
+Lyapunov exponents.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,19 @@ from saltus_paper.panel_work import Panels
 
 WINDOWS = {"a": (0.35, 0.42), "b": (0.405, 0.475)}  # Omega
 TITLES = {"a": r"load (i), $\widehat{\mathcal{H}}=0.2$", "b": r"load (ii), $\widehat{\zeta}=0.5$"}
-COUNT, STARTS = 57, 4
+COUNT = 57
+STARTS = 4
 EFFORT = "quick"  # steps of 4e-3 of these windows: less than a tenth of those of Figs. 9 and 10
 
 
-def panels(windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = COUNT, starts: int = STARTS) -> Panels:
+def panels(
+    windows: Mapping[str, tuple[float, float]] = WINDOWS, count: int = COUNT, starts: int = STARTS
+) -> Panels:
     """`chaotic_bands` over both windows."""
-    return {name: partial(_panel, name, window, count=count, starts=starts, effort=EFFORT) for name, window in windows.items()}
+    return {
+        name: partial(_panel, name, window, count=count, starts=starts, effort=EFFORT)
+        for name, window in windows.items()
+    }
 
 
 def join(made: Mapping[str, Any]) -> Any:
@@ -40,7 +48,11 @@ def _panel(name: str, window: tuple[float, float], **options: Any) -> Any:
     system = {"a": under_force(amplitude=0.2), "b": on_ground(amplitude=0.5)}[name]
     found = chaotic_bands(system, FREQUENCY, window, window=((-1.0, 1.0), (-1.0, 1.0)), **options)
     tree = xr.DataTree.from_dict(found.to_datasets())
-    tree.attrs = {"system": system.to_json(), "bounds": list(window), "torus": excludes_tori(system) or ""}
+    tree.attrs = {
+        "system": system.to_json(),
+        "bounds": list(window),
+        "torus": excludes_tori(system) or "",
+    }
     return tree
 
 
@@ -58,7 +70,8 @@ def draw(data: Any) -> Any:
         column[1].set_xlabel(r"frequency $\Omega$")
     axes[0, 0].set_ylabel(r"$\theta$ at phase 0 (rad)")
     axes[1, 0].set_ylabel(r"largest exponent $\lambda$")
-    axes[1, 0].legend(loc="upper right", handletextpad=0.2, borderaxespad=0.2)  # where nothing is drawn
+    # where nothing is drawn
+    axes[1, 0].legend(loc="upper right", handletextpad=0.2, borderaxespad=0.2)
     return figure
 
 
@@ -95,21 +108,31 @@ def _exponents(ax: Any, tree: Any) -> None:
 
 def measure(data: Any) -> dict[str, Measured | None]:
     """Both bands are chaos between periodic motions, not tori."""
-    return {f"quasi-{name}": _resolved(data[name]) if name in data.children else None for name in WINDOWS}
+    return {
+        f"quasi-{name}": _resolved(data[name]) if name in data.children else None
+        for name in WINDOWS
+    }
 
 
 def _resolved(panel: Any) -> Measured:
-    bands, table, reason = panel["bands"], panel["exponents"], panel.attrs["torus"]
+    bands = panel["bands"]
+    table = panel["exponents"]
+    reason = panel.attrs["torus"]
     periodic = int(np.isin(table["verdict"].values, (Ending.PERIODIC, Ending.TRANSIENT)).sum())
     largest = float(np.max(bands["exponent"].values, initial=-np.inf))
     return measured(
         bool(reason) and largest > 0.0 and periodic > 0,
         reason=reason,
-        bands=[{"low": low, "high": high} for low, high in zip(bands["low"].values, bands["high"].values, strict=True)],
+        bands=[
+            {"low": low, "high": high}
+            for low, high in zip(bands["low"].values, bands["high"].values, strict=True)
+        ],
         largest=largest,
         periodic=periodic,
         frequencies=table.sizes["value"],
     )
 
 
-FIGURE = paper_figure("quasi", quick={"count": 15}, panels=panels, join=join, draw=draw, measure=measure)
+FIGURE = paper_figure(
+    "quasi", quick={"count": 15}, panels=panels, join=join, draw=draw, measure=measure
+)

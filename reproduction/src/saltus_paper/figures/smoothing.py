@@ -1,4 +1,6 @@
-"""The paper's smoothed sign compared with the exact equation: branches and special points, errors and work over B."""
+"""The paper's smoothed sign compared with the exact equation: branches and special points, errors
+and work over B.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from saltus_paper.figures.smoothing_panels import BOUNDS, MARKERS, REGULAR, draw
 
 AMPLITUDE = 0.5  # Hhat
 SHARPNESS = (20.0, 50.0, 100.0, 200.0, 400.0, 1000.0, 2000.0)  # B of the branches
-FEATURES = {  # kind and frequency near which a special point is looked for, and how far away it may be
+# kind and frequency near which a special point is looked for, and how far away it may be
+FEATURES = {
     "fold of the primary resonance (upper)": ("LP", 0.9088, 1e-3),
     "fold of the primary resonance (lower)": ("LP", 0.8485, 1e-3),
     "symmetry breaking": ("BPC", 0.284, 0.006),
@@ -35,19 +38,26 @@ ENOUGH = 400.0  # B from which all stable motions must be confirmed
 class WorkSettings:
     """The motion for which the work of an integrator is counted, and the values over which it is."""
 
-    periods: int = 20  # The number of forcing periods: enough impacts for their number not to matter.
+    # The number of forcing periods: enough impacts for their number not to matter.
+    periods: int = 20
     start: float = 0.3  # The angle in rad from which the motion starts at rest.
-    sharpness: tuple[float, ...] = (50.0, 200.0, 1e3, 5e3, 2e4)  # The values of B, up to where 1/B is below the errors shown.
-    tolerances: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10)  # The tolerances of the integrator, from rough to near its best.
+    # The values of B, up to where 1/B is below the errors shown.
+    sharpness: tuple[float, ...] = (50.0, 200.0, 1e3, 5e3, 2e4)
+    # The tolerances of the integrator, from rough to near its best.
+    tolerances: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10)
 
 
 WORK = WorkSettings()
 
 
 def compute(count: int = 161) -> Any:
-    """Branches, features, confirmation at `count` frequencies, and the work of an independent integrator (DOP853)."""
+    """Branches, features, confirmation at `count` frequencies, and the work of an independent
+    integrator (DOP853).
+    """
     branches = {sharpness: _branch(sharpness) for sharpness in (None, *SHARPNESS)}
-    groups = {"exact" if b is None else f"B{b:g}": branch.to_xarray() for b, branch in branches.items()}
+    groups = {
+        "exact" if b is None else f"B{b:g}": branch.to_xarray() for b, branch in branches.items()
+    }
     groups |= {
         "broken": _broken(branches[None]).to_xarray(),
         "features": _features(branches),
@@ -55,7 +65,9 @@ def compute(count: int = 161) -> Any:
         "work": _work(),
     }
     parts = {name: xr.DataTree(group) for name, group in groups.items()}
-    return joined(parts, what=f"the smoothed equation beside the exact one, load (i), Hhat = {AMPLITUDE}")
+    return joined(
+        parts, what=f"the smoothed equation beside the exact one, load (i), Hhat = {AMPLITUDE}"
+    )
 
 
 def _system(sharpness: float | None, frequency: float = REGULAR) -> System:
@@ -74,18 +86,50 @@ def _broken(branch: Any) -> Any:
 
 
 def _features(branches: dict[float | None, Any]) -> Any:
-    """The places of the special points and of the knot, and the amplitude at `REGULAR`, by B; B = inf is the exact equation."""
+    """The places of the special points and of the knot, and the amplitude at `REGULAR`, by B; B =
+    inf is the exact equation.
+    """
     every = list(branches.values())
-    place = np.array([[_nearest(branch, *feature) for feature in FEATURES.values()] for branch in every])
+    place = np.array(
+        [[_nearest(branch, *feature) for feature in FEATURES.values()] for branch in every]
+    )
     return dataset(
         {
-            "frequency": (("sharpness", "feature"), place, "1", "Omega of the special point, NaN if there is none"),
-            "knot": ("sharpness", [_knot(branch) for branch in every], "1", "Omega at which the curve crosses itself"),
-            "regular": ("sharpness", [branch.at(REGULAR)[0].amplitude for branch in every], "rad", "max abs(theta)"),
-            "special": ("sharpness", [sum(p.kind in MARKERS for p in branch.special) for branch in every], "1", "number"),
-            "complete": ("sharpness", [_is_complete(branch) for branch in every], "1", "followed over all of the range"),
+            "frequency": (
+                ("sharpness", "feature"),
+                place,
+                "1",
+                "Omega of the special point, NaN if there is none",
+            ),
+            "knot": (
+                "sharpness",
+                [_knot(branch) for branch in every],
+                "1",
+                "Omega at which the curve crosses itself",
+            ),
+            "regular": (
+                "sharpness",
+                [branch.at(REGULAR)[0].amplitude for branch in every],
+                "rad",
+                "max abs(theta)",
+            ),
+            "special": (
+                "sharpness",
+                [sum(p.kind in MARKERS for p in branch.special) for branch in every],
+                "1",
+                "number",
+            ),
+            "complete": (
+                "sharpness",
+                [_is_complete(branch) for branch in every],
+                "1",
+                "followed over all of the range",
+            ),
         },
-        {"sharpness": ("sharpness", [math.inf if b is None else b for b in branches]), "feature": ("feature", list(FEATURES))},
+        {
+            "sharpness": ("sharpness", [math.inf if b is None else b for b in branches]),
+            "feature": ("feature", list(FEATURES)),
+        },
         what="special points of the exact and of the smoothed branches",
     )
 
@@ -96,7 +140,9 @@ def _is_complete(branch: Any) -> bool:
 
 
 def _nearest(branch: Any, kind: str, place: float, within: float) -> float:
-    found = [p.parameter for p in branch.special if p.kind == kind and abs(p.parameter - place) <= within]
+    found = [
+        p.parameter for p in branch.special if p.kind == kind and abs(p.parameter - place) <= within
+    ]
     return min(found, key=lambda value: abs(value - place)) if found else math.nan
 
 
@@ -105,15 +151,18 @@ def _knot(branch: Any) -> float:
     from scipy.optimize import brentq
 
     def difference(frequency: float) -> float:
-        one, two = sorted((orbit for orbit in branch.at(frequency) if orbit.stable), key=lambda orbit: orbit.state[1])
+        one, two = sorted(
+            (orbit for orbit in branch.at(frequency) if orbit.stable),
+            key=lambda orbit: orbit.state[1],
+        )
         return float(one.amplitude - two.amplitude)
 
     return float(brentq(difference, *KNOT, xtol=1e-12))
 
 
 def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
-    """The stable orbits of each smoothed branch at `count` frequencies, and the amplitudes on which exact motions from their
-    states settle."""
+    """The stable orbits of each smoothed branch at `count` frequencies, and the amplitudes on which
+    exact motions from their states settle."""
     frequencies = np.linspace(*BOUNDS, count)[1:-1]
     rows = [
         (b, w, orbit.amplitude, *map(float, orbit.state))
@@ -125,12 +174,23 @@ def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
     ]
     sharpness, frequency, amplitude, theta, velocity = np.array(rows, dtype=float).T
     late = simulate_many(
-        _system(None), theta=theta, velocity=velocity, parameters={FREQUENCY: frequency}, periods=400, sample="extrema", last=12
+        _system(None),
+        theta=theta,
+        velocity=velocity,
+        parameters={FREQUENCY: frequency},
+        periods=400,
+        sample="extrema",
+        last=12,
     )
     return dataset(
         {
             "amplitude": ("motion", amplitude, "rad", "max abs(theta) of the smoothed orbit"),
-            "settled": ("motion", largest_angle(late), "rad", "that of the exact motion from its state, periods 389 to 400"),
+            "settled": (
+                "motion",
+                largest_angle(late),
+                "rad",
+                "that of the exact motion from its state, periods 389 to 400",
+            ),
             "sharpness": ("motion", sharpness, "1", "B"),
             "frequency": ("motion", frequency, "1", "Omega"),
         },
@@ -139,16 +199,36 @@ def _confirmed(branches: dict[float | None, Any], count: int) -> Any:
 
 
 def _work() -> Any:
-    """Evaluations of the right-hand side and errors of the state after `WORK` periods by DOP853: smoothed, and with events."""
+    """Evaluations of the right-hand side and errors of the state after `WORK` periods by DOP853:
+    smoothed, and with events.
+    """
     system = _system(None)
     exact = simulate(system, theta=WORK.start, velocity=0.0, periods=WORK.periods, tol=1e-14)
-    runs = {sharpness: [_integrated(sharpness, rtol) for rtol in WORK.tolerances] for sharpness in (*WORK.sharpness, math.inf)}
+    runs = {
+        sharpness: [_integrated(sharpness, rtol) for rtol in WORK.tolerances]
+        for sharpness in (*WORK.sharpness, math.inf)
+    }
     evaluations = np.array([[count for count, _, _ in row] for row in runs.values()])
-    error = np.array([[math.hypot(x - exact.theta, v - exact.velocity) for _, x, v in row] for row in runs.values()])
+    error = np.array(
+        [
+            [math.hypot(x - exact.theta, v - exact.velocity) for _, x, v in row]
+            for row in runs.values()
+        ]
+    )
     return dataset(
         {
-            "evaluations": (("sharpness", "rtol"), evaluations, "1", "evaluations of the right-hand side"),
-            "error": (("sharpness", "rtol"), error, "1", "distance of the last state from that of the exact motion"),
+            "evaluations": (
+                ("sharpness", "rtol"),
+                evaluations,
+                "1",
+                "evaluations of the right-hand side",
+            ),
+            "error": (
+                ("sharpness", "rtol"),
+                error,
+                "1",
+                "distance of the last state from that of the exact motion",
+            ),
         },
         {"sharpness": ("sharpness", list(runs)), "rtol": ("rtol", list(WORK.tolerances))},
         what="work and error of DOP853",
@@ -157,11 +237,16 @@ def _work() -> Any:
 
 
 def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
-    """Evaluations, and the last state: on one piece with the smoothed sign, or from impact to impact where B is inf."""
+    """Evaluations, and the last state: on one piece with the smoothed sign, or from impact to
+    impact where B is inf.
+    """
     from scipy.integrate import solve_ivp
 
-    end, beta0 = WORK.periods * 2 * math.pi / REGULAR, math.radians(BETA0)
-    state, time, count = [WORK.start, 0.0], 0.0, 0
+    end = WORK.periods * 2 * math.pi / REGULAR
+    beta0 = math.radians(BETA0)
+    state = [WORK.start, 0.0]
+    time = 0.0
+    count = 0
 
     def rate(t: float, y: np.ndarray, side: float) -> list[float]:
         sign = side if math.isinf(sharpness) else math.tanh(sharpness * y[0] / 2)
@@ -170,31 +255,56 @@ def _integrated(sharpness: float, rtol: float) -> tuple[int, float, float]:
         return [y[1], push - DAMPING * y[1] - y[0]]
 
     def crossing(t: float, y: np.ndarray, side: float) -> float:
-        return float(y[0] * side + (1e-9 if t - time < 1e-6 else 0.0))  # the start of a piece is no crossing
+        # the start of a piece is no crossing
+        return float(y[0] * side + (1e-9 if t - time < 1e-6 else 0.0))
 
-    crossing.terminal, crossing.direction = True, -1  # type: ignore[attr-defined]
+    crossing.terminal = True  # type: ignore[attr-defined]
+    crossing.direction = -1  # type: ignore[attr-defined]
     side = 1.0
     while time < end:
         events = crossing if math.isinf(sharpness) else None
-        piece = solve_ivp(rate, (time, end), state, method="DOP853", rtol=rtol, atol=rtol, events=events, args=(side,))
+        piece = solve_ivp(
+            rate,
+            (time, end),
+            state,
+            method="DOP853",
+            rtol=rtol,
+            atol=rtol,
+            events=events,
+            args=(side,),
+        )
         count, time = count + int(piece.nfev), float(piece.t[-1])
-        state, side = [0.0 if piece.status == 1 else float(piece.y[0, -1]), float(piece.y[1, -1])], -side
+        state, side = (
+            [0.0 if piece.status == 1 else float(piece.y[0, -1]), float(piece.y[1, -1])],
+            -side,
+        )
     return count, state[0], state[1]
 
 
 def measure(data: Any) -> dict[str, Measured]:
     """The paper's statements on the smoothing, and the changes that it makes."""
-    found = {**_accuracy(data["features"], data["confirmed"]), **_kinds(data), **_cost(data["work"])}
+    found = {
+        **_accuracy(data["features"], data["confirmed"]),
+        **_kinds(data),
+        **_cost(data["work"]),
+    }
     return found | {"abstract-branch-point": _branch_point(data["exact"], data["broken"])}
 
 
 def _branch_point(exact: Any, broken: Any) -> Measured:
-    """A symmetry breaking at which the stability of the symmetric orbits changes, with unsymmetric stable ones beside it."""
+    """A symmetry breaking at which the stability of the symmetric orbits changes, with unsymmetric
+    stable ones beside it.
+    """
     here = exact["kind"].values == "BPC"
     place = float(exact["special_parameter"].values[here][0]) if here.any() else math.nan
     near = abs(exact["parameter"].values - place)
-    first, second = (exact["stable"].values[np.where(side, near, np.inf).argmin()] for side in _sides(exact, place))
-    uneven = np.where(broken["stable"].values, abs(broken["highest"].values + broken["lowest"].values), 0.0)
+    first, second = (
+        exact["stable"].values[np.where(side, near, np.inf).argmin()]
+        for side in _sides(exact, place)
+    )
+    uneven = np.where(
+        broken["stable"].values, abs(broken["highest"].values + broken["lowest"].values), 0.0
+    )
     apart = float(uneven.max())
     return measured(bool(first != second and apart > 1e-3), place=place, apart=apart)
 
@@ -205,16 +315,21 @@ def _sides(branch: Any, place: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
-    """Whether a B that is large enough gives the limit cycles, and stable motions that the exact equation confirms."""
+    """Whether a B that is large enough gives the limit cycles, and stable motions that the exact
+    equation confirms.
+    """
     sharpness = features["sharpness"].values
     away = abs(confirmed["amplitude"].values - confirmed["settled"].values)
     rows: list[dict[str, Any]] = []
     for b in sharpness[1:]:
         here = confirmed["sharpness"].values == b
         wrong = here & (away > CONFIRMED)
-        low, high = confirmed["frequency"].values[wrong].min(initial=9.0), confirmed["frequency"].values[wrong].max(initial=0.0)
+        low = confirmed["frequency"].values[wrong].min(initial=9.0)
+        high = confirmed["frequency"].values[wrong].max(initial=0.0)
         places = [{"low": float(low), "high": float(high)}] if wrong.any() else []
-        rows.append({"b": float(b), "orbits": int(here.sum()), "wrong": int(wrong.sum()), "places": places})
+        rows.append(
+            {"b": float(b), "orbits": int(here.sum()), "wrong": int(wrong.sum()), "places": places}
+        )
     large = [row for row in rows if row["b"] >= ENOUGH]
     error = abs(features["regular"].values[1:] - features["regular"].values[0])
     order = -float(np.polyfit(np.log(sharpness[-3:]), np.log(error[-3:]), 1)[0])
@@ -222,9 +337,13 @@ def _accuracy(features: Any, confirmed: Any) -> dict[str, Measured]:
     confirmed_all = len(large) > 1 and not any(row["wrong"] for row in large)
     return {
         "smoothing-limit-cycle": measured(
-            bool(error[-1] < 1e-6 and features["complete"].values.all()), errors=errors, regular=REGULAR
+            bool(error[-1] < 1e-6 and features["complete"].values.all()),
+            errors=errors,
+            regular=REGULAR,
         ),
-        "smoothing-confirmed": measured(confirmed_all, panels=rows, within=CONFIRMED, enough=ENOUGH),
+        "smoothing-confirmed": measured(
+            confirmed_all, panels=rows, within=CONFIRMED, enough=ENOUGH
+        ),
         "smoothing-order": measured(abs(order - 2) < 0.1, order=order),
     }
 
@@ -235,7 +354,9 @@ def _kinds(data: Any) -> dict[str, Measured]:
     exact, *smoothed = features["special"].values.tolist()
     lost = np.isnan(features["frequency"].values)
     knot = abs(features["knot"].values[1:] - features["knot"].values[0])
-    folds = abs(features["frequency"].values[1:, :2] - features["frequency"].values[0, :2]).max(axis=1)
+    folds = abs(features["frequency"].values[1:, :2] - features["frequency"].values[0, :2]).max(
+        axis=1
+    )
     rows = [
         {"b": float(b), "special": int(n), "lost": int(row.sum())}
         for b, n, row in zip(features["sharpness"].values[1:], smoothed, lost[1:], strict=True)
@@ -243,21 +364,33 @@ def _kinds(data: Any) -> dict[str, Measured]:
     few = np.isin(features["sharpness"].values[1:], (50.0, 100.0))
     return {
         "smoothing-grazings": measured(
-            not lost[0].any() and all(n != exact for n in smoothed) and bool((lost[1:3].sum(axis=1) == 3).all()),
+            not lost[0].any()
+            and all(n != exact for n in smoothed)
+            and bool((lost[1:3].sum(axis=1) == 3).all()),
             exact=exact,
             panels=rows,
         ),
         "smoothing-primary": measured(
-            bool(folds[few].max() < 1e-5 and knot[few].max() < 1e-5), knot=float(knot[few].max()), folds=float(folds[few].max())
+            bool(folds[few].max() < 1e-5 and knot[few].max() < 1e-5),
+            knot=float(knot[few].max()),
+            folds=float(folds[few].max()),
         ),
     }
 
 
 def _cost(work: Any) -> dict[str, Measured]:
-    """The evaluations for an error of 1e-8, smoothed and from impact to impact, and those that the paper's longest step takes."""
+    """The evaluations for an error of 1e-8, smoothed and from impact to impact, and those that the
+    paper's longest step takes.
+    """
     exact, smoothed = (_needed(work, b, 1e-7) for b in (math.inf, 5000.0))
     steps = float(work.attrs["duration"]) / LONGEST_STEP
-    numbers = {"exact": exact, "smoothed": smoothed, "ratio": smoothed / exact, "paper": 6 * steps, "step": LONGEST_STEP}
+    numbers = {
+        "exact": exact,
+        "smoothed": smoothed,
+        "ratio": smoothed / exact,
+        "paper": 6 * steps,
+        "step": LONGEST_STEP,
+    }
     return {"smoothing-work": measured(exact < smoothed < 6 * steps, **numbers)}
 
 

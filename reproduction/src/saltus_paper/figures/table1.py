@@ -1,4 +1,6 @@
-"""Table 1: the impact scenarios, with conditions in the velocities and one computed example of each (erratum 16)."""
+"""Table 1: the impact scenarios, with conditions in the velocities and one computed example of each
+(erratum 16).
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ EXAMPLES: tuple[tuple[float, tuple[float, float], float], ...] = (
 
 
 def compute(beta0: float = 80.0) -> Any:
-    """The rows, an example state after each kind of impact on the lower layer, and its name; `beta0` in degrees."""
+    """The rows, an example state after each kind of impact on the lower layer, and its name;
+    `beta0` in degrees.
+    """
     model = TwoLayer(beta0=np.deg2rad(beta0))
     rows = table_1()
     examples = [_example(model, *example, row=i) for i, example in enumerate(EXAMPLES)]
@@ -43,21 +47,34 @@ def compute(beta0: float = 80.0) -> Any:
         "scenario": [row.scenario.value for row in rows],
         **{name: [example[name] for example in examples] for name in examples[0]},
     }
-    data = dataset({name: ("row", np.array(values)) for name, values in columns.items()}, what="impact scenarios")
+    data = dataset(
+        {name: ("row", np.array(values)) for name, values in columns.items()},
+        what="impact scenarios",
+    )
     return tree(
-        {"rows": data, "angles": _refusal(model), "random": _random_impacts(model, np.random.default_rng(11))},
+        {
+            "rows": data,
+            "angles": _refusal(model),
+            "random": _random_impacts(model, np.random.default_rng(11)),
+        },
         what="Table 1 with examples at beta0 = 80 deg, m = 0, s = 1",
         beta0_degrees=beta0,
     )
 
 
-def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: float, row: int) -> dict[str, Any]:
-    """An impact on the lower layer whose velocity becomes `after_1`; the other velocity follows from its momentum balance."""
+def _example(
+    model: Any, theta_2: float, before: tuple[float, float], after_1: float, row: int
+) -> dict[str, Any]:
+    """An impact on the lower layer whose velocity becomes `after_1`; the other velocity follows
+    from its momentum balance.
+    """
     theta = (0.0, theta_2)
     matrix = model.mass_matrix(theta)
     free = before[1] - matrix[1][0] / matrix[1][1] * (after_1 - before[0])
-    after_2 = 0.0 if row == 1 else float(free)  # row 2, bouncing: the other layer's contact holds it
-    first, second = LayerState(theta, before), LayerState(theta, (after_1, after_2))
+    # row 2, bouncing: the other layer's contact holds it
+    after_2 = 0.0 if row == 1 else float(free)
+    first = LayerState(theta, before)
+    second = LayerState(theta, (after_1, after_2))
     named = name_impact(first, second, model=model)
     held = LayerState(theta, (after_1, before[1]))
     return {
@@ -74,19 +91,26 @@ def _example(model: Any, theta_2: float, before: tuple[float, float], after_1: f
 
 
 def _random_impacts(model: Any, rng: np.random.Generator, impacts: int = 300) -> Any:
-    """How many random impacts on either layer get another name than by `impact_condition1` to `impact_condition3`.
+    """How many random impacts on either layer get another name than by `impact_condition1` to
+    `impact_condition3`.
 
-    The conditions are those of the text, on the velocities of the hit and of the other layer; which layers are deformed
-    afterwards follows from a short motion with the velocities after the impact.
+    The conditions are those of the text, on the velocities of the hit and of the other layer; which
+    layers are deformed afterwards follows from a short motion with the velocities after the impact.
     """
-    wrong, kinds = 0, set()
+    wrong = 0
+    kinds = set()
     for _ in range(impacts):
         s = int(rng.integers(2))
-        j, sign = 1 - s, (1.0, -1.0)[s]  # layer 1 opens to positive angles, layer 2 to negative ones
+        # layer 1 opens to positive angles, layer 2 to negative ones
+        j = 1 - s
+        sign = (1.0, -1.0)[s]
         other_open, stops, holds = rng.random(3) < 0.5
-        theta, before, after = np.zeros(2), np.zeros(2), np.zeros(2)
+        theta = np.zeros(2)
+        before = np.zeros(2)
+        after = np.zeros(2)
         theta[j], before[j] = (sign * OPEN, float(rng.normal())) if other_open else (0.0, 0.0)
-        before[s], after[s] = -sign * rng.uniform(0.1, 1), 0.0 if stops else sign * rng.uniform(0.1, 1)
+        before[s] = -sign * rng.uniform(0.1, 1)
+        after[s] = 0.0 if stops else sign * rng.uniform(0.1, 1)
         row = model.mass_matrix(tuple(theta))[j]
         after[j] = before[j] - row[s] / row[j] * (after[s] - before[s])
         if not other_open:
@@ -97,9 +121,17 @@ def _random_impacts(model: Any, rng: np.random.Generator, impacts: int = 300) ->
         expected = (1 + int(other_open), int((abs(soon) > 0).sum()), said)
         named = name_impact(_state(theta, before), _state(theta, after), model=model)
         kinds.add(expected)
-        wrong += (named.deformed_before, named.deformed_after, named.scenario.value) != expected or named.layer != s + 1
+        wrong += (
+            named.deformed_before,
+            named.deformed_after,
+            named.scenario.value,
+        ) != expected or named.layer != s + 1
     return dataset(
-        {"wrong": ((), wrong), "impacts": ((), impacts), "printed_kinds": ((), int(kinds == set(PRINTED)))},
+        {
+            "wrong": ((), wrong),
+            "impacts": ((), impacts),
+            "printed_kinds": ((), int(kinds == set(PRINTED))),
+        },
         what="random impacts named by the conditions of the text",
     )
 
@@ -111,7 +143,11 @@ def _state(theta: np.ndarray, velocity: np.ndarray) -> LayerState:
 def _refusal(model: Any) -> Any:
     """Whether an impact across which an angle jumps, as Table 1 prints it, is refused."""
     try:
-        name_impact(LayerState((0.0, OPEN), (-0.5, 0.2)), LayerState((0.0, OPEN / 2), (0.0, 0.2)), model=model)
+        name_impact(
+            LayerState((0.0, OPEN), (-0.5, 0.2)),
+            LayerState((0.0, OPEN / 2), (0.0, 0.2)),
+            model=model,
+        )
     except ParameterError as error:
         return dataset({"refused": ((), True)}, what=str(error))
     return dataset({"refused": ((), False)}, what="a jump of an angle was accepted")
@@ -148,7 +184,15 @@ def table(data: Any) -> str:
 
 
 def _pretty(text: Any) -> str:
-    names = {"theta_s": "θₛ", "theta_j": "θⱼ", "M_sj": "Mₛⱼ", "M_jj": "Mⱼⱼ", "!=": "≠", "(+)": "⁺", "(-)": "⁻"}
+    names = {
+        "theta_s": "θₛ",
+        "theta_j": "θⱼ",
+        "M_sj": "Mₛⱼ",
+        "M_jj": "Mⱼⱼ",
+        "!=": "≠",
+        "(+)": "⁺",
+        "(-)": "⁻",
+    }
     out = str(text)
     for name, pretty in names.items():
         out = out.replace(name, pretty)
@@ -157,15 +201,24 @@ def _pretty(text: Any) -> str:
 
 def measure(data: Any) -> dict[str, Measured]:
     """The table's scenarios, and erratum 16."""
-    rows, refused = data["rows"], bool(data["angles"]["refused"])
+    rows = data["rows"]
+    refused = bool(data["angles"]["refused"])
     named = tuple(
-        (int(a), int(b), str(c)) for a, b, c in zip(*(rows[f"named{x}"].values for x in ("_before", "_after", "")), strict=True)
+        (int(a), int(b), str(c))
+        for a, b, c in zip(
+            *(rows[f"named{x}"].values for x in ("_before", "_after", "")), strict=True
+        )
     )
     found = {name: int(data["random"][name]) for name in ("wrong", "impacts", "printed_kinds")}
     same = named == PRINTED and found["wrong"] == 0 and found["printed_kinds"] == 1
-    last = {name: float(rows[name][-1]) for name in ("impulse", "impulse_if_unchanged", "velocity_before_2", "velocity_after_2")}
+    last = {
+        name: float(rows[name][-1])
+        for name in ("impulse", "impulse_if_unchanged", "velocity_before_2", "velocity_after_2")
+    }
     measures = {
-        "table1-scenarios": measured(same, states=rows.sizes["row"], named=rows["named"].values.tolist(), **found),
+        "table1-scenarios": measured(
+            same, states=rows.sizes["row"], named=rows["named"].values.tolist(), **found
+        ),
         "table1-angles": measured(not refused, refused, refusal=data["angles"].attrs["what"]),
         "table1-other-layer": measured(last["impulse_if_unchanged"], last["impulse"]),
     }

@@ -1,4 +1,7 @@
-"""The panels of Figs. 14 and 15 in numbers: areas of the plane of the loads, and the onset of motions over V."""
+"""The panels of Figs.
+
+14 and 15 in numbers: areas of the plane of the loads, and the onset of motions over V.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,8 @@ FIRST_MOTION = (1, 2)  # one forcing period, two impacts in it
 class ChartCells:
     """A chart's cells over (vertical, horizontal).
 
-    The line V = 0, on which rest is nowhere the only equilibrium, and Hhat = 0, where no load moves anything, are left out.
+    The line V = 0, on which rest is nowhere the only equilibrium, and Hhat = 0, where no load moves
+    anything, are left out.
     """
 
     horizontal: np.ndarray
@@ -30,14 +34,20 @@ class ChartCells:
 
     def with_motion(self, period: int, impact_count: int) -> np.ndarray:
         """Cells with a motion of so many forcing periods and impacts in them."""
-        return np.asarray(((self.motion_period == period) & (self.motion_impact_count == impact_count)).any(axis=2))
+        return np.asarray(
+            ((self.motion_period == period) & (self.motion_impact_count == impact_count)).any(
+                axis=2
+            )
+        )
 
 
 def chart_cells(panel: Any) -> ChartCells:
     """The cells of a panel."""
-    chart, static = panel["chart"].to_dataset(), panel["static"].to_dataset()
+    chart = panel["chart"].to_dataset()
+    static = panel["static"].to_dataset()
     inside = chart.isel(vertical=chart["vertical"] < 0, horizontal=chart["horizontal"] > 0)
-    horizontal, vertical = inside["horizontal"].values, inside["vertical"].values
+    horizontal = inside["horizontal"].values
+    vertical = inside["vertical"].values
     border = np.interp(vertical, static["vertical"].values, static["true"].values)
     names = ("amplitude", "count", "motion_period", "motion_impact_count")
     return ChartCells(
@@ -56,13 +66,17 @@ def lost(panel: Any) -> float:
 
 
 def gained(panel: Any) -> float:
-    """The cells outside the quasi-static monostable domain in which there is rest alone, as a share of the domain."""
+    """The cells outside the quasi-static monostable domain in which there is rest alone, as a share
+    of the domain.
+    """
     cells = chart_cells(panel)
     return float((~cells.static & cells.only_rest).sum() / max(cells.static.sum(), 1))
 
 
 def outside(panel: Any) -> float:
-    """The cells outside the domain in which there is rest alone, as a share of the cells outside the domain."""
+    """The cells outside the domain in which there is rest alone, as a share of the cells outside
+    the domain.
+    """
     cells = chart_cells(panel)
     return float((~cells.static & cells.only_rest).sum() / max((~cells.static).sum(), 1))
 
@@ -79,7 +93,8 @@ def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:
 
 def _least_at(curve: Any, vertical: np.ndarray) -> np.ndarray:
     """The least Hhat at which a curve goes through each V."""
-    h, v = curve["horizontal"].values, curve["vertical"].values
+    h = curve["horizontal"].values
+    v = curve["vertical"].values
     least = np.full(len(vertical), np.nan)
     for a in range(len(v) - 1):
         low, high = sorted((v[a], v[a + 1]))
@@ -90,12 +105,14 @@ def _least_at(curve: Any, vertical: np.ndarray) -> np.ndarray:
 
 
 def lost_by_curves(panel: Any) -> float:
-    """The share `lost`, from the exact curves: the area between the onset of the first motion and the static border.
+    """The share `lost`, from the exact curves: the area between the onset of the first motion and
+    the static border.
 
     NaN if the curve of the onset does not extend over all V, or is no border of rest.
     """
     static = panel["static"].to_dataset()
     inside = (static["vertical"].values < 0) & (static["true"].values > 0)
-    vertical, border = static["vertical"].values[inside], static["true"].values[inside]
+    vertical = static["vertical"].values[inside]
+    border = static["true"].values[inside]
     begins = np.minimum(onset(panel, vertical), border)
     return float(1 - np.trapezoid(begins, vertical) / np.trapezoid(border, vertical))

@@ -1,1 +1,3 @@
-"""The report: one HTML file from templates, with pictures, claims, errata and where each number comes from."""
+"""The report: one HTML file from templates, with pictures, claims, errata and where each number
+comes from.
+"""

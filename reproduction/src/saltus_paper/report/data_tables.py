@@ -1,4 +1,6 @@
-"""The contents of a netCDF file as tables for a reader: its variables, the systems and the settings of its panels."""
+"""The contents of a netCDF file as tables for a reader: its variables, the systems and the settings
+of its panels.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ class VariableRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueRow:
-    """A parameter of the system or a setting, with its value, or its values in the panels if they differ."""
+    """A parameter of the system or a setting, with its value, or its values in the panels if they
+    differ.
+    """
 
     name: str
     meaning: str
@@ -48,7 +52,8 @@ class DataTables:
 
 
 def data_tables(path: Path) -> DataTables:
-    """The tables of a netCDF file that this package has written and whose fingerprint is that of its record.
+    """The tables of a netCDF file that this package has written and whose fingerprint is that of
+    its record.
 
     It is read by h5netcdf, as `saltus.load` would also read all numbers of hundreds of groups.
 
@@ -63,7 +68,9 @@ def data_tables(path: Path) -> DataTables:
         with h5netcdf.File(path, "r") as file:
             return _tables_of(file)
     except Exception as error:  # h5netcdf, HDF5 and forged attributes have many ways to say so
-        raise ParameterError(f"{path} is no result of saltus that can be read ({error!s:.80}); compute it again") from error
+        raise ParameterError(
+            f"{path} is no result of saltus that can be read ({error!s:.80}); compute it again"
+        ) from error
 
 
 def _tables_of(file: Any) -> DataTables:
@@ -86,16 +93,25 @@ def _tables_of(file: Any) -> DataTables:
                 settings.setdefault(name, {}).setdefault(panel, _text(value))
     return DataTables(
         variables=[
-            VariableRow(panels=_panels(panels), path=row[0], dims=dims[row], units=row[1], meaning=row[2])
+            VariableRow(
+                panels=_panels(panels), path=row[0], dims=dims[row], units=row[1], meaning=row[2]
+            )
             for row, panels in variables.items()
         ],
-        parameters=[_parameter_row(name, values, settings.get("path", {})) for name, values in parameters.items()],
-        settings=[_value_row(name, _words("settings")[name], values) for name, values in settings.items()],
+        parameters=[
+            _parameter_row(name, values, settings.get("path", {}))
+            for name, values in parameters.items()
+        ],
+        settings=[
+            _value_row(name, _words("settings")[name], values) for name, values in settings.items()
+        ],
     )
 
 
 def _groups(group: Any, panel: str = "", inner: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Every group: its panel, its path within the panel and itself; of numbered groups, such as curves, only the first."""
+    """Every group: its panel, its path within the panel and itself; of numbered groups, such as
+    curves, only the first.
+    """
     yield panel, inner, group
     seen = set()
     for name, child in group.groups.items():
@@ -123,9 +139,16 @@ def _text(value: Any) -> str:
 
 
 def _parameter_row(name: str, values: Mapping[str, str], paths: Mapping[str, str]) -> ValueRow:
-    """A number of the system; it has no single value in a panel whose diagram or chart is drawn over it."""
-    varied = {panel: "varied" if re.search(rf"\b{re.escape(name)}\b", path) else None for panel, path in paths.items()}
-    return _value_row(name, "", {panel: varied.get(panel) or value for panel, value in values.items()})
+    """A number of the system; it has no single value in a panel whose diagram or chart is drawn
+    over it.
+    """
+    varied = {
+        panel: "varied" if re.search(rf"\b{re.escape(name)}\b", path) else None
+        for panel, path in paths.items()
+    }
+    return _value_row(
+        name, "", {panel: varied.get(panel) or value for panel, value in values.items()}
+    )
 
 
 def _value_row(name: str, meaning: str, values: Mapping[str, str]) -> ValueRow:
@@ -135,7 +158,11 @@ def _value_row(name: str, meaning: str, values: Mapping[str, str]) -> ValueRow:
         by_value.setdefault(value, []).append(panel)
     if len(by_value) == 1:
         return ValueRow(name=name, meaning=meaning, values=next(iter(by_value)))
-    return ValueRow(name=name, meaning=meaning, values="; ".join(f"{_panels(p)}: {value}" for value, p in by_value.items()))
+    return ValueRow(
+        name=name,
+        meaning=meaning,
+        values="; ".join(f"{_panels(p)}: {value}" for value, p in by_value.items()),
+    )
 
 
 def _panels(names: list[str]) -> str:
@@ -148,6 +175,8 @@ def _panels(names: list[str]) -> str:
 
 
 def _words(table: str) -> dict[str, str]:
-    """The words for `settings` (attributes), or the `meanings` of variables that have no description of their own."""
+    """The words for `settings` (attributes), or the `meanings` of variables that have no
+    description of their own.
+    """
     words: dict[str, str] = toml_table("report", "variables.toml")[table]
     return words

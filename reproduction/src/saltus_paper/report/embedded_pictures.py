@@ -1,4 +1,6 @@
-"""Pictures as text within the report, so that it is one file: losslessly packed, at their full size."""
+"""Pictures as text within the report, so that it is one file: losslessly packed, at their full
+size.
+"""
 
 from __future__ import annotations
 
@@ -29,4 +31,8 @@ def embedded(path: Path) -> EmbeddedPicture:
             # The least effort would double the size, and an effort above 2 gains nothing.
             picture.convert("RGB").save(buffer, format="WEBP", lossless=True, quality=50, method=2)
     content = buffer.getvalue() or path.read_bytes()
-    return EmbeddedPicture(uri=f"data:image/{kind};base64,{base64.b64encode(content).decode()}", width=width, height=height)
+    return EmbeddedPicture(
+        uri=f"data:image/{kind};base64,{base64.b64encode(content).decode()}",
+        width=width,
+        height=height,
+    )

@@ -1,4 +1,6 @@
-"""Writing the report: report.html from its templates, claims.json, claims.md, and report.pdf where a browser can print it."""
+"""Writing the report: report.html from its templates, claims.json, claims.md, and report.pdf where
+a browser can print it.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +25,15 @@ from saltus_paper.report.browser import print_pdf
 from saltus_paper.report.report_content import BEYOND, ReportContent, report_content
 from saltus_paper.toml_tables import toml_table
 
-PAGE, PRINT = "report.html", "report.pdf"
+PAGE = "report.html"
+PRINT = "report.pdf"
 
 
-def write_report(figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iterable[Claim]]) -> list[Claim]:
-    """Write report.html, claims.json and claims.md about everything in `folder` that is up to date; return its claims.
+def write_report(
+    figures: Iterable[PaperFigure], folder: Path, known: Mapping[str, Iterable[Claim]]
+) -> list[Claim]:
+    """Write report.html, claims.json and claims.md about everything in `folder` that is up to date;
+    return its claims.
 
     `known` holds the claims of the figures, by name, that are known to be up to date.
     """
@@ -42,10 +48,11 @@ def write_report(figures: Iterable[PaperFigure], folder: Path, known: Mapping[st
 
 
 def report_from_results(folder: Path | str) -> list[str]:
-    """Write the report anew from the results in a folder, computing nothing; return the names of the parts in it.
+    """Write the report anew from the results in a folder, computing nothing; return the names of
+    the parts in it.
 
-    Parts that were made by other sources are shown too, and marked. A part is left out if its files are not those of its record,
-    or if the record cannot be read.
+    Parts that were made by other sources are shown too, and marked. A part is left out if its files
+    are not those of its record, or if the record cannot be read.
 
     Raises
     ------
@@ -56,23 +63,32 @@ def report_from_results(folder: Path | str) -> list[str]:
 
     folder = Path(folder)
     figures = [state.as_made(figure, folder) for figure in FIGURES.values()]
-    present = {figure: state.claims(figure, folder) for figure in figures if state.intact(figure, folder)}
+    present = {
+        figure: state.claims(figure, folder) for figure in figures if state.intact(figure, folder)
+    }
     if not present:
-        raise ParameterError(f"{folder} holds no results of `saltus reproduce`; name the folder in which they are")
+        raise ParameterError(
+            f"{folder} holds no results of `saltus reproduce`; name the folder in which they are"
+        )
     check_writable(folder)
     _write(report_content(figures, present, folder), folder)
     return [figure.name for figure in present]
 
 
 def report_as_pdf(folder: Path | str) -> str | None:
-    """Print report.html of a folder as report.pdf, if there is a browser and it is not done yet; returns why not, or None."""
+    """Print report.html of a folder as report.pdf, if there is a browser and it is not done yet;
+    returns why not, or None.
+    """
     folder = Path(folder)
     return print_pdf(folder / PAGE, folder / PRINT, folder / state.FOLDER / f"{PRINT}.sha256")
 
 
 def _write(content: ReportContent, folder: Path) -> list[Claim]:
     pages = {
-        "claims.json": json.dumps([claim.to_dict() for claim in content.claims], indent=1, ensure_ascii=False) + "\n",
+        "claims.json": json.dumps(
+            [claim.to_dict() for claim in content.claims], indent=1, ensure_ascii=False
+        )
+        + "\n",
         "claims.md": to_markdown(content.claims),
         PAGE: page(content),
     }
@@ -98,7 +114,10 @@ def page(content: ReportContent) -> str:
             findings=findings(content.claims),
             validity=validity(content.claims),
             verdicts=list(ClaimVerdict),
-            counts={verdict: sum(claim.verdict is verdict for claim in content.claims) for verdict in ClaimVerdict},
+            counts={
+                verdict: sum(claim.verdict is verdict for claim in content.claims)
+                for verdict in ClaimVerdict
+            },
             ours=Origin.OURS,
             beyond=BEYOND,
         )
@@ -107,7 +126,9 @@ def page(content: ReportContent) -> str:
 
 @cache
 def _environment() -> Any:
-    """Templates that escape everything that is put into them: captions, evidence and metadata are data."""
+    """Templates that escape everything that is put into them: captions, evidence and metadata are
+    data.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -123,34 +144,53 @@ def _environment() -> Any:
 
 
 class Linker:
-    """Turns the ids of claims and the numbers of errata within a text into links, and `names` into code; the rest is escaped.
+    """Turns the ids of claims and the numbers of errata within a text into links, and `names` into
+    code; the rest is escaped.
 
-    A word that is also English, such as `period`, is taken as an id only if its verdict follows or the word "claim" precedes it.
+    A word that is also English, such as `period`, is taken as an id only if its verdict follows or
+    the word "claim" precedes it.
     """
 
     def __init__(self, ids: set[str]) -> None:
         verdicts = "|".join(map(str, ClaimVerdict))
-        names, words = (_alternatives(id for id in ids if ("-" in id) is hyphen) for hyphen in (True, False))
+        names, words = (
+            _alternatives(id for id in ids if ("-" in id) is hyphen) for hyphen in (True, False)
+        )
         claim = rf"(?P<id>{names}|{words}(?= \((?:{verdicts}))|(?<=claim ){words})"
-        self._pattern = re.compile(rf"`(?P<code>[^`]+)`|(?<![\w/:.-])(?:erratum (?P<number>\d+)|{claim})(?![\w/:-])")
+        self._pattern = re.compile(
+            rf"`(?P<code>[^`]+)`|(?<![\w/:.-])(?:erratum (?P<number>\d+)|{claim})(?![\w/:-])"
+        )
 
     def __call__(self, text: str, without: str = "") -> Any:
-        """The text as markup, with no link to `without`, the claim or erratum that contains the text."""
+        """The text as markup, with no link to `without`, the claim or erratum that contains the
+        text.
+        """
         from markupsafe import Markup, escape
 
-        parts, end = [], 0
+        parts = []
+        end = 0
         for match in self._pattern.finditer(text):
-            code, number, id = match["code"], match["number"], match["id"]
-            target = id if id else f"erratum-{number}" if number and int(number) in errata() else None
+            code = match["code"]
+            number = match["number"]
+            id = match["id"]
+            target = (
+                id if id else f"erratum-{number}" if number and int(number) in errata() else None
+            )
             if code or (target and target != without):
-                made = _equation(code) or Markup("<code>{}</code>").format(code) if code else _link(target, match[0])
+                made = (
+                    _equation(code) or Markup("<code>{}</code>").format(code)
+                    if code
+                    else _link(target, match[0])
+                )
                 parts += [escape(text[end : match.start()]), made]
                 end = match.end()
         return Markup("").join([*parts, escape(text[end:])])
 
 
 def placed(text: str) -> Any:
-    """A place in the paper as markup: labels of equations become their numbers, and the rest is escaped."""
+    """A place in the paper as markup: labels of equations become their numbers, and the rest is
+    escaped.
+    """
     from markupsafe import Markup, escape
 
     parts = []

@@ -1,4 +1,6 @@
-"""The contents of the report, gathered from the parts of the paper, their records and their data, as values for templates."""
+"""The contents of the report, gathered from the parts of the paper, their records and their data,
+as values for templates.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ from saltus_paper.report.data_tables import DataTables, data_tables
 from saltus_paper.report.embedded_pictures import EmbeddedPicture, embedded
 from saltus_paper.report.exact_features import chart_features, diagram_features
 
-BEYOND = {"both_layers": "B", "chain": "C"}  # sections of subjects that the paper does not treat; each has a chapter of its own
+# sections of subjects that the paper does not treat; each has a chapter of its own
+BEYOND = {"both_layers": "B", "chain": "C"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +55,11 @@ class ReportPart:
         """Three lines of Python that make it."""
         name = self.figure.name
         what = "figure.compute(**figure.parameters)"
-        last = f'figure.draw({what}).savefig("{name}.png")' if self.figure.draw else f"print(figure.claims({what}))"
+        last = (
+            f'figure.draw({what}).savefig("{name}.png")'
+            if self.figure.draw
+            else f"print(figure.claims({what}))"
+        )
         if self.figure.table:
             last = f"print(figure.table({what}))"
         return f'from saltus_paper import FIGURES\nfigure = FIGURES["{name}"]\n{last}'
@@ -87,7 +94,8 @@ class ReportContent:
     errata: list[ErratumContent]
     diagrams: list[tuple[str, ...]] = field(default_factory=list)
     charts: list[tuple[str, ...]] = field(default_factory=list)
-    shares: dict[str, list[list[str]]] = field(default_factory=dict)  # tables of both layers by figure
+    # tables of both layers by figure
+    shares: dict[str, list[list[str]]] = field(default_factory=dict)
     portraits: list[tuple[str, int, int]] = field(default_factory=list)
 
     @property
@@ -101,7 +109,9 @@ class ReportContent:
         return [part for section in self.sections for part in section.parts]
 
 
-def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFigure, list[Claim]], folder: Path) -> ReportContent:
+def report_content(
+    all_figures: Iterable[PaperFigure], present: Mapping[PaperFigure, list[Claim]], folder: Path
+) -> ReportContent:
     """Gather what is in `folder` of these figures, each with its claims.
 
     Raises
@@ -111,9 +121,14 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
     """
     claims = with_summaries(claim for group in present.values() for claim in group)
     with ThreadPoolExecutor(available_cores()) as pool:  # packing a picture leaves Python's lock
-        drawn = {figure: pool.submit(embedded, folder / f"{figure.name}.png") for figure in present if figure.draw is not None}
+        drawn = {
+            figure: pool.submit(embedded, folder / f"{figure.name}.png")
+            for figure in present
+            if figure.draw is not None
+        }
         parts = [
-            _part(figure, here, folder, drawn[figure].result() if figure in drawn else None) for figure, here in present.items()
+            _part(figure, here, folder, drawn[figure].result() if figure in drawn else None)
+            for figure, here in present.items()
         ]
     shown = {claim.id for part in parts if part.figure.section for claim in part.claims}
     numbers = [*section_titles(), ""]
@@ -122,7 +137,9 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
             number=number,
             title=section_titles().get(number, "Statements without a figure"),
             parts=[part for part in parts if part.figure.section == number],
-            statements=[claim for claim in claims if claim.section == number and claim.id not in shown],
+            statements=[
+                claim for claim in claims if claim.section == number and claim.id not in shown
+            ],
         )
         for number in numbers
     ]
@@ -132,7 +149,11 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
         sections=[section for section in sections if section.parts or section.statements],
         missing=[figure.name for figure in all_figures if figure not in present],
         errata=[
-            ErratumContent(number=number, erratum=erratum, claims=[claim for claim in claims if claim.erratum == number])
+            ErratumContent(
+                number=number,
+                erratum=erratum,
+                claims=[claim for claim in claims if claim.erratum == number],
+            )
             for number, erratum in errata().items()
         ],
         diagrams=diagram_features(folder, titles),
@@ -141,10 +162,16 @@ def report_content(all_figures: Iterable[PaperFigure], present: Mapping[PaperFig
     )
 
 
-def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: EmbeddedPicture | None) -> ReportPart:
+def _part(
+    figure: PaperFigure, claims: list[Claim], folder: Path, picture: EmbeddedPicture | None
+) -> ReportPart:
     record = state.read(figure, folder) or {}
-    checksums, versions = record["files"], record["versions"]
-    links = [FileLink(name=n, size=_size(folder / n), checksum=str(checksums.get(n, ""))) for n in figure.files()]
+    checksums = record["files"]
+    versions = record["versions"]
+    links = [
+        FileLink(name=n, size=_size(folder / n), checksum=str(checksums.get(n, "")))
+        for n in figure.files()
+    ]
     return ReportPart(
         figure=figure,
         claims=claims,
@@ -155,7 +182,9 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: Embed
         draft=figure.effort != "standard",
         data=data_tables(folder / f"{figure.name}.nc"),
         picture=picture,
-        table=_markdown_rows((folder / f"{figure.name}.md").read_text(encoding="utf-8", errors="replace"))
+        table=_markdown_rows(
+            (folder / f"{figure.name}.md").read_text(encoding="utf-8", errors="replace")
+        )
         if figure.table is not None
         else [],
     )
@@ -164,7 +193,9 @@ def _part(figure: PaperFigure, claims: list[Claim], folder: Path, picture: Embed
 def _both_layers(folder: Path) -> dict[str, Any]:
     data: Any = saltus.load(folder / "both_layers.nc")
     return {
-        "shares": {f"Fig. {name[3:].lstrip('0')}": share_table(data[name]) for name in ("fig09", "fig11")},
+        "shares": {
+            f"Fig. {name[3:].lstrip('0')}": share_table(data[name]) for name in ("fig09", "fig11")
+        },
         "portraits": exact_portraits(data["portraits"]),
     }
 
@@ -175,7 +206,9 @@ def _size(path: Path) -> str:
 
 
 def _markdown_rows(text: str) -> list[list[str]]:
-    """The rows of a table that this package has written as Markdown, without the line below its headings."""
+    """The rows of a table that this package has written as Markdown, without the line below its
+    headings.
+    """
     lines = [line.strip().strip("|") for line in text.splitlines() if line.startswith("|")]
     rows = [[cell.strip() for cell in line.split("|")] for line in lines]
     return [row for row in rows if not all(set(cell) <= set(":-") for cell in row)]

@@ -1,4 +1,6 @@
-"""Section 3 and the reduction to one degree of freedom: the equations of motion (errata 14, 18, 21)."""
+"""Section 3 and the reduction to one degree of freedom: the equations of motion (errata 14, 18,
+21).
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ def _residuals(rng: np.random.Generator) -> dict[str, float]:
 
 
 def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any) -> float:
-    """`kin_eng` against the velocities of the masses of the drawn cell, by differences of their positions."""
+    """`kin_eng` against the velocities of the masses of the drawn cell, by differences of their
+    positions.
+    """
     cell = UnitCell(alpha0=0.3, beta0=model.beta0)
 
     def places(s: float) -> np.ndarray:
@@ -69,8 +73,11 @@ def _kinetic_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any
 
 
 def _virtual_work_residual(model: Any, load: Any, t: float, theta: Any) -> float:
-    """`ext_forces_beta` against the work of the forces on both masses of the drawn cell over small rotations."""
-    cell, worst = UnitCell(alpha0=0.3, beta0=model.beta0), 0.0
+    """`ext_forces_beta` against the work of the forces on both masses of the drawn cell over small
+    rotations.
+    """
+    cell = UnitCell(alpha0=0.3, beta0=model.beta0)
+    worst = 0.0
     upper = np.array([load.horizontal(t), load.vertical(t)])
     lower = np.array([load.lower_horizontal(t), load.lower_vertical(t)])
 
@@ -85,23 +92,37 @@ def _virtual_work_residual(model: Any, load: Any, t: float, theta: Any) -> float
 
 def _operators_residual(model: Any, theta: Any) -> float:
     """How far M is from symmetric, D from skew-symmetric, and C and K from diagonal."""
-    mass, twist = np.asarray(model.mass_matrix(theta)), np.asarray(model.velocity_matrix(theta))
-    diagonals = [np.asarray(matrix) for matrix in (model.damping_matrix(), model.stiffness_matrix())]
-    parts = [mass - mass.T, twist + twist.T, *(matrix - np.diag(np.diag(matrix)) for matrix in diagonals)]
+    mass = np.asarray(model.mass_matrix(theta))
+    twist = np.asarray(model.velocity_matrix(theta))
+    diagonals = [
+        np.asarray(matrix) for matrix in (model.damping_matrix(), model.stiffness_matrix())
+    ]
+    parts = [
+        mass - mass.T,
+        twist + twist.T,
+        *(matrix - np.diag(np.diag(matrix)) for matrix in diagonals),
+    ]
     return float(max(abs(part).max() for part in parts))
 
 
 def _excitation() -> dict[str, float]:
-    """The change of f0 and K0 over a period if one channel alone varies: the least of the six, for beta0 = 80 and 90."""
-    times, found = np.linspace(0, 2 * np.pi, 13), dict[str, float]()
+    """The change of f0 and K0 over a period if one channel alone varies: the least of the six, for
+    beta0 = 80 and 90.
+    """
+    times = np.linspace(0, 2 * np.pi, 13)
+    found = dict[str, float]()
     for degrees in (80, 90):
-        model, swings = TwoLayer(beta0=float(np.deg2rad(degrees)), mass_ratio=0.4), []
+        model = TwoLayer(beta0=float(np.deg2rad(degrees)), mass_ratio=0.4)
+        swings = []
         for name in Metainterface.channels:
             load = Load(frequency=1.0, **{name: Harmonic(amplitude=0.3)})
             force = np.array([model.load_vector(t, (0.0, 0.0), load) for t in times])
             stiffness = np.array([np.diag(model.linear_stiffness_matrix(t, load)) for t in times])
             swings.append([float(np.ptp(values, axis=0).max()) for values in (force, stiffness)])
-        found |= {f"external_{degrees}": min(s[0] for s in swings), f"parametric_{degrees}": min(s[1] for s in swings)}
+        found |= {
+            f"external_{degrees}": min(s[0] for s in swings),
+            f"parametric_{degrees}": min(s[1] for s in swings),
+        }
     still = Load(horizontal=0.3, vertical=-0.5)
     parts = [
         np.array([model.load_vector(t, (0.0, 0.0), still) for t in times]),
@@ -110,8 +131,12 @@ def _excitation() -> dict[str, float]:
     return found | {"excitation_still": float(max(np.ptp(part, axis=0).max() for part in parts))}
 
 
-def _lagrange_residual(model: Any, load: Any, t: float, theta: Any, velocity: Any, acceleration: Any) -> float:
-    """Euler-Lagrange from kin_eng, pot_eng_beta, Rayleigh and ext_forces_beta only, by differences, along the motion."""
+def _lagrange_residual(
+    model: Any, load: Any, t: float, theta: Any, velocity: Any, acceleration: Any
+) -> float:
+    """Euler-Lagrange from kin_eng, pot_eng_beta, Rayleigh and ext_forces_beta only, by differences,
+    along the motion.
+    """
     step = 1e-20j
 
     def slope(function: Any, point: tuple[float, float], j: int) -> float:
@@ -120,22 +145,36 @@ def _lagrange_residual(model: Any, load: Any, t: float, theta: Any, velocity: An
         return float(np.imag(function(tuple(shifted))) / step.imag)
 
     def momentum(j: int, s: float) -> float:
-        where = tuple(q + v * s + a * s * s / 2 for q, v, a in zip(theta, velocity, acceleration, strict=True))
+        where = tuple(
+            q + v * s + a * s * s / 2 for q, v, a in zip(theta, velocity, acceleration, strict=True)
+        )
         speed = tuple(v + a * s for v, a in zip(velocity, acceleration, strict=True))
         return slope(lambda v: model.kinetic_energy(t + s, where, v, 0, load), speed, j)
 
-    force, worst = model.generalised_forces(t, theta, load), 0.0
+    force = model.generalised_forces(t, theta, load)
+    worst = 0.0
     for j in (0, 1):
-        potential = slope(lambda q: model.kinetic_energy(t, q, velocity, 0, load) - model.potential_energy(q), theta, j)
-        balance = derivative(partial(momentum, j)) - potential + slope(model.dissipation, velocity, j)
+        potential = slope(
+            lambda q: model.kinetic_energy(t, q, velocity, 0, load) - model.potential_energy(q),
+            theta,
+            j,
+        )
+        balance = (
+            derivative(partial(momentum, j)) - potential + slope(model.dissipation, velocity, j)
+        )
         worst = max(worst, abs(balance - force[j]))
     return worst
 
 
 def _linear_residual(model: Any, load: Any) -> float:
-    """K theta - f against K0 theta - f0 to first order, and M0: derivatives at theta = 0 by complex steps."""
-    step, t, worst = 1e-20j, 0.2, 0.0
-    stiffness, exact = np.asarray(model.linear_stiffness_matrix(t, load)), np.asarray(model.stiffness_matrix())
+    """K theta - f against K0 theta - f0 to first order, and M0: derivatives at theta = 0 by complex
+    steps.
+    """
+    step = 1e-20j
+    t = 0.2
+    worst = 0.0
+    stiffness = np.asarray(model.linear_stiffness_matrix(t, load))
+    exact = np.asarray(model.stiffness_matrix())
     for j in (0, 1):
         point = tuple(step if i == j else 0.0 for i in (0, 1))
         slopes = exact[:, j] - np.imag(np.array(model.load_vector(t, point, load))) / step.imag
@@ -151,39 +190,60 @@ def _reduction_residual(single: Any, double: Any, load: Any, theta: Any, velocit
         speed = tuple(velocity[i] if i == j else 0.0 for i in (0, 1))
         moving = single.acceleration(0.2, theta[j], velocity[j], side, load)
         both = tuple(moving if i == j else 0.0 for i in (0, 1))
-        worst = max(worst, abs(float(double.constraint_reactions(0.2, where, speed, both, load)[j])))
+        worst = max(
+            worst, abs(float(double.constraint_reactions(0.2, where, speed, both, load)[j]))
+        )
     return worst
 
 
 def _equivalence(rng: np.random.Generator) -> dict[str, float]:
-    """Ground motion zetahat against a force +Omega^2 zetahat and -Omega^2 zetahat, symmetric, and with h = m."""
-    times, theta, omega, zeta = rng.uniform(0, 6, 40), float(rng.uniform(0.1, 1)), 1.3, 0.4
+    """Ground motion zetahat against a force +Omega^2 zetahat and -Omega^2 zetahat, symmetric, and
+    with h = m.
+    """
+    times = rng.uniform(0, 6, 40)
+    theta = float(rng.uniform(0.1, 1))
+    omega = 1.3
+    zeta = 0.4
     worst = {"force_printed": 0.0, "force_corrected": 0.0, "force_unequal": 0.0}
     ground = Load(frequency=omega, ground_horizontal=Harmonic(amplitude=zeta), vertical=-0.5)
 
     def gap(model: Any, **force: Any) -> float:
         other = Load(frequency=omega, vertical=-0.5, **force)
         return float(
-            max(abs(model.acceleration(t, theta, 0.1, 1, ground) - model.acceleration(t, theta, 0.1, 1, other)) for t in times)
+            max(
+                abs(
+                    model.acceleration(t, theta, 0.1, 1, ground)
+                    - model.acceleration(t, theta, 0.1, 1, other)
+                )
+                for t in times
+            )
         )
 
-    symmetric, unequal = Metainterface(beta0=1.4), Metainterface(beta0=1.4, mass_ratio=0.7)
+    symmetric = Metainterface(beta0=1.4)
+    unequal = Metainterface(beta0=1.4, mass_ratio=0.7)
     size = omega**2 * zeta
     worst["force_printed"] = gap(symmetric, horizontal=Harmonic(amplitude=-size))
     worst["force_corrected"] = max(
         gap(symmetric, horizontal=Harmonic(amplitude=size)),
-        gap(unequal, horizontal=Harmonic(amplitude=size), lower_horizontal=Harmonic(amplitude=0.7 * size)),
+        gap(
+            unequal,
+            horizontal=Harmonic(amplitude=size),
+            lower_horizontal=Harmonic(amplitude=0.7 * size),
+        ),
     )
     worst["force_unequal"] = gap(unequal, horizontal=Harmonic(amplitude=size))
     return worst
 
 
 def _symmetry(rng: np.random.Generator) -> dict[str, Any]:
-    """Whether reversing theta and the horizontal loads reverses the acceleration, symmetric and with k = c = 1+m = 1+h = 1+v."""
+    """Whether reversing theta and the horizontal loads reverses the acceleration, symmetric and
+    with k = c = 1+m = 1+h = 1+v.
+    """
 
     def gap(model: Any, ratio: float) -> float:
         def load(sign: int) -> Any:
-            force, push = Harmonic(amplitude=sign * 0.4), -0.5
+            force = Harmonic(amplitude=sign * 0.4)
+            push = -0.5
             return Load(
                 frequency=1.3,
                 horizontal=force,
@@ -194,37 +254,65 @@ def _symmetry(rng: np.random.Generator) -> dict[str, Any]:
             )
 
         states = rng.uniform(0.05, 1, (20, 3))
-        sums = [model.acceleration(t, q, v, 1, load(1)) + model.acceleration(t, -q, -v, -1, load(-1)) for t, q, v in states]
+        sums = [
+            model.acceleration(t, q, v, 1, load(1)) + model.acceleration(t, -q, -v, -1, load(-1))
+            for t, q, v in states
+        ]
         return float(max(map(abs, sums)))
 
     symmetric = gap(Metainterface(beta0=1.4, damping=0.1), 0.0)
-    scaled = gap(Metainterface(beta0=1.4, damping=0.1, stiffness_ratio=1.7, mass_ratio=0.7, dissipation_ratio=1.7), 0.7)
+    scaled = gap(
+        Metainterface(
+            beta0=1.4, damping=0.1, stiffness_ratio=1.7, mass_ratio=0.7, dissipation_ratio=1.7
+        ),
+        0.7,
+    )
     unequal = gap(Metainterface(beta0=1.4, damping=0.1, stiffness_ratio=1.7), 0.0)
     upright = Metainterface(beta0=np.pi / 2, damping=0.1)
-    return {"symmetry": symmetric, "symmetry_scaled": scaled, "symmetry_unequal": unequal, "pendulum": _pendulum(upright, rng)}
+    return {
+        "symmetry": symmetric,
+        "symmetry_scaled": scaled,
+        "symmetry_unequal": unequal,
+        "pendulum": _pendulum(upright, rng),
+    }
 
 
 def _pendulum(model: Any, rng: np.random.Generator) -> float:
-    load = Load(frequency=1.3, horizontal=Harmonic(amplitude=0.4), vertical=-0.5, ground_horizontal=Harmonic(amplitude=0.1))
+    load = Load(
+        frequency=1.3,
+        horizontal=Harmonic(amplitude=0.4),
+        vertical=-0.5,
+        ground_horizontal=Harmonic(amplitude=0.1),
+    )
     system = System(model=model, load=load)
     return max(
-        abs(float(pendulum_acceleration(system, t, s * q, v)) - float(model.acceleration(t, s * q, v, s, load)))
+        abs(
+            float(pendulum_acceleration(system, t, s * q, v))
+            - float(model.acceleration(t, s * q, v, s, load))
+        )
         for t, q, v in rng.uniform(0.05, 1, (20, 3))
         for s in (1, -1)
     )
 
 
 def _closed_layer() -> dict[str, float]:
-    """The speed just after a crossing above which the closed layer's reaction has the wrong sign, beta0 = 80 deg, V = -0.5."""
+    """The speed just after a crossing above which the closed layer's reaction has the wrong sign,
+    beta0 = 80 deg, V = -0.5.
+    """
     from scipy.optimize import brentq
 
-    model, load = Metainterface(beta0=np.deg2rad(80.0)), Load(vertical=-0.5)
+    model = Metainterface(beta0=np.deg2rad(80.0))
+    load = Load(vertical=-0.5)
 
     def reaction(speed: float) -> float:
         acceleration = model.acceleration(0.0, 0.0, speed, 1, load)
         return float(model.margins(0.0, 0.0, speed, acceleration, 1, load)["reaction"])
 
-    return {"reaction_onset": float(brentq(reaction, 0.01, 5.0)), "reaction_slow": reaction(0.3), "reaction_fast": reaction(1.5)}
+    return {
+        "reaction_onset": float(brentq(reaction, 0.01, 5.0)),
+        "reaction_slow": reaction(0.3),
+        "reaction_fast": reaction(1.5),
+    }
 
 
 def measure(data: Any) -> dict[str, Measured]:
@@ -236,10 +324,14 @@ def measure(data: Any) -> dict[str, Measured]:
         "virtual-work": measured(r["virtual_work"]),
         "operators": measured(r["operators"]),
         "linearised": measured(r["linear"]),
-        "external-parametric": measured(r["external_80"] > 0.01 and r["parametric_80"] > 0.01 and r["excitation_still"] == 0.0),
+        "external-parametric": measured(
+            r["external_80"] > 0.01 and r["parametric_80"] > 0.01 and r["excitation_still"] == 0.0
+        ),
         "asymmetry": measured(r["symmetry_unequal"] > 1e-3),
         "reduction": measured(r["reduction"]),
-        "one-open-layer": measured(r["reaction_fast"] >= 0, r["reaction_slow"] > 0 > r["reaction_fast"]),
+        "one-open-layer": measured(
+            r["reaction_fast"] >= 0, r["reaction_slow"] > 0 > r["reaction_fast"]
+        ),
         "symmetry": measured(r["symmetry"]),
         "symmetry-general": measured(r["symmetry_scaled"] > 1e-9, r["symmetry_scaled"] < 1e-12),
         "pendulum": measured(r["pendulum"]),

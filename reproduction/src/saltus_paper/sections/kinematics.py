@@ -1,4 +1,6 @@
-"""Section 2: geometry, kinematics and dimensionless numbers of the unit cell (errata 1, 2, 3, 13, 19, 20)."""
+"""Section 2: geometry, kinematics and dimensionless numbers of the unit cell (errata 1, 2, 3, 13,
+19, 20).
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,12 @@ def _cell(alpha0: float, beta0: float) -> dict[str, float]:
         "psi_misread": abs(misread / (2 * cell.lambda_) + cell.chi - math.cos(alpha0)),
         "theta_1_drop": float((cell.beta_of_phi(phi) - beta0).max()),
         "theta_1_corrected": float(abs(cell.theta(phi, layer=1) - theta).max()),
-        "configalpha_printed": float(abs(_cos_alpha(cell, beta0 - theta, chi_printed) - exact).max()),
-        "configalpha_corrected": float(abs(_cos_alpha(cell, beta0 + theta, cell.chi) - exact).max()),
+        "configalpha_printed": float(
+            abs(_cos_alpha(cell, beta0 - theta, chi_printed) - exact).max()
+        ),
+        "configalpha_corrected": float(
+            abs(_cos_alpha(cell, beta0 + theta, cell.chi) - exact).max()
+        ),
         "closed_side": float(max(beta0 - cell.beta_of_phi(sign * phi).min() for sign in (1, -1))),
         **_drawn(cell, theta[::10]),
     }
@@ -51,33 +57,58 @@ def _cos_alpha(cell: Any, angle: np.ndarray, chi: float) -> np.ndarray:
 
 
 def _drawn(cell: Any, openings: np.ndarray) -> dict[str, float]:
-    """The constructed positions: lengths of the bars, angles alpha_j, displacements xi_j and heights eta_j."""
-    lengths, angles, places, turns = 0.0, 0.0, 0.0, 0.0
+    """The constructed positions: lengths of the bars, angles alpha_j, displacements xi_j and
+    heights eta_j.
+    """
+    lengths = 0.0
+    angles = 0.0
+    places = 0.0
+    turns = 0.0
     for one, two in zip(openings, -openings[::-1], strict=True):
         layout = cell.layout(float(one), float(two))
         bars = [np.diff(layout.segment(pair), axis=0)[0] for pair in layout.bars]
         wanted = [cell.base, 1, 1, cell.base, 1, 1, cell.base, *[cell.lambda_] * 4]
-        lengths = max(lengths, *(abs(float(np.hypot(*bar)) - length) for bar, length in zip(bars, wanted, strict=True)))
+        lengths = max(
+            lengths,
+            *(
+                abs(float(np.hypot(*bar)) - length)
+                for bar, length in zip(bars, wanted, strict=True)
+            ),
+        )
         turns = max(turns, *(abs(math.atan2(bar[1], bar[0])) for bar in (bars[3], bars[6])))
         run = layout.points["middle_right"] - layout.points["lower_left"]
         angles = max(angles, abs(math.atan2(run[1], run[0]) - float(cell.alpha(one))))
         offset = math.sin(cell.alpha0 - cell.beta0) / (2 * math.sin(cell.alpha0))
         step = layout.points["mass_2"] - layout.points["mass_1"]
-        found = (layout.points["mass_1"][0] + offset, layout.points["mass_1"][1], step[0] - math.cos(cell.beta0), step[1])
+        found = (
+            layout.points["mass_1"][0] + offset,
+            layout.points["mass_1"][1],
+            step[0] - math.cos(cell.beta0),
+            step[1],
+        )
         stated = (cell.xi(one), cell.eta(one), cell.xi(two), cell.eta(two))
         places = max(places, *(abs(a - b) for a, b in zip(found, stated, strict=True)))
-    return {"bar_lengths": lengths, "alpha_drawn": angles, "places": places, "top_edges_turn": turns}
+    return {
+        "bar_lengths": lengths,
+        "alpha_drawn": angles,
+        "places": places,
+        "top_edges_turn": turns,
+    }
 
 
 def _closing_cells(count: int = 40) -> int:
-    """For how many pairs of angles in (0, pi) `restangle` disagrees with the existence of a triangle with positive edges.
+    """For how many pairs of angles in (0, pi) `restangle` disagrees with the existence of a
+    triangle with positive edges.
 
-    The base, the inclined bar of length 1 and the diagonal meet where two rays from the base's ends, at alpha0 and beta0, cross.
+    The base, the inclined bar of length 1 and the diagonal meet where two rays from the base's
+    ends, at alpha0 and beta0, cross.
     """
     wrong = 0
     for alpha0 in np.linspace(0.05, 3.1, count):
         for beta0 in np.linspace(0.05, 3.1, count):
-            rays = np.array([[math.cos(alpha0), math.cos(beta0)], [math.sin(alpha0), -math.sin(beta0)]])
+            rays = np.array(
+                [[math.cos(alpha0), math.cos(beta0)], [math.sin(alpha0), -math.sin(beta0)]]
+            )
             diagonal, bar = np.linalg.solve(rays, [1.0, 0.0])
             wrong += bool(diagonal > 0 and bar > 0) != (alpha0 + beta0 < math.pi)
     return wrong
@@ -92,7 +123,9 @@ def _limits() -> dict[str, float]:
         "height_on_line": float(cell.eta(cell.line_limit)),
         "kinematic_limit": math.degrees(cell.kinematic_limit),
         "phi_at_limit": float(cell.phi(cell.kinematic_limit)),
-        "cosine_needed_beyond": float(math.cos(cell.beta0) - np.cos(cell.beta0 + cell.kinematic_limit + 0.01)),
+        "cosine_needed_beyond": float(
+            math.cos(cell.beta0) - np.cos(cell.beta0 + cell.kinematic_limit + 0.01)
+        ),
         "largest_displacement": float(np.max(cell.xi(theta))),
         "bound": cell.max_displacement,
         "second_line": math.degrees(2 * math.pi - cell.beta0),
@@ -100,12 +133,15 @@ def _limits() -> dict[str, float]:
 
 
 def _dimensions() -> dict[str, float]:
-    """One cell written in seconds and in milliseconds: a number that changes has a dimension, as t sqrt(M2 / K2), unlike tau."""
+    """One cell written in seconds and in milliseconds: a number that changes has a dimension, as t
+    sqrt(M2 / K2), unlike tau.
+    """
     seconds = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0, upper_damping=0.07)
     millis = PhysicalCell(length=0.2, upper_mass=1.5, upper_stiffness=3.0e-6, upper_damping=0.07e-3)
     inertia = seconds.upper_mass * seconds.length**2
     return {
-        "damping_printed_ratio": (millis.upper_damping / inertia) / (seconds.upper_damping / inertia),
+        "damping_printed_ratio": (millis.upper_damping / inertia)
+        / (seconds.upper_damping / inertia),
         "damping_ratio": millis.ratios["damping"] / seconds.ratios["damping"],
         "tau_printed": math.sqrt(seconds.upper_mass / seconds.upper_stiffness) * 1.0,
         "tau_corrected": 1.0 / seconds.units["time"],
@@ -128,10 +164,14 @@ def measure(data: Any) -> dict[str, Measured]:
         "line-limit": measured(r["line_limit"]),
         "kinematic-limit": measured(
             r["second_line"] <= r["kinematic_limit"],
-            r["second_line"] > r["kinematic_limit"] and abs(r["phi_at_limit"]) < 1e-6 and r["cosine_needed_beyond"] < 0,
+            r["second_line"] > r["kinematic_limit"]
+            and abs(r["phi_at_limit"]) < 1e-6
+            and r["cosine_needed_beyond"] < 0,
         ),
         "max-displacement": measured(max(0.0, r["largest_displacement"] - r["bound"])),
         "damping-dimension": measured(r["damping_printed_ratio"] - 1, r["damping_ratio"] - 1),
-        "time-scale": measured(r["tau_printed"] - r["tau_of_frequency"], r["tau_corrected"] - r["tau_of_frequency"]),
+        "time-scale": measured(
+            r["tau_printed"] - r["tau_of_frequency"], r["tau_corrected"] - r["tau_of_frequency"]
+        ),
     }
     return with_fields(r | {"cells": len(UNIT_CELLS)}, found)

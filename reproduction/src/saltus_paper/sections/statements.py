@@ -8,7 +8,14 @@ from typing import Any
 from saltus_paper.claims.claim import Measured
 from saltus_paper.figure_data import tree
 from saltus_paper.figures.figure import paper_figure
-from saltus_paper.sections import equations_of_motion, impacts, kinematics, large_amplitude, misalignment, small_vibrations
+from saltus_paper.sections import (
+    equations_of_motion,
+    impacts,
+    kinematics,
+    large_amplitude,
+    misalignment,
+    small_vibrations,
+)
 
 SECTIONS: dict[str, ModuleType] = {
     "kinematics": kinematics,
@@ -28,7 +35,11 @@ def compute() -> Any:
 
 def measure(data: Any) -> dict[str, Measured]:
     """What every section measured."""
-    return {id: one for name, section in SECTIONS.items() for id, one in section.measure(data[name]).items()}
+    return {
+        id: one
+        for name, section in SECTIONS.items()
+        for id, one in section.measure(data[name]).items()
+    }
 
 
 FIGURE = paper_figure("claims", compute=compute, measure=measure)

@@ -1,4 +1,6 @@
-"""The attractors on which the motions from given states end, and the blocks of cells of a basin picture that are computed so."""
+"""The attractors on which the motions from given states end, and the blocks of cells of a basin
+picture that are computed so.
+"""
 
 from __future__ import annotations
 
@@ -26,9 +28,11 @@ if TYPE_CHECKING:
 class LabellingSettings:
     """How motions are followed until their label is known."""
 
-    # Number of forcing periods of the first stage; after each stage settled motions are labelled. Later stages are longer.
+    # Number of forcing periods of the first stage; after each stage settled motions are labelled.
+    # Later stages are longer.
     stage: int = 48
-    # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for arrays computed from them.
+    # The largest number of stroboscopic states that are kept at once: 67 MB, and as much again for
+    # arrays computed from them.
     most_states: int = 1 << 22
     fewest: int = 256  # The least number of motions that are followed together.
 
@@ -47,12 +51,14 @@ class Labelling:
     tol: float
 
     def of(self, states: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
-        """The labels of states (n, d), UNDECIDED where no label is certain, and the times to reach the attractors, (n,) each.
+        """The labels of states (n, d), UNDECIDED where no label is certain, and the times to reach
+        the attractors, (n,) each.
 
         A state at a contact that moves into it is taken just before the impact.
         """
         states = before_impacts(self.system, states)
-        label, time = np.empty(len(states), dtype=np.int16), np.empty(len(states))
+        label = np.empty(len(states), dtype=np.int16)
+        time = np.empty(len(states))
         size = max(SETTINGS.fewest, SETTINGS.most_states // self.periods)
         for start in range(0, len(states), size):
             part = slice(start, start + size)
@@ -61,12 +67,19 @@ class Labelling:
         return label, time
 
     def _together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Labels and times of states that fit into memory together, in stages: settled motions are not followed further."""
-        label, time = np.full(len(states), UNDECIDED, dtype=np.int16), np.full(len(states), np.nan)
-        rows, history, done = np.arange(len(states)), states[:, None], 0
+        """Labels and times of states that fit into memory together, in stages: settled motions are
+        not followed further.
+        """
+        label = np.full(len(states), UNDECIDED, dtype=np.int16)
+        time = np.full(len(states), np.nan)
+        rows = np.arange(len(states))
+        history = states[:, None]
+        done = 0
         while rows.size and done < self.periods:
             span = min(max(SETTINGS.stage, done // 2), self.periods - done)
-            ends = find_recurrence(self.system, history[:, -1], span, tol=self.tol).after(done, history)
+            ends = find_recurrence(self.system, history[:, -1], span, tol=self.tol).after(
+                done, history
+            )
             done += span
             label[rows] = self._labels(ends, at_the_end=done == self.periods)
             time[rows] = self._times(label[rows], ends)
@@ -75,7 +88,9 @@ class Labelling:
         return label, time
 
     def _labels(self, ends: Recurrence, at_the_end: bool) -> np.ndarray:
-        """The labels of motions; unsettled motions are compared with the sampled sets at the end only."""
+        """The labels of motions; unsettled motions are compared with the sampled sets at the end
+        only.
+        """
         label = np.full(len(ends), UNDECIDED, dtype=np.int16)
         for target in self.targets:
             if target.kind is Ending.REST:
@@ -90,14 +105,24 @@ class Labelling:
         return label
 
     def _rests(self, target: Target, ends: Recurrence) -> np.ndarray:
-        """Which motions are at rest for good in the state of an attractor, (n,); a model with one contact has one such state."""
-        here = target.distance(ends.last) < SAME_STATE * max(1.0, float(np.abs(target.states).max()))
-        return np.asarray(here & (ends.rest | (ends.period == 1)) if self.system.model.holds_coordinates else ends.rest)
+        """Which motions are at rest for good in the state of an attractor, (n,); a model with one
+        contact has one such state.
+        """
+        here = target.distance(ends.last) < SAME_STATE * max(
+            1.0, float(np.abs(target.states).max())
+        )
+        return np.asarray(
+            here & (ends.rest | (ends.period == 1))
+            if self.system.model.holds_coordinates
+            else ends.rest
+        )
 
     def _times(self, label: np.ndarray, ends: Recurrence) -> np.ndarray:
-        """The forcing periods after which each motion stays near its attractor for as long as it is followed; nan if undecided.
+        """The forcing periods after which each motion stays near its attractor for as long as it is
+        followed; nan if undecided.
 
-        `ends.states` begins with the initial states; it has nan for periods that a motion did not need.
+        `ends.states` begins with the initial states; it has nan for periods that a motion did not
+        need.
         """
         time = np.full(len(label), np.nan)
         for target in self.targets:
@@ -114,13 +139,17 @@ class Labelling:
 
 
 def _on_orbit(target: Target, ends: Recurrence) -> np.ndarray:
-    """Which motions have settled on an orbit, or were near it during its last two periods and nearer in the second, (n,)."""
-    last, q = ends.states[:, -1], len(target.states)
+    """Which motions have settled on an orbit, or were near it during its last two periods and
+    nearer in the second, (n,).
+    """
+    last = ends.states[:, -1]
+    q = len(target.states)
     near = SAME_STATE * np.maximum(1.0, np.abs(last).max(axis=1))
     here: np.ndarray = (target.distance(last) < near) & (ends.periodic | ends.unsettled)
     rows = np.flatnonzero(here & ends.unsettled)
     rounds = target.distance(ends.states[rows, -2 * q :])
-    before, after = rounds[:, :q].max(axis=1), rounds[:, q:].max(axis=1)
+    before = rounds[:, :q].max(axis=1)
+    after = rounds[:, q:].max(axis=1)
     here[rows] = (before < near[rows]) & (after < before) & (rounds.shape[1] == 2 * q)
     return here
 
@@ -135,7 +164,8 @@ class Grid:
     plane: tuple[str, str]  # the variables along the horizontal and the vertical axis
     horizontal: np.ndarray  # (columns,)
     vertical: np.ndarray  # (rows,)
-    fixed: dict[str, float]  # all state variables in their order; the values of the two in the plane are not used
+    # all state variables in their order; the values of the two in the plane are not used
+    fixed: dict[str, float]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -172,19 +202,27 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     Raises
     ------
     ParameterError
-        Arguments of a system with other equations than it has here, or of another version of saltus.
+        Arguments of a system with other equations than it has here, or of another version of
+        saltus.
     """
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
     targets = tuple(Target.from_dict(item) for item in arguments["attractors"])
     x, y = arguments["plane"]
-    grid = Grid((x, y), np.asarray(block[x], dtype=float), np.asarray(block[y], dtype=float), arguments["fixed"])
+    grid = Grid(
+        (x, y),
+        np.asarray(block[x], dtype=float),
+        np.asarray(block[y], dtype=float),
+        arguments["fixed"],
+    )
     numbers = int(arguments["periods"]), float(arguments["within"]), float(arguments["tol"])
     label, time = _label_grid(Labelling(with_clock(system), targets, *numbers), grid)
     return {"label": label, "time": time}
 
 
-def _label_grid(labelling: Labelling, grid: Grid, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
+def _label_grid(
+    labelling: Labelling, grid: Grid, progress: Progress = silent
+) -> tuple[np.ndarray, np.ndarray]:
     """Labels and times over the grid, (rows, columns) each."""
     label, time = labelling.of(grid.states.reshape(-1, labelling.system.dimension), progress)
     return label.reshape(grid.shape), time.reshape(grid.shape)
@@ -193,7 +231,8 @@ def _label_grid(labelling: Labelling, grid: Grid, progress: Progress = silent) -
 def computed_cells(
     system: System, labelling: Labelling, grid: Grid, rows: int, progress: Progress, **where: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and times over the grid, by a sweep in chunks of `rows` of the grid if `where` has a store, workers or a scheduler.
+    """Labels and times over the grid, by a sweep in chunks of `rows` of the grid if `where` has a
+    store, workers or a scheduler.
 
     Parameters
     ----------
@@ -223,14 +262,23 @@ def cell_arguments(system: System, labelling: Labelling, grid: Grid) -> dict[str
     targets = [target.to_dict() for target in labelling.targets]
     numbers = {"periods": labelling.periods, "within": labelling.within, "tol": labelling.tol}
     place = {"plane": list(grid.plane), "fixed": grid.fixed}
-    return {"system": system.to_dict(), "attractors": targets, **place, **numbers, **identity(system)}
+    return {
+        "system": system.to_dict(),
+        "attractors": targets,
+        **place,
+        **numbers,
+        **identity(system),
+    }
 
 
 def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
     from saltus.sweep import Plan, Variable
 
     variables = {
-        "label": Variable(dtype="i2", attrs={"units": "1", "long_name": "known attractor on which the motion ends, else -1"}),
+        "label": Variable(
+            dtype="i2",
+            attrs={"units": "1", "long_name": "known attractor on which the motion ends, else -1"},
+        ),
         "time": Variable(dtype="f8", attrs={"long_name": "forcing periods to reach it"}),
     }
     return Plan(
@@ -244,13 +292,23 @@ def _plan(system: System, labelling: Labelling, grid: Grid, rows: int) -> Plan:
 
 
 def check_basin_store(path: Path, system: System) -> None:
-    """Refuse a store that is not one of the basins of this system, before attractors are looked for."""
+    """Refuse a store that is not one of the basins of this system, before attractors are looked
+    for.
+    """
     from saltus.sweep import BEGIN_ANEW, read_plan
 
     try:
         kept = read_plan(path)
     except ParameterError as error:
         raise ParameterError(str(error), "store") from None
-    if kept["function"] != FUNCTION or kept["arguments"]["system"] != json.loads(json.dumps(system.to_dict())):
-        raise ParameterError(f"{path} is the store of another sweep, or of the basins of another system; {BEGIN_ANEW}", "store")
+    if kept["function"] != FUNCTION or kept["arguments"]["system"] != json.loads(
+        json.dumps(system.to_dict())
+    ):
+        raise ParameterError(
+            (
+                f"{path} is the store of another sweep, or of the basins of another system; "
+                f"{BEGIN_ANEW}"
+            ),
+            "store",
+        )
     check_provenance(kept["attrs"], system, str(path), BEGIN_ANEW)

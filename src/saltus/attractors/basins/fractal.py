@@ -1,4 +1,5 @@
-"""Measures of a grid of labels for fractal basin boundaries: basin entropy, uncertainty exponent, Wada property.
+"""Measures of a grid of labels for fractal basin boundaries: basin entropy, uncertainty exponent,
+Wada property.
 
 None of them sees structure that is finer than a cell of the grid.
 """
@@ -27,8 +28,10 @@ class FractalSettings:
     """The numbers by which a grid of labels is judged."""
 
     radius: int = 5  # Within this number of cells, a cell of a Wada boundary must meet all labels.
-    most_uncertain: float = 0.5  # Larger shares of uncertain cells are not fitted: strips along the boundary overlap then.
-    agrees: float = 0.9  # Basins have the Wada property if at least this share of the boundary cells meets all labels.
+    # Larger shares of uncertain cells are not fitted: strips along the boundary overlap then.
+    most_uncertain: float = 0.5
+    # Basins have the Wada property if at least this share of the boundary cells meets all labels.
+    agrees: float = 0.9
     fails: float = 0.5  # They do not have it if at most this share does.
 
 
@@ -67,16 +70,20 @@ class BasinEntropy:
 
     @property
     def fractal(self) -> bool:
-        """Whether S_bb > ln 2, which shows that the boundary is fractal; S_bb of a fractal boundary may also be smaller."""
+        """Whether S_bb > ln 2, which shows that the boundary is fractal; S_bb of a fractal boundary
+        may also be smaller.
+        """
         return self.boundary > math.log(2.0)
 
 
 @answered
 def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
-    """The basin entropy of a grid of labels, in one or two dimensions, in boxes of `box` cells a side.
+    """The basin entropy of a grid of labels, in one or two dimensions, in boxes of `box` cells a
+    side.
 
-    Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The criterion S_bb > ln 2 is for
-    boundaries that separate two labels almost everywhere, so that few boxes hold three.
+    Incomplete boxes at the far edges, and boxes with an undecided cell (-1), are left out. The
+    criterion S_bb > ln 2 is for boundaries that separate two labels almost everywhere, so that few
+    boxes hold three.
 
     Parameters
     ----------
@@ -99,32 +106,43 @@ def basin_entropy(labels: Numbers, box: int = 5) -> BasinEntropy:
     grid = _labels(labels)
     check_count("box", box, 2)
     if min(grid.shape) < box:
-        raise ParameterError(f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box", "box")
+        raise ParameterError(
+            f"a grid of {grid.shape} cells has no box of {box}; take a finer grid or a smaller box",
+            "box",
+        )
     cut = grid[tuple(slice(0, n - n % box) for n in grid.shape)]
     boxes = _boxes(cut, box)
     boxes = boxes[(boxes != UNDECIDED).all(axis=1)]
-    entropy, mixed = np.zeros(len(boxes)), np.zeros(len(boxes), dtype=int)
+    entropy = np.zeros(len(boxes))
+    mixed = np.zeros(len(boxes), dtype=int)
     for label in np.unique(boxes):
         share = (boxes == label).mean(axis=1)
         entropy -= share * np.log(np.where(share > 0.0, share, 1.0))
         mixed += share > 0.0
     edge = mixed > 1
     mean = float(entropy.mean()) if len(boxes) else math.nan
-    return BasinEntropy(mean, float(entropy[edge].mean()) if edge.any() else math.nan, len(boxes), int(edge.sum()), int(box))
+    return BasinEntropy(
+        mean,
+        float(entropy[edge].mean()) if edge.any() else math.nan,
+        len(boxes),
+        int(edge.sum()),
+        int(box),
+    )
 
 
 def _boxes(grid: np.ndarray, box: int) -> np.ndarray:
     """The cells of each box in a row."""
     if grid.ndim == 1:
         return grid.reshape(-1, box)
-    rows, columns = grid.shape[0] // box, grid.shape[1] // box
+    rows = grid.shape[0] // box
+    columns = grid.shape[1] // box
     return grid.reshape(rows, box, columns, box).swapaxes(1, 2).reshape(-1, box * box)
 
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyExponent(Result):
-    """The exponent alpha in f(eps) ~ eps^alpha, f the share of states with a different end within a distance eps of them
-    (Grebogi et al., Phys. Lett. A 99 (1983) 415).
+    """The exponent alpha in f(eps) ~ eps^alpha, f the share of states with a different end within a
+    distance eps of them (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
     Attributes
     ----------
@@ -159,18 +177,34 @@ class UncertaintyExponent(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """`share` over `distance`, with `alpha`, its `error` and the `dimension` as attributes."""
-        columns = {"share": ("distance", self.shares, "1", "states with a different end within the distance")}
-        facts: dict[str, Any] = {"alpha": self.alpha, "error": self.error, "dimension": self.dimension}
-        return result_dataset("uncertainty_exponent", columns, {"distance": self.distances}, **facts)
+        columns = {
+            "share": (
+                "distance",
+                self.shares,
+                "1",
+                "states with a different end within the distance",
+            )
+        }
+        facts: dict[str, Any] = {
+            "alpha": self.alpha,
+            "error": self.error,
+            "dimension": self.dimension,
+        }
+        return result_dataset(
+            "uncertainty_exponent", columns, {"distance": self.distances}, **facts
+        )
 
 
 @answered
-def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None) -> UncertaintyExponent:
+def uncertainty_exponent(
+    labels: Numbers, distances: Iterable[int] | None = None
+) -> UncertaintyExponent:
     """The uncertainty exponent of a grid of labels, in one or two dimensions.
 
-    A cell is uncertain at eps if a cell with another label lies within eps cells of it along each axis; undecided cells do not
-    count. Cells nearer to the edge of the grid than the largest eps are left out. The slope of ln f over ln eps is fitted, with
-    its standard error, over the distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below 0.5, or over all if
+    A cell is uncertain at eps if a cell with another label lies within eps cells of it along each
+    axis; undecided cells do not count. Cells nearer to the edge of the grid than the largest eps
+    are left out. The slope of ln f over ln eps is fitted, with its standard error, over the
+    distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below 0.5, or over all if
     fewer than three of them are.
 
     Parameters
@@ -197,11 +231,14 @@ def uncertainty_exponent(labels: Numbers, distances: Iterable[int] | None = None
     reach = _distances(grid, distances)
     inner = tuple(slice(int(reach[-1]), n - int(reach[-1])) for n in grid.shape)
     known = grid != UNDECIDED
-    high, low = np.where(known, grid, grid.min()), np.where(known, grid, grid.max() + 1)
+    high = np.where(known, grid, grid.min())
+    low = np.where(known, grid, grid.max() + 1)
     high = np.where(known, high, UNDECIDED)
     shares = np.array(
         [
-            ((maximum_filter(high, 2 * int(k) + 1) > minimum_filter(low, 2 * int(k) + 1)) & known)[inner].sum()
+            ((maximum_filter(high, 2 * int(k) + 1) > minimum_filter(low, 2 * int(k) + 1)) & known)[
+                inner
+            ].sum()
             / max(int(known[inner].sum()), 1)
             for k in reach
         ]
@@ -214,7 +251,12 @@ def _distances(grid: np.ndarray, given: Iterable[int] | None) -> np.ndarray:
     largest = min(grid.shape) // 16
     steps = [k for p in range(20) for k in (2**p, 3 * 2 ** (p - 1)) if k == int(k) and k <= largest]
     reach = np.unique(np.array(steps if given is None else list(given), dtype=float))
-    if len(reach) < 3 or not np.equal(reach, np.round(reach)).all() or reach[0] < 1 or 4 * reach[-1] > min(grid.shape):
+    if (
+        len(reach) < 3
+        or not np.equal(reach, np.round(reach)).all()
+        or reach[0] < 1
+        or 4 * reach[-1] > min(grid.shape)
+    ):
         raise ParameterError(
             f"the exponent needs at least three distances, whole numbers of cells up to a quarter of the grid {grid.shape}; "
             f"got {reach.tolist()}: take a finer grid, 64 cells a side or more",
@@ -230,7 +272,8 @@ def _slope(reach: np.ndarray, shares: np.ndarray) -> tuple[float, float]:
         used = shares > 0.0
     if used.sum() < 3:
         return math.nan, math.nan
-    x, y = np.log(reach[used]), np.log(shares[used])
+    x = np.log(reach[used])
+    y = np.log(shares[used])
     x = x - x.mean()
     slope = float(x @ y / (x @ x))
     residual = y - y.mean() - slope * x
@@ -247,7 +290,8 @@ class WadaVerdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Wada(Result):
-    """The share of a boundary that lies near all basins (after Daza et al., Sci. Rep. 5 (2015) 16579).
+    """The share of a boundary that lies near all basins (after Daza et al., Sci. Rep. 5 (2015)
+    16579).
 
     Attributes
     ----------
@@ -274,7 +318,9 @@ class Wada(Result):
 
     @property
     def verdict(self) -> WadaVerdict:
-        """The verdict by the share at the largest radius; fewer than three basins do not have the Wada property."""
+        """The verdict by the share at the largest radius; fewer than three basins do not have the
+        Wada property.
+        """
         share = self.shares[-1] if len(self.shares) else 0.0
         if len(self.labels) < 3 or share <= FRACTAL.fails:
             return WadaVerdict.NOT_WADA
@@ -282,9 +328,27 @@ class Wada(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """`share` over `radius`, with the verdict as an attribute."""
-        columns = {"share": ("radius", self.shares, "1", "boundary cells that have all labels within the radius")}
-        facts: dict[str, Any] = {"labels": list(self.labels), "verdict": str(self.verdict), "boundary_cells": self.boundary_cells}
-        return result_dataset("wada", columns, {"radius": self.radii}, **facts, agrees=FRACTAL.agrees, fails=FRACTAL.fails)
+        columns = {
+            "share": (
+                "radius",
+                self.shares,
+                "1",
+                "boundary cells that have all labels within the radius",
+            )
+        }
+        facts: dict[str, Any] = {
+            "labels": list(self.labels),
+            "verdict": str(self.verdict),
+            "boundary_cells": self.boundary_cells,
+        }
+        return result_dataset(
+            "wada",
+            columns,
+            {"radius": self.radii},
+            **facts,
+            agrees=FRACTAL.agrees,
+            fails=FRACTAL.fails,
+        )
 
     @property
     def resolution(self) -> str:
@@ -297,11 +361,13 @@ class Wada(Result):
 
 @answered
 def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
-    """Whether every point on the boundary of one basin is on the boundaries of all basins, as far as a grid of labels shows it.
+    """Whether every point on the boundary of one basin is on the boundaries of all basins, as far
+    as a grid of labels shows it.
 
-    Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each of them a neighbourhood grows,
-    up to `radius` cells, until it contains all labels. If the basins have the Wada property, nearly all neighbourhoods do in the
-    end; if three basins meet at single points only, nearly none does. Undecided cells (-1) count as no label.
+    Boundary cells have a neighbour, along an axis or diagonally, with another label. Around each of
+    them a neighbourhood grows, up to `radius` cells, until it contains all labels. If the basins
+    have the Wada property, nearly all neighbourhoods do in the end; if three basins meet at single
+    points only, nearly none does. Undecided cells (-1) count as no label.
 
     Parameters
     ----------
@@ -331,7 +397,9 @@ def wada(labels: Numbers, radius: int = FRACTAL.radius) -> Wada:
         return Wada(tuple(known), radii, np.zeros(len(radii)), 0)
     low = np.where(grid == UNDECIDED, grid.max() + 1, grid)
     boundary = (maximum_filter(grid, 3) > minimum_filter(low, 3)) & (grid != UNDECIDED)
-    farthest = np.max([distance_transform_cdt(grid != label, "chessboard")[boundary] for label in known], axis=0)
+    farthest = np.max(
+        [distance_transform_cdt(grid != label, "chessboard")[boundary] for label in known], axis=0
+    )
     shares = np.array([(farthest <= r).mean() for r in radii])
     return Wada(tuple(known), radii, shares, int(boundary.sum()))
 
@@ -343,9 +411,11 @@ def _labels(labels: Any) -> np.ndarray:
         array = np.asarray(labels)
         grid = array.astype(int)
     except (TypeError, ValueError, OverflowError):
-        array, grid = np.empty((0, 0)), np.empty((0, 0), dtype=int)
+        array = np.empty((0, 0))
+        grid = np.empty((0, 0), dtype=int)
     if grid.ndim not in (1, 2) or not grid.size or not np.array_equal(array, grid):
         raise ParameterError(
-            f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}", "labels"
+            f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}",
+            "labels",
         )
     return grid

@@ -1,6 +1,8 @@
-"""Basins: for every initial state of a grid, the attractor on which its motion ends, and how long it takes to come near.
+"""Basins: for every initial state of a grid, the attractor on which its motion ends, and how long
+it takes to come near.
 
-The curves between basins are stable manifolds of the saddles on the boundary, found by edge tracking.
+The curves between basins are stable manifolds of the saddles on the boundary, found by edge
+tracking.
 """
 
 from __future__ import annotations
@@ -31,13 +33,35 @@ from saltus.attractors.attractor_search import find_attractors
 from saltus.attractors.basins.basin_cells import Grid, Labelling, check_basin_store, computed_cells
 from saltus.attractors.phase_plane import separatrices
 from saltus.attractors.saddle_manifolds import is_saddle, stable_manifold
-from saltus.attractors.stroboscopic_section import is_constant, section_states, solved_orbit, with_clock
-from saltus.checks import LIMITS, check_axis, check_count, check_memory, check_number, check_work, checked_by
+from saltus.attractors.stroboscopic_section import (
+    is_constant,
+    section_states,
+    solved_orbit,
+    with_clock,
+)
+from saltus.checks import (
+    LIMITS,
+    check_axis,
+    check_count,
+    check_memory,
+    check_number,
+    check_work,
+    checked_by,
+)
 from saltus.errors import ParameterError
 from saltus.flow import state_names
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import System, Window, check_reached, check_system, check_window, image_of, rest_state, reversed_system
+from saltus.systems import (
+    System,
+    Window,
+    check_reached,
+    check_system,
+    check_window,
+    image_of,
+    rest_state,
+    reversed_system,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -47,30 +71,38 @@ if TYPE_CHECKING:
 class BoundarySettings:
     """How saddles on the boundary are found, and their manifolds computed."""
 
-    step: float = 0.01  # Distance between neighbouring points of a manifold, in half widths of the window.
+    # Distance between neighbouring points of a manifold, in half widths of the window.
+    step: float = 0.01
     points: int = 8_000  # The largest number of points of a manifold on each side of a saddle.
     max_period: int = 6  # The longest period of saddles that are looked for, in forcing periods.
-    # The largest number of saddles, which are those of the shortest periods. If there are more, the manifold of each comes near
-    # all of the boundary.
+    # The largest number of saddles, which are those of the shortest periods. If there are more, the
+    # manifold of each comes near all of the boundary.
     saddles: int = 4
     edges: int = 12  # Number of places of the boundary from which the edge is tracked.
     tracked: int = 40  # Number of forcing periods for which it is tracked.
     cuts: int = 32  # Number of states that divide an interval across the boundary.
-    rounds: int = 9  # Number of times that such an interval is divided: 33^-9 of it is less than rounding.
-    farthest_return: float = 0.2  # Newton's method is tried from returns that are no farther than this.
-    margin: float = 1.5  # Curves are given up to this distance from the middle of the window, in half widths.
+    # Number of times that such an interval is divided: 33^-9 of it is less than rounding.
+    rounds: int = 9
+    # Newton's method is tried from returns that are no farther than this.
+    farthest_return: float = 0.2
+    # Curves are given up to this distance from the middle of the window, in half widths.
+    margin: float = 1.5
 
 
 BOUNDARIES = BoundarySettings()
 Label = Callable[[np.ndarray], np.ndarray]  # states (n, 2) -> labels (n,)
 
 
-def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """The curves at which the basins of a grid meet, one after the other, (n, 2), with nan between them.
+def basin_boundaries(
+    found: Attractors, label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray
+) -> np.ndarray:
+    """The curves at which the basins of a grid meet, one after the other, (n, 2), with nan between
+    them.
 
-    Under a constant load they are the separatrices of the saddle equilibria in the window of the grid. Under a periodic load they
-    are the stable manifolds of at most 4 saddle orbits, of up to 6 forcing periods, that edge tracking finds. Of a curve that is
-    too long only a part is given: the manifold of a chaotic saddle has no end.
+    Under a constant load they are the separatrices of the saddle equilibria in the window of the
+    grid. Under a periodic load they are the stable manifolds of at most 4 saddle orbits, of up to 6
+    forcing periods, that edge tracking finds. Of a curve that is too long only a part is given: the
+    manifold of a chaotic saddle has no end.
 
     Parameters
     ----------
@@ -86,19 +118,35 @@ def basin_boundaries(found: Attractors, label: Label, labels: np.ndarray, along:
     bounds = (float(along[0]), float(along[-1])), (float(velocity[0]), float(velocity[-1]))
     window = check_window(bounds, found.system)
     if is_constant(found.system.load):
-        curves = [np.stack([curve.theta, curve.velocity], axis=1) for curve in separatrices(found.system, window)]
+        curves = [
+            np.stack([curve.theta, curve.velocity], axis=1)
+            for curve in separatrices(found.system, window)
+        ]
     else:
         saddles = edge_saddles(found.system, *edges(label, labels, along, velocity))
         curves = [
-            stable_manifold(saddle, window=window, step=BOUNDARIES.step, points=BOUNDARIES.points).states for saddle in saddles
+            stable_manifold(
+                saddle, window=window, step=BOUNDARIES.step, points=BOUNDARIES.points
+            ).states
+            for saddle in saddles
         ]
     return clipped(curves, window)
 
 
-def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of states (n, 2) with different labels, as close to each other as rounding allows, spread over the boundary."""
-    rows, columns = np.nonzero((labels[:, 1:] != labels[:, :-1]) & (labels[:, 1:] != UNDECIDED) & (labels[:, :-1] != UNDECIDED))
-    chosen = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(BOUNDARIES.edges, len(rows))).astype(int))
+def edges(
+    label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of states (n, 2) with different labels, as close to each other as rounding allows,
+    spread over the boundary.
+    """
+    rows, columns = np.nonzero(
+        (labels[:, 1:] != labels[:, :-1])
+        & (labels[:, 1:] != UNDECIDED)
+        & (labels[:, :-1] != UNDECIDED)
+    )
+    chosen = np.unique(
+        np.linspace(0, max(len(rows) - 1, 0), min(BOUNDARIES.edges, len(rows))).astype(int)
+    )
     rows, columns = rows[chosen], columns[chosen]
     low = np.stack([along[columns], velocity[rows]], axis=1)
     high = np.stack([along[columns + 1], velocity[rows]], axis=1)
@@ -108,9 +156,11 @@ def edges(label: Label, labels: np.ndarray, along: np.ndarray, velocity: np.ndar
         between = low[:, None] + share * (high - low)[:, None]
         other = label(between.reshape(-1, 2)).reshape(len(rows), BOUNDARIES.cuts) != first[:, None]
         between = np.concatenate([low[:, None], between, high[:, None]], axis=1)
-        place = np.where(other.any(axis=1), np.argmax(other, axis=1), BOUNDARIES.cuts)  # the last state with the first label
+        # the last state with the first label
+        place = np.where(other.any(axis=1), np.argmax(other, axis=1), BOUNDARIES.cuts)
         pick = np.arange(len(rows))
-        low, high = between[pick, place], between[pick, place + 1]
+        low = between[pick, place]
+        high = between[pick, place + 1]
     return low, high
 
 
@@ -129,11 +179,14 @@ def edge_saddles(system: System, low: np.ndarray, high: np.ndarray) -> list[Peri
 
 
 def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """For each period up to the longest, the state of a motion to which it returns most closely after this period, if near."""
+    """For each period up to the longest, the state of a motion to which it returns most closely
+    after this period, if near.
+    """
     chosen = []
     for q in range(1, BOUNDARIES.max_period + 1):
         apart = np.abs(track[q:] - track[:-q]).max(axis=1)
-        apart = apart[: len(apart) // 2]  # later it has left the boundary for an attractor, and returns there
+        # later it has left the boundary for an attractor, and returns there
+        apart = apart[: len(apart) // 2]
         nearest = int(np.nanargmin(apart))
         if apart[nearest] < BOUNDARIES.farthest_return:
             chosen.append((track[nearest], q))
@@ -141,8 +194,8 @@ def _returns(track: np.ndarray) -> list[tuple[np.ndarray, int]]:
 
 
 def clipped(curves: list[np.ndarray], window: Window) -> np.ndarray:
-    """The curves one after the other, (n, 2), with nan between them and where they are more than 1.5 half widths from the middle
-    of the window."""
+    """The curves one after the other, (n, 2), with nan between them and where they are more than
+    1.5 half widths from the middle of the window."""
     parts = [np.full((0, 2), np.nan)]
     for curve in curves:
         far = ~(np.abs(window.scaled(curve)) <= BOUNDARIES.margin).all(axis=1)
@@ -156,7 +209,9 @@ def _image(orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     """The mirror image of an orbit that is not its own."""
     if orbit.symmetric or not is_symmetric(orbit.system):
         return []
-    state = image_of(orbit.system.model, section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0])
+    state = image_of(
+        orbit.system.model, section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0]
+    )
     image = solved_orbit(orbit.system, state, orbit.period)
     return [] if image is None else [image]
 
@@ -170,7 +225,8 @@ class BasinSettings:
     periods: int = 500  # The largest number of forcing periods for which a motion is followed.
     within: float = 1e-2  # The distance from an attractor within which a motion has reached it.
     rows: int = 25  # Number of rows of the grid in a chunk of a store, which then takes seconds.
-    # Number of states, out of the cells whose motions end on no known attractor, from which new attractors are looked for.
+    # Number of states, out of the cells whose motions end on no known attractor, from which new
+    # attractors are looked for.
     new_states: int = 64
     rounds: int = 3  # Number of times that new attractors are looked for.
 
@@ -201,7 +257,10 @@ def _check(
     check_number("within", within, above=0.0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     if found is not None and found.system != system:
-        raise ParameterError("found holds the attractors of another system; leave it out, or compute it for this one", "found")
+        raise ParameterError(
+            "found holds the attractors of another system; leave it out, or compute it for this one",
+            "found",
+        )
     if curves:
         _check_curves(system, grid)
     check_count("rows", rows, 1)
@@ -230,48 +289,55 @@ def basins_of_attraction(
     progress: Progress = silent,
     **coordinates: Iterable[float] | float,
 ) -> xarray.Dataset:
-    """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0 ends, and the time it takes.
+    """The attractor on which the motion from each state (coordinate, velocity) of a grid at phase 0
+    ends, and the time it takes.
 
-    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on the orbit (to 1e-6, or stays
-    as near for two of its periods and is nearer in the second), or ends among the points of a chaotic set; else it is -1,
-    undecided. Motions that settle elsewhere give new attractors, with labels after the known ones. The time is the number of
-    forcing periods after which the motion stays within a distance (`within`) of the attractor's states at phase 0; for rest it is
-    at most the time until capture is proved.
+    A cell has the label of an attractor if its motion is proved to be captured at rest, settles on
+    the orbit (to 1e-6, or stays as near for two of its periods and is nearer in the second), or
+    ends among the points of a chaotic set; else it is -1, undecided. Motions that settle elsewhere
+    give new attractors, with labels after the known ones. The time is the number of forcing periods
+    after which the motion stays within a distance (`within`) of the attractor's states at phase 0;
+    for rest it is at most the time until capture is proved.
 
     Parameters
     ----------
     system
         What moves, as for `find_attractors`.
     velocity
-        The velocities of the grid, increasing; by default 201 over the window of `found`, or of `find_attractors`.
+        The velocities of the grid, increasing; by default 201 over the window of `found`, or of
+        `find_attractors`.
     found
-        The attractors and their labels; by default those that `find_attractors` finds, over the grid.
+        The attractors and their labels; by default those that `find_attractors` finds, over the
+        grid.
     periods
         The largest number of forcing periods of each motion.
     within
-        The distance from an attractor, as the largest difference of a variable, within which a motion has reached it.
+        The distance from an attractor, as the largest difference of a variable, within which a
+        motion has reached it.
     curves
-        Whether to add the curves at which basins meet, computed by the backward flow (see `basin_boundaries`), as `boundary_...`
-        over `boundary_point`, nan between curves.
+        Whether to add the curves at which basins meet, computed by the backward flow (see
+        `basin_boundaries`), as `boundary_...` over `boundary_point`, nan between curves.
     tol
         The error of a step.
     rows
         The number of rows of the grid in one chunk of a store or of a worker.
     store, workers, scheduler
-        Where the cells are kept and who computes them, see `saltus.sweep.run`. The attractors before and the curves after the
-        cells are computed anew at every run. If none is given all cells are computed at once.
+        Where the cells are kept and who computes them, see `saltus.sweep.run`. The attractors
+        before and the curves after the cells are computed anew at every run. If none is given all
+        cells are computed at once.
     progress
         Called with the fraction done and what is being done.
     coordinates
-        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With several coordinates two state
-        variables are lists, such as theta_1 and theta_1_velocity; the others are held fixed, by default at rest at their
-        contacts, or at 0 without one.
+        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With
+        several coordinates two state variables are lists, such as theta_1 and theta_1_velocity; the
+        others are held fixed, by default at rest at their contacts, or at 0 without one.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset over (velocity, coordinate), or over the two variables of the plane: `label`, `time` (nan where undecided), and
-        the table of the attractors, in which `cells` is an attractor's share of the grid.
+        A Dataset over (velocity, coordinate), or over the two variables of the plane: `label`,
+        `time` (nan where undecided), and the table of the attractors, in which `cells` is an
+        attractor's share of the grid.
 
     Raises
     ------
@@ -289,10 +355,14 @@ def basins_of_attraction(
     grid = _grid(clock, velocity, coordinates, found)
     progress(0.0, "attractors")
     if found is None:
-        found = find_attractors(system, window=_around(clock, grid), tol=tol, progress=part_of(progress, 0.0, 0.1))
+        found = find_attractors(
+            system, window=_around(clock, grid), tol=tol, progress=part_of(progress, 0.0, 0.1)
+        )
     labelling = Labelling(clock, found.targets, periods, within, tol)
     where = {"store": store, "workers": workers, "scheduler": scheduler}
-    label, time = computed_cells(system, labelling, grid, int(rows), part_of(progress, 0.1, 0.9), **where)
+    label, time = computed_cells(
+        system, labelling, grid, int(rows), part_of(progress, 0.1, 0.9), **where
+    )
     found = _with_new(found, labelling, grid, label, time)
     data = _dataset(found, grid, label, time, {"periods": periods, "within": within, "tol": tol})
     if curves:
@@ -301,9 +371,15 @@ def basins_of_attraction(
     return data
 
 
-def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray, time: np.ndarray) -> Attractors:
-    """The attractors with those to which only cells of the grid lead; `label` and `time` of these cells are filled in."""
-    members, reasons, seen = list(found.members), list(found.reasons), np.zeros(label.shape, dtype=bool)
+def _with_new(
+    found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray, time: np.ndarray
+) -> Attractors:
+    """The attractors with those to which only cells of the grid lead; `label` and `time` of these
+    cells are filled in.
+    """
+    members = list(found.members)
+    reasons = list(found.reasons)
+    seen = np.zeros(label.shape, dtype=bool)
     for _ in range(SETTINGS.rounds):
         rows, columns = np.nonzero((label == UNDECIDED) & ~seen)
         if not rows.size:
@@ -312,7 +388,11 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
         chosen = np.linspace(0, rows.size - 1, min(SETTINGS.new_states, rows.size)).astype(int)
         seen[rows[chosen], columns[chosen]] = True
         more = find_attractors(found.system, starts=1, also=states[chosen], tol=labelling.tol)
-        new = [member for member in more if not any(_same(member.target, known.target) for known in members)]
+        new = [
+            member
+            for member in more
+            if not any(_same(member.target, known.target) for known in members)
+        ]
         reasons = list(dict.fromkeys([*reasons, *more.reasons]))
         if not new:
             continue
@@ -324,10 +404,15 @@ def _with_new(found: Attractors, labelling: Labelling, grid: Grid, label: np.nda
     return replace(found, members=tuple(members), reasons=tuple(reasons))
 
 
-def _curves(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray) -> dict[str, Any]:
+def _curves(
+    found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarray
+) -> dict[str, Any]:
     """The curves at which basins meet, as variables."""
-    points = basin_boundaries(found, lambda states: labelling.of(states)[0], label, grid.horizontal, grid.vertical)
-    text, units = "of the stable manifolds between basins, nan between curves", state_units(found.system)
+    points = basin_boundaries(
+        found, lambda states: labelling.of(states)[0], label, grid.horizontal, grid.vertical
+    )
+    text = "of the stable manifolds between basins, nan between curves"
+    units = state_units(found.system)
     return {
         f"boundary_{key}": variable("boundary_point", points[:, i], units[key], f"{key} {text}")
         for i, key in enumerate(grid.plane)
@@ -335,11 +420,16 @@ def _curves(found: Attractors, labelling: Labelling, grid: Grid, label: np.ndarr
 
 
 def _check_curves(system: System, grid: Grid) -> None:
-    """Refuse, before cells are computed, grids and systems without curves: a grid that is a line, irreversible impacts."""
+    """Refuse, before cells are computed, grids and systems without curves: a grid that is a line,
+    irreversible impacts.
+    """
     check_system(system, "the curves between basins", coordinates=1)
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         if len(values) < 2:
-            raise ParameterError(f"{name} must be at least two numbers where the curves between basins are asked for", name)
+            raise ParameterError(
+                f"{name} must be at least two numbers where the curves between basins are asked for",
+                name,
+            )
     reversed_system(system)
 
 
@@ -354,9 +444,11 @@ def _same(one: Target, other: Target) -> bool:
 
 
 def _relabelled(new: list[Attractor], known: list[int]) -> list[Attractor]:
-    """New attractors with labels after the known ones, without shares, as these would be of a few states only.
+    """New attractors with labels after the known ones, without shares, as these would be of a few
+    states only.
 
-    A state of rest gets the label of rest if no known one has it: models with several contacts may have several states of rest.
+    A state of rest gets the label of rest if no known one has it: models with several contacts may
+    have several states of rest.
     """
     first = 1 + max(known, default=REST)
     label_of = {member.label: first + i for i, member in enumerate(new)}
@@ -366,9 +458,12 @@ def _relabelled(new: list[Attractor], known: list[int]) -> list[Attractor]:
 
 
 def _around(system: System, grid: Grid) -> Window:
-    """The smallest window around the contact that contains a grid; with the default bounds for variables that are held fixed."""
+    """The smallest window around the contact that contains a grid; with the default bounds for
+    variables that are held fixed.
+    """
     area = check_window(None, system)
-    bounds, names = [list(pair) for pair in area], list(grid.fixed)
+    bounds = [list(pair) for pair in area]
+    names = list(grid.fixed)
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         i = names.index(name)
         middle = area.centre[i]
@@ -377,23 +472,34 @@ def _around(system: System, grid: Grid) -> Window:
     return check_window(bounds, system)
 
 
-def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: Attractors | None) -> Grid:
+def _grid(
+    system: System, velocity: Any, coordinates: Mapping[str, Any], found: Attractors | None
+) -> Grid:
     """The plane of the initial states."""
-    names, given = state_names(system.model.coordinates), {n: v for n, v in coordinates.items() if v is not None}
+    names = state_names(system.model.coordinates)
+    given = {n: v for n, v in coordinates.items() if v is not None}
     if velocity is not None:
         given["velocity"] = velocity
-    chosen = names[: len(names) - len(system.model.first_order)]  # the velocities of the last ones follow from the state
+    # the velocities of the last ones follow from the state
+    chosen = names[: len(names) - len(system.model.first_order)]
     if len(chosen) < 2:
         raise ParameterError(
-            f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two", "system"
+            f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two",
+            "system",
         )
     for name in given:
         if name not in chosen:
             known = ", ".join(f"{each}=..." for each in chosen)
             kind = "coordinate" if len(names) == 2 else "state variable"
-            raise ParameterError(f"{type(system.model).__name__} has no {kind} {name!r}; give {known}", name)
+            raise ParameterError(
+                f"{type(system.model).__name__} has no {kind} {name!r}; give {known}", name
+            )
     fixed = dict(zip(names, map(float, rest_state(system)), strict=True))
-    varied = [name for name in names if name in given and np.ndim(given[name]) > 0] if len(names) > 2 else list(names)
+    varied = (
+        [name for name in names if name in given and np.ndim(given[name]) > 0]
+        if len(names) > 2
+        else list(names)
+    )
     if len(varied) not in (0, 2):
         raise ParameterError(
             f"two state variables of {', '.join(names)} are given as lists and the others as numbers, got lists of "
@@ -405,7 +511,10 @@ def _grid(system: System, velocity: Any, coordinates: Mapping[str, Any], found: 
         check_number(name, given[name])
         fixed[name] = float(given[name])
     window = check_window(None if found is None else found.window, system)
-    along, up = (check_axis(n, given[n] if n in given else _over(system, window, names.index(n))) for n in (x, y))
+    along, up = (
+        check_axis(n, given[n] if n in given else _over(system, window, names.index(n)))
+        for n in (x, y)
+    )
     return Grid((x, y), along, up, fixed)
 
 
@@ -413,19 +522,28 @@ def _over(system: System, window: Window, place: int) -> np.ndarray:
     """Evenly spaced values of a state variable over a window, without those beyond a contact."""
     values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, SETTINGS.cells)
     names = system.model.coordinates
-    return np.asarray(values[system.model.reaches(names[place], values)] if place < len(names) else values)
+    return np.asarray(
+        values[system.model.reaches(names[place], values)] if place < len(names) else values
+    )
 
 
-def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]) -> xarray.Dataset:
+def _dataset(
+    found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray, numbers: dict[str, Any]
+) -> xarray.Dataset:
     import xarray
 
-    (x, y), units = grid.plane, state_units(found.system)
+    (x, y) = grid.plane
+    units = state_units(found.system)
     share = [float((label == member.label).mean()) for member in found]
     period = with_clock(found.system).load.period or math.nan
     variables: dict[str, Any] = attractor_table(found.members, found.system)
     variables |= {
-        "label": variable((y, x), label, "1", "attractor on which the motion ends, -1 for undecided"),
-        "time": variable((y, x), time, f"2 pi / Omega = {period:.9g}", "forcing periods to reach the attractor"),
+        "label": variable(
+            (y, x), label, "1", "attractor on which the motion ends, -1 for undecided"
+        ),
+        "time": variable(
+            (y, x), time, f"2 pi / Omega = {period:.9g}", "forcing periods to reach the attractor"
+        ),
         "cells": variable("attractor", np.array(share), "1", "share of the grid"),
     }
     axes = {
@@ -435,5 +553,13 @@ def _dataset(found: Attractors, grid: Grid, label: np.ndarray, time: np.ndarray,
     }
     undecided = float((label == UNDECIDED).mean())
     held = {f"held_{name}": value for name, value in grid.fixed.items() if name not in grid.plane}
-    attributes = about(found.system, "basins", **numbers, plane=[x, y], **held, reasons=list(found.reasons), undecided=undecided)
+    attributes = about(
+        found.system,
+        "basins",
+        **numbers,
+        plane=[x, y],
+        **held,
+        reasons=list(found.reasons),
+        undecided=undecided,
+    )
     return xarray.Dataset(variables, axes, attributes)

@@ -1,4 +1,6 @@
-"""Lyapunov exponents of many motions at once, in lanes, as for charts of exponents along a parameter."""
+"""Lyapunov exponents of many motions at once, in lanes, as for charts of exponents along a
+parameter.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.lyapunov.growth import LYAPUNOV, Estimate, check_run, first_frame, resolution, span_count
+from saltus.attractors.lyapunov.growth import (
+    LYAPUNOV,
+    Estimate,
+    check_run,
+    first_frame,
+    resolution,
+    span_count,
+)
 from saltus.attractors.lyapunov.spectrum import impact_factor
 from saltus.checks import Numbers
 from saltus.enumerations import flags
@@ -37,9 +46,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stretched:
-    """The run of many motions; growth is NaN once a motion is lost, and -inf once it has come to rest with a loss at impacts."""
+    """The run of many motions; growth is NaN once a motion is lost, and -inf once it has come to
+    rest with a loss at impacts.
+    """
 
-    growth: np.ndarray  # (periods, n, 2): ln of the stretch of each direction of the frame in each period
+    # (periods, n, 2): ln of the stretch of each direction of the frame in each period
+    growth: np.ndarray
     states: np.ndarray  # (n, 2): coordinate and velocity at the end; NaN where the motion was lost
 
 
@@ -54,12 +66,17 @@ def stretch_many(
 ) -> Stretched:
     """Follow motions from states (n, 2) at phase 0 over so many periods of the given lengths, (n,).
 
-    `parameters` replaces numbers of the system by path, (n,) each. Results do not depend on the number of cores.
+    `parameters` replaces numbers of the system by path, (n,) each. Results do not depend on the
+    number of cores.
     """
     ensemble = TangentEnsemble(system, parameters, lengths, tol)
-    result = Stretched(np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan))
+    result = Stretched(
+        np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan)
+    )
     counts = np.array([span_count(length) for length in lengths])
-    groups = [group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))]
+    groups = [
+        group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))
+    ]
     done = np.zeros(1)
     stopped: list[bool] = []
 
@@ -92,11 +109,15 @@ def _groups(rows: np.ndarray) -> list[np.ndarray]:
 
 
 class _TangentGroup:
-    """A group of motions with frames; the row of each has the coordinate, its two derivatives, the velocity, its two
-    derivatives."""
+    """A group of motions with frames; the row of each has the coordinate, its two derivatives, the
+    velocity, its two derivatives."""
 
-    def __init__(self, ensemble: TangentEnsemble, rows: np.ndarray, states: np.ndarray, lengths: np.ndarray) -> None:
-        self._ensemble, self._rows, self._lengths = ensemble, rows, lengths
+    def __init__(
+        self, ensemble: TangentEnsemble, rows: np.ndarray, states: np.ndarray, lengths: np.ndarray
+    ) -> None:
+        self._ensemble = ensemble
+        self._rows = rows
+        self._lengths = lengths
         self._states = np.zeros((len(states), 6))
         self._states[:, [0, 3]] = states
         self._states[:, [1, 2, 4, 5]] = first_frame(2).ravel()
@@ -111,7 +132,9 @@ class _TangentGroup:
             if not here.size:
                 break
             span = self._lengths[here] / spans
-            ends = self._ensemble.advance(self._rows[here], self._states[here], j * span, (j + 1) * span)
+            ends = self._ensemble.advance(
+                self._rows[here], self._states[here], j * span, (j + 1) * span
+            )
             self._states[here], stretch = _orthonormal(ends.states, self._rounding)
             self._alive[here[~ends.sound]] = False
             growth[here] += np.where(ends.sound[:, None], stretch, np.nan)
@@ -123,20 +146,29 @@ class _TangentGroup:
 
 
 def _orthonormal(states: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray]:
-    """The states with their derivatives made orthonormal, by Gram and Schmidt, and ln of the lengths that they had, (n, 2).
+    """The states with their derivatives made orthonormal, by Gram and Schmidt, and ln of the
+    lengths that they had, (n, 2).
 
     A second length that is no more than `rounding` of the first one is 0.
     """
     states = states.copy()
-    x1, x2, y1, y2 = states[:, 1], states[:, 2], states[:, 4], states[:, 5]
-    first, area = np.hypot(x1, y1), x1 * y2 - x2 * y1
+    x1 = states[:, 1]
+    x2 = states[:, 2]
+    y1 = states[:, 4]
+    y2 = states[:, 5]
+    first = np.hypot(x1, y1)
+    area = x1 * y2 - x2 * y1
     area[np.abs(area) <= rounding * first**2] = 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = np.log(np.stack([first, np.abs(area) / first], axis=1))
-        unit_x, unit_y = np.where(first > 0.0, x1 / first, 1.0), np.where(first > 0.0, y1 / first, 0.0)
+        unit_x = np.where(first > 0.0, x1 / first, 1.0)
+        unit_y = np.where(first > 0.0, y1 / first, 0.0)
     growth[first == 0.0] = -np.inf
     turn = np.where(area < 0.0, -1.0, 1.0)
-    states[:, 1], states[:, 4], states[:, 2], states[:, 5] = unit_x, unit_y, -turn * unit_y, turn * unit_x
+    states[:, 1] = unit_x
+    states[:, 4] = unit_y
+    states[:, 2] = -turn * unit_y
+    states[:, 5] = turn * unit_x
     return states, growth
 
 
@@ -151,10 +183,12 @@ def lyapunov_many(
     progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
-    """Both exponents of every motion of an ensemble, as `lyapunov_spectrum` computes them for one motion.
+    """Both exponents of every motion of an ensemble, as `lyapunov_spectrum` computes them for one
+    motion.
 
-    Arrays broadcast as those of `simulate_many` do. Motions that settle on an orbit are followed along it. For motions that rest
-    at the contact for good the exponents are -inf if impacts lose energy, and nan if they do not.
+    Arrays broadcast as those of `simulate_many` do. Motions that settle on an orbit are followed
+    along it. For motions that rest at the contact for good the exponents are -inf if impacts lose
+    energy, and nan if they do not.
 
     Parameters
     ----------
@@ -174,10 +208,12 @@ def lyapunov_many(
     Returns
     -------
     xarray.Dataset
-        A Dataset over the dimensions of the arguments: `exponent` and its `error`, `at_half` and `later_half` (from the halves of
-        the run), each with a dimension `index` of 2; `resolution`, below which an exponent may be 0; `positive`, whether the
-        largest exponent is above its error and the resolution, over the whole run and over both halves; `period`, the forcing
-        periods after which the motion repeats itself at the end, 0 if it does not; `ending`, and the state at the end.
+        A Dataset over the dimensions of the arguments: `exponent` and its `error`, `at_half` and
+        `later_half` (from the halves of the run), each with a dimension `index` of 2; `resolution`,
+        below which an exponent may be 0; `positive`, whether the largest exponent is above its
+        error and the resolution, over the whole run and over both halves; `period`, the forcing
+        periods after which the motion repeats itself at the end, 0 if it does not; `ending`, and
+        the state at the end.
 
     Raises
     ------
@@ -188,18 +224,32 @@ def lyapunov_many(
     --------
     >>> many = saltus.lyapunov_many(system, theta=[0.3, 0.4], periods=200)
     >>> sorted(many.data_vars)
-    ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period', 'positive', 'resolution']
+    ['at_half', 'end_theta', 'end_velocity', 'ending', 'error', 'exponent', 'later_half', 'period',
+    'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
     if len(system.in_gap_coordinates.model.coordinates) > 1:
         raise ParameterError(
-            "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one motion at a time", "system"
+            (
+                "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one "
+                "motion at a time"
+            ),
+            "system",
         )
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
-    run = _Many(system.in_gap_coordinates, inputs.in_gaps(system), tol)  # exponents are the same over a wall that moves
+    # exponents are the same over a wall that moves
+    run = _Many(system.in_gap_coordinates, inputs.in_gaps(system), tol)
     started, captured = run.settle(run.begin(), transient)
     started[captured] = np.nan
-    stretched = stretch_many(system, started, run.parameters, run.lengths, int(periods), tol, part_of(progress, 0.0, 0.95))
+    stretched = stretch_many(
+        system,
+        started,
+        run.parameters,
+        run.lengths,
+        int(periods),
+        tol,
+        part_of(progress, 0.0, 0.95),
+    )
     period, still = run.period(stretched.states)
     measures = _measures(run.system, run, stretched, captured, still) | {"period": period}
     measures["ending"][(measures["ending"] == Ending.UNDECIDED) & (period > 0)] = Ending.PERIODIC
@@ -207,7 +257,9 @@ def lyapunov_many(
     ends = stretched.states
     if run.system is not system:
         twin = inputs.with_numbers(run.system)
-        ends = np.concatenate(twin.model.own_states(0.0, ends[None, :, 0], ends[None, :, 1], twin.load)).T
+        ends = np.concatenate(
+            twin.model.own_states(0.0, ends[None, :, 0], ends[None, :, 1], twin.load)
+        ).T
     return _dataset(system, run, measures, ends, {"periods": periods, "transient": transient})
 
 
@@ -215,8 +267,12 @@ class _Many:
     """The motions in one row: their parameters and the lengths of their periods."""
 
     def __init__(self, system: System, inputs: Inputs, tol: float) -> None:
-        self.system, self.inputs, self.tol = system, inputs, tol
-        self.parameters = {path: np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
+        self.system = system
+        self.inputs = inputs
+        self.tol = tol
+        self.parameters = {
+            path: np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()
+        }
         frequency = self.parameters.get("load.frequency", system.load.frequency)
         length = 1.0 if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
         self.lengths = np.broadcast_to(length, inputs.size)
@@ -224,26 +280,37 @@ class _Many:
     def begin(self) -> np.ndarray:
         """Coordinate and velocity at the start, (n, 2)."""
         state = list(self.inputs.values.values())[:2]
-        return np.stack([np.broadcast_to(values, self.inputs.size) for values in state], axis=1).astype(float)
+        return np.stack(
+            [np.broadcast_to(values, self.inputs.size) for values in state], axis=1
+        ).astype(float)
 
     def settle(self, states: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-        """States after so many periods, or fewer for motions that have settled, and which motions are proved to rest for ever."""
+        """States after so many periods, or fewer for motions that have settled, and which motions
+        are proved to rest for ever.
+        """
         if not periods or not len(states):
             return states.copy(), np.zeros(len(states), dtype=bool)
         result = self._follow(states, periods, ("rest", "settled"))
         stop = stop_names(result).values
         going = np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))
-        return np.where(going[:, None], last_states(self.system, result), np.nan), stop == Stop.CAPTURED
+        return np.where(
+            going[:, None], last_states(self.system, result), np.nan
+        ), stop == Stop.CAPTURED
 
     def period(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forcing periods after which motions from these states repeat themselves, 0 if they do not or are lost; and which
-        motions stand still."""
-        found, still = np.zeros(len(states), dtype=int), np.zeros(len(states), dtype=bool)
+        """Forcing periods after which motions from these states repeat themselves, 0 if they do not
+        or are lost; and which motions stand still."""
+        found = np.zeros(len(states), dtype=int)
+        still = np.zeros(len(states), dtype=bool)
         here = np.flatnonzero(np.isfinite(states).all(axis=1))
         if here.size and self.system.load.frequency is not None:
             result = self._follow(states, LYAPUNOV.look_back, ("settled",), here, ("extrema",))
-            highest, lowest = (result[f"overall_{name}"].values for name in extrema_names(self.system.model.coordinates))
-            found[here], still[here] = result["recurrence_period"].values, highest == lowest
+            highest, lowest = (
+                result[f"overall_{name}"].values
+                for name in extrema_names(self.system.model.coordinates)
+            )
+            found[here] = result["recurrence_period"].values
+            still[here] = highest == lowest
         return found, still
 
     def _follow(
@@ -266,15 +333,21 @@ class _Many:
         )
 
 
-def _measures(system: System, run: _Many, stretched: Stretched, captured: np.ndarray, still: np.ndarray) -> dict[str, np.ndarray]:
+def _measures(
+    system: System, run: _Many, stretched: Stretched, captured: np.ndarray, still: np.ndarray
+) -> dict[str, np.ndarray]:
     """Exponents, errors and what follows from them, a row for each motion."""
     growth = stretched.growth
     if captured.any():
         lossy = impact_factor(system, run.parameters) < LYAPUNOV.lossless
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
-    found, duration = Estimate.of(growth / run.lengths[None, :, None]), len(growth) * run.lengths
-    # Contacts and frictions that hold a coordinate for a while make an exponent -inf also where the motion goes on.
-    rested = captured | (still if system.model.holds_coordinates else np.isneginf(found.value[:, 1]))
+    found = Estimate.of(growth / run.lengths[None, :, None])
+    duration = len(growth) * run.lengths
+    # Contacts and frictions that hold a coordinate for a while make an exponent -inf also where the
+    # motion goes on.
+    rested = captured | (
+        still if system.model.holds_coordinates else np.isneginf(found.value[:, 1])
+    )
     moving = np.isfinite(stretched.states).all(axis=1)
     return {
         "exponent": found.value,
@@ -283,7 +356,9 @@ def _measures(system: System, run: _Many, stretched: Stretched, captured: np.nda
         "error": found.error,
         "resolution": resolution(duration),
         "positive": found.positive(duration[:, None])[:, 0],
-        "ending": np.where(rested, Ending.REST, np.where(moving, Ending.UNDECIDED, Ending.ENDED)).astype(np.int8),
+        "ending": np.where(
+            rested, Ending.REST, np.where(moving, Ending.UNDECIDED, Ending.ENDED)
+        ).astype(np.int8),
     }
 
 
@@ -293,18 +368,26 @@ MEANINGS = {
     "later_half": "the exponents from the second half of the run",
     "error": "half width of the 95 % interval of the exponent",
     "resolution": "2 ln(t) / t, what growth by the square of the time would give",
-    "positive": "whether the largest exponent is above its error and the resolution, in all and in both halves",
+    "positive": (
+        "whether the largest exponent is above its error and the resolution, in all and "
+        "in both halves"
+    ),
     "ending": "what the motion does at the end",
     "period": "forcing periods after which the motion repeats itself at the end, 0 if it does not",
 }
 
 
 def _dataset(
-    system: System, run: _Many, measures: dict[str, np.ndarray], states: np.ndarray, numbers: dict[str, Any]
+    system: System,
+    run: _Many,
+    measures: dict[str, np.ndarray],
+    states: np.ndarray,
+    numbers: dict[str, Any],
 ) -> xarray.Dataset:
     import xarray
 
-    inputs, name = run.inputs, system.model.coordinates[0]
+    inputs = run.inputs
+    name = system.model.coordinates[0]
     unit = system.model.unit_of(name)
     columns = {name: (array, "1", MEANINGS[name]) for name, array in measures.items()}
     for i, label in enumerate((name, "velocity")):
@@ -315,9 +398,14 @@ def _dataset(
     variables: dict[str, Any] = {}
     for key, (array, units, text) in columns.items():
         dims = (*inputs.dims, *(("index",) if array.ndim > 1 else ()))
-        variables[key] = dims, array.reshape((*inputs.shape, *array.shape[1:])), {"units": units, "long_name": text}
+        variables[key] = (
+            dims,
+            array.reshape((*inputs.shape, *array.shape[1:])),
+            {"units": units, "long_name": text},
+        )
     variables["ending"][2].update(flags(Ending))
-    attributes = {"title": "Lyapunov exponents computed by saltus", "kind": "lyapunov_many"} | provenance(
-        system, tol=run.tol, **numbers
-    )
+    attributes = {
+        "title": "Lyapunov exponents computed by saltus",
+        "kind": "lyapunov_many",
+    } | provenance(system, tol=run.tol, **numbers)
     return xarray.Dataset(variables, coords=inputs.coords, attrs=attributes)

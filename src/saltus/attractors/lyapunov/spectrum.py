@@ -1,4 +1,6 @@
-"""Lyapunov exponents of a motion, through saltation at every impact, and two independent checks of them."""
+"""Lyapunov exponents of a motion, through saltation at every impact, and two independent checks of
+them.
+"""
 
 from __future__ import annotations
 
@@ -37,29 +39,47 @@ VELOCITY = Expr("velocity", (), 0)
 class Contraction:
     """ln det of the flow's derivative along a motion of a system with one coordinate.
 
-    ln det Phi = sum over impacts of ln(R_v v+ / v-) + sum over sides s of (da/dv)_s T_s, where R(v-) is the law of impact and T_s
-    the time on the side; for the metainterface (da/dv)_s = -C c^P / (1 + m)^P, and R_v v+ / v- = e^2 (numerics.md, section 5).
-    It is independent of the derivatives that are carried along the motion.
+    ln det Phi = sum over impacts of ln(R_v v+ / v-) + sum over sides s of (da/dv)_s T_s, where
+    R(v-) is the law of impact and T_s the time on the side; for the metainterface (da/dv)_s = -C
+    c^P / (1 + m)^P, and R_v v+ / v- = e^2 (numerics.md, section 5). It is independent of the
+    derivatives that are carried along the motion.
     """
 
     def __init__(self, system: System) -> None:
         traced = trace(system)
         self._leaves = Leaves([Interval(value) for value in system.parameters.values()], [])
         sides = system.model.every_side
-        damping = {s: substitute(differentiate(traced.acceleration[0], VELOCITY), {Expr("side"): float(s)}) for s in sides}
+        damping = {
+            s: substitute(differentiate(traced.acceleration[0], VELOCITY), {Expr("side"): float(s)})
+            for s in sides
+        }
         after = traced.velocity_after
         self._slopes = {}
         if after is not None:
-            self._slopes = {s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY) for s in sides}
-        known = not any(reads(d, "time", "coordinate", "velocity", "record") for d in damping.values())
+            self._slopes = {
+                s: differentiate(substitute(after, {Expr("side"): float(s)}), VELOCITY)
+                for s in sides
+            }
+        known = not any(
+            reads(d, "time", "coordinate", "velocity", "record") for d in damping.values()
+        )
         known &= not any(reads(slope, "record") for slope in self._slopes.values())
-        self.known = known and system.model.has_state_plane  # whether da/dv is constant on each side
-        linear = {s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")}
+        # whether da/dv is constant on each side
+        self.known = known and system.model.has_state_plane
+        linear = {
+            s: d for s, d in self._slopes.items() if not reads(d, "time", "velocity", "record")
+        }
         self._factors = {s: _middle(enclose([d], self._leaves)[0]) for s, d in linear.items()}
-        self._rates = {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()} if self.known else {}
+        self._rates = (
+            {s: _middle(enclose([d], self._leaves)[0]) for s, d in damping.items()}
+            if self.known
+            else {}
+        )
 
     def along(self, motion: Motion) -> float:
-        """ln det from the start of a motion to its end; -inf if it rests in between, NaN if da/dv is not constant on a side."""
+        """ln det from the start of a motion to its end; -inf if it rests in between, NaN if da/dv
+        is not constant on a side.
+        """
         if not self.known:
             return float("nan")
         if len(motion.events.of(EventKind.REST)):
@@ -67,36 +87,49 @@ class Contraction:
         impacts = motion.impacts
         bounds = np.concatenate([[motion.start], impacts.time, [motion.time]])
         sides = np.append(impacts.side, motion.side)
-        total = sum(rate * np.diff(bounds)[sides == side].sum() for side, rate in self._rates.items())
+        total = sum(
+            rate * np.diff(bounds)[sides == side].sum() for side, rate in self._rates.items()
+        )
         for side in set(impacts.side.tolist()):
             here = impacts.side == side
-            before, after = impacts.velocity_before[here], impacts.velocity_after[here]
+            before = impacts.velocity_before[here]
+            after = impacts.velocity_after[here]
             with np.errstate(divide="ignore"):
-                total += np.log(np.abs(self._slope(int(side), impacts.time[here], before) * after / before)).sum()
+                total += np.log(
+                    np.abs(self._slope(int(side), impacts.time[here], before) * after / before)
+                ).sum()
         return float(total)
 
     def _slope(self, side: int, time: np.ndarray, before: np.ndarray) -> Any:
         """R_v at impacts with these velocities."""
         if side in self._factors:
             return self._factors[side]
-        (slope,) = enclose([self._slopes[side]], Leaves(self._leaves.parameters, [], Interval(time), speed=Interval(before)))
+        (slope,) = enclose(
+            [self._slopes[side]],
+            Leaves(self._leaves.parameters, [], Interval(time), speed=Interval(before)),
+        )
         return _middle(slope)
 
 
 def impact_factor(system: System, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of parameters: if it is below 1, impacts
-    lead to rest.
+    """The product over the sides of abs(dv+/dv-) of impacts without speed, for arrays of
+    parameters: if it is below 1, impacts lead to rest.
 
-    Its shape is () or that of the arrays; it is NaN if the impact law has no slope there, and 0 if contacts or frictions hold a
-    coordinate.
+    Its shape is () or that of the arrays; it is NaN if the impact law has no slope there, and 0 if
+    contacts or frictions hold a coordinate.
     """
     traced = trace(system)
     if traced.velocity_after is None:
         return np.zeros(()) if traced.reactions else np.ones(())
-    values = [Interval(np.asarray(parameters.get(path, value), dtype=float)) for path, value in system.parameters.items()]
+    values = [
+        Interval(np.asarray(parameters.get(path, value), dtype=float))
+        for path, value in system.parameters.items()
+    ]
     product = np.ones(())
     for side in system.model.every_side:
-        slope = differentiate(substitute(traced.velocity_after, {Expr("side"): float(side)}), VELOCITY)
+        slope = differentiate(
+            substitute(traced.velocity_after, {Expr("side"): float(side)}), VELOCITY
+        )
         product = product * np.abs(_middle(enclose([slope], Leaves(values, []))[0]))
     return product
 
@@ -107,25 +140,31 @@ def _middle(bounds: Interval) -> np.ndarray:
     return middle
 
 
-def separation_growth(system: System, state: np.ndarray, periods: int, length: float, progress: Progress = silent) -> np.ndarray:
-    """ln(distance after a period / distance before) for each period, (periods,); -inf once both states are the same.
+def separation_growth(
+    system: System, state: np.ndarray, periods: int, length: float, progress: Progress = silent
+) -> np.ndarray:
+    """ln(distance after a period / distance before) for each period, (periods,); -inf once both
+    states are the same.
 
-    After each period the second state is moved along the line to the first one, back to the distance of 1e-7 (Benettin, Galgani,
-    Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may lie on different sides of the contact, or have different numbers
-    of impacts. Of several contacts, those that are closed in the first state are closed in the second.
+    After each period the second state is moved along the line to the first one, back to the
+    distance of 1e-7 (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may
+    lie on different sides of the contact, or have different numbers of impacts. Of several
+    contacts, those that are closed in the first state are closed in the second.
     """
     here = state
     away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
-        beside, following = states_beside(system, here, away), _mapped(system, here, length)
+        beside = states_beside(system, here, away)
+        following = _mapped(system, here, length)
         before = float(np.linalg.norm(beside - here))
         apart = _mapped(system, beside, length) - following
         distance = float(np.linalg.norm(apart))
         if distance == 0.0 or before == 0.0:
             break
         growth[p] = np.log(distance / before)
-        here, away = following, apart * (LYAPUNOV.distance / distance)
+        here = following
+        away = apart * (LYAPUNOV.distance / distance)
         progress((p + 1) / periods, "two trajectories")
     return growth
 
@@ -133,15 +172,18 @@ def separation_growth(system: System, state: np.ndarray, periods: int, length: f
 def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
     """The state a period later."""
     start = arguments_of(system, state)
-    return simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False).final_state
+    return simulate(
+        system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False
+    ).final_state
 
 
 @dataclass(frozen=True, eq=False)
 class Exponents(Result):
     """The exponents of a motion, per unit of dimensionless time, largest first.
 
-    They are -inf if the motion comes to rest with a loss at impacts: motions beside it reach the same rest in a finite time. They
-    are NaN if the motion has no derivative or ends; `note` then says why.
+    They are -inf if the motion comes to rest with a loss at impacts: motions beside it reach the
+    same rest in a finite time. They are NaN if the motion has no derivative or ends; `note` then
+    says why.
 
     Attributes
     ----------
@@ -154,9 +196,11 @@ class Exponents(Result):
     half_errors
         (2, 2 n): half widths of 95 % intervals of the exponents from the halves.
     divergence
-        The mean of ln det per unit of time, from impacts and the time on each side; NaN if it does not follow from these alone.
+        The mean of ln det per unit of time, from impacts and the time on each side; NaN if it does
+        not follow from these alone.
     stroboscopic
-        The stroboscopic map's largest exponent over the forcing period, from two trajectories; or NaN.
+        The stroboscopic map's largest exponent over the forcing period, from two trajectories; or
+        NaN.
     stroboscopic_error
         The half width of its 95 % interval.
     periods
@@ -197,8 +241,14 @@ class Exponents(Result):
 
     @property
     def sum_defect(self) -> float:
-        """The difference between the sum of the exponents and the mean divergence, which should be equal."""
-        return abs(float(self.values.sum()) - self.divergence) if np.isfinite(self.values).all() else math.nan
+        """The difference between the sum of the exponents and the mean divergence, which should be
+        equal.
+        """
+        return (
+            abs(float(self.values.sum()) - self.divergence)
+            if np.isfinite(self.values).all()
+            else math.nan
+        )
 
     @property
     def agrees(self) -> bool:
@@ -208,36 +258,90 @@ class Exponents(Result):
 
     @property
     def resolution(self) -> float:
-        """2 ln(t) / t after a time t: regular motion, whose perturbations may grow like t^2, may show an exponent up to this."""
+        """2 ln(t) / t after a time t: regular motion, whose perturbations may grow like t^2, may
+        show an exponent up to this.
+        """
         return float(resolution(self.duration))
 
     @property
     def positive(self) -> bool:
-        """Whether the largest exponent is above 0 by more than its error and the resolution, over the run and both halves."""
-        largest = Estimate(self.values[0], self.errors[0], self.halves[:, 0], self.half_errors[:, 0])
+        """Whether the largest exponent is above 0 by more than its error and the resolution, over
+        the run and both halves.
+        """
+        largest = Estimate(
+            self.values[0], self.errors[0], self.halves[:, 0], self.half_errors[:, 0]
+        )
         return bool(largest.positive(self.duration))
 
     def to_xarray(self) -> xarray.Dataset:
         """`exponent`, its `error` and those of both halves over `index`, and the checks."""
         per_time = "per unit of dimensionless time"
         columns: dict[str, tuple[Any, ...]] = {
-            "exponent": ("index", self.values, "1", f"Lyapunov exponents, {per_time}, largest first"),
+            "exponent": (
+                "index",
+                self.values,
+                "1",
+                f"Lyapunov exponents, {per_time}, largest first",
+            ),
             "error": ("index", self.errors, "1", "half width of the 95 % interval of the exponent"),
-            "at_half": ("index", self.halves[0], "1", "the exponents from the first half of the run"),
-            "later_half": ("index", self.halves[1], "1", "the exponents from the second half of the run"),
-            "divergence": ((), self.divergence, "1", f"mean divergence, {per_time}, which is the sum of the exponents"),
-            "stroboscopic": ((), self.stroboscopic, "1", "the largest exponent from two trajectories"),
-            "stroboscopic_error": ((), self.stroboscopic_error, "1", "half width of its 95 % interval"),
-            "resolution": ((), self.resolution, "1", "2 ln(t) / t, what growth by the square of the time would give"),
+            "at_half": (
+                "index",
+                self.halves[0],
+                "1",
+                "the exponents from the first half of the run",
+            ),
+            "later_half": (
+                "index",
+                self.halves[1],
+                "1",
+                "the exponents from the second half of the run",
+            ),
+            "divergence": (
+                (),
+                self.divergence,
+                "1",
+                f"mean divergence, {per_time}, which is the sum of the exponents",
+            ),
+            "stroboscopic": (
+                (),
+                self.stroboscopic,
+                "1",
+                "the largest exponent from two trajectories",
+            ),
+            "stroboscopic_error": (
+                (),
+                self.stroboscopic_error,
+                "1",
+                "half width of its 95 % interval",
+            ),
+            "resolution": (
+                (),
+                self.resolution,
+                "1",
+                "2 ln(t) / t, what growth by the square of the time would give",
+            ),
         }
-        facts: dict[str, Any] = {"periods": self.periods, "duration": self.duration, "note": self.note or ""}
+        facts: dict[str, Any] = {
+            "periods": self.periods,
+            "duration": self.duration,
+            "note": self.note or "",
+        }
         return result_dataset("exponents", columns, **facts)
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{x:.5g} +- {e:.1g}" for x, e in zip(self.values, self.errors, strict=True))
-        known = f", sum - divergence = {self.values.sum() - self.divergence:.1e}" if np.isfinite(self.divergence) else ""
+        values = ", ".join(
+            f"{x:.5g} +- {e:.1g}" for x, e in zip(self.values, self.errors, strict=True)
+        )
+        known = (
+            f", sum - divergence = {self.values.sum() - self.divergence:.1e}"
+            if np.isfinite(self.divergence)
+            else ""
+        )
         note = f", {self.note}" if self.note else known
-        return f"Exponents({values}; stroboscopic {self.stroboscopic:.5g}; {self.periods} periods{note})"
+        return (
+            f"Exponents({values}; stroboscopic {self.stroboscopic:.5g}; {self.periods} "
+            f"periods{note})"
+        )
 
 
 def lyapunov_spectrum(
@@ -251,22 +355,27 @@ def lyapunov_spectrum(
     progress: Progress = silent,
     **coordinates: float,
 ) -> Exponents:
-    """All Lyapunov exponents of a motion, lambda_i = lim ln(R_ii) / t, where Phi = Q R over the time t.
+    """All Lyapunov exponents of a motion, lambda_i = lim ln(R_ii) / t, where Phi = Q R over the
+    time t.
 
-    The derivatives Phi of the exact flow, with the saltation of every impact, are carried over spans of a forcing period, each
-    no longer than 6.5 units of time, and made orthonormal after each span. Averages over the periods are weighted
-    (`averages.weights`), so that exponents of periodic and quasi-periodic motions, and of equilibria, converge faster than any
-    power of the time. Exponents are -inf for the directions in which closed contacts and sticking frictions hold the motion.
+    The derivatives Phi of the exact flow, with the saltation of every impact, are carried over
+    spans of a forcing period, each no longer than 6.5 units of time, and made orthonormal after
+    each span. Averages over the periods are weighted (`averages.weights`), so that exponents of
+    periodic and quasi-periodic motions, and of equilibria, converge faster than any power of the
+    time. Exponents are -inf for the directions in which closed contacts and sticking frictions hold
+    the motion.
 
-    The result contains two checks. The sum of the exponents must equal the mean divergence, which is computed from the impacts
-    and from the times on each side; with several contacts or frictions it is not known. And the stroboscopic map must have the
-    same largest exponent, computed from a second trajectory that starts at a distance of 1e-7 from the motion and is moved back
-    to this distance after every period.
+    The result contains two checks. The sum of the exponents must equal the mean divergence, which
+    is computed from the impacts and from the times on each side; with several contacts or frictions
+    it is not known. And the stroboscopic map must have the same largest exponent, computed from a
+    second trajectory that starts at a distance of 1e-7 from the motion and is moved back to this
+    distance after every period.
 
     Parameters
     ----------
     system
-        What moves, under constant or harmonic loads. Under constant loads a unit of time is taken as the period.
+        What moves, under constant or harmonic loads. Under constant loads a unit of time is taken
+        as the period.
     velocity, coordinates
         The state at the start, at phase 0.
     periods
@@ -294,14 +403,18 @@ def lyapunov_spectrum(
     array([-0.05, -0.05])
     """
     check_run("lyapunov_spectrum", system, periods, transient, tol)
-    run, start = _Run(system, periods), dict[str, Any](coordinates, velocity=velocity)
+    run = _Run(system, periods)
+    start = dict[str, Any](coordinates, velocity=velocity)
     motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
-    run.state, run.note = arguments_of(system, motion.final_state), _lost(motion)
+    run.state = arguments_of(system, motion.final_state)
+    run.note = _lost(motion)
     share = 0.6 if two_trajectories else 1.0
     run.stretch_frames(tol, part_of(progress, 0.0, share))
     growth = np.full(LYAPUNOV.batches, np.nan)
     if two_trajectories and run.note is None:
-        growth = separation_growth(system, motion.final_state, periods, run.length, part_of(progress, share, 1.0))
+        growth = separation_growth(
+            system, motion.final_state, periods, run.length, part_of(progress, share, 1.0)
+        )
     progress(1.0, "exponents")
     return run.exponents(growth)
 
@@ -310,7 +423,8 @@ class _Run:
     """A run: the logarithms of the stretches and of the determinant of every period."""
 
     def __init__(self, system: System, periods: int) -> None:
-        self.system, self.length = system, period_length(system)
+        self.system = system
+        self.length = period_length(system)
         self.stretch = np.full((periods, system.dimension - len(system.model.first_order)), np.nan)
         self.areas = np.full(periods, np.nan)
         self.condition = 1.0
@@ -319,9 +433,12 @@ class _Run:
 
     def stretch_frames(self, tol: float, progress: Progress) -> None:
         """Follow the motion period after period, as long as it has derivatives."""
-        contraction, frame, begin = Contraction(self.system), first_frame(self.stretch.shape[1]), self.state
+        contraction = Contraction(self.system)
+        frame = first_frame(self.stretch.shape[1])
+        begin = self.state
         for p in range(len(self.areas) if self.note is None else 0):
-            self.stretch[p], self.areas[p] = 0.0, 0.0
+            self.stretch[p] = 0.0
+            self.areas[p] = 0.0
             for j in range(span_count(self.length)):
                 frame = self._advance(p, j, frame, contraction, tol)
                 if self.note is not None:
@@ -329,24 +446,33 @@ class _Run:
                     return
             progress((p + 1) / len(self.areas), "derivatives")
 
-    def _advance(self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float) -> np.ndarray:
+    def _advance(
+        self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float
+    ) -> np.ndarray:
         """Go on over span j of period p; returns the frame at its end, orthonormal again."""
         span = self.length / span_count(self.length)
-        found = sensitivities(self.system, **self.state, time=j * span, duration=span, tol=tol, dense=False)
+        found = sensitivities(
+            self.system, **self.state, time=j * span, duration=span, tol=tol, dense=False
+        )
         self.note = _lost(found.motion) or found.undefined
         if self.note is not None:
             self.stretch[:] = np.nan
             return frame
-        count = len(frame)  # behind them are the velocities of coordinates of first order, which follow from the rest
+        # behind them are the velocities of coordinates of first order, which follow from the rest
+        count = len(frame)
         derivatives = found.state[:count, :count]
         if not derivatives.any():
-            self.note = "the motion rests at contact, and so do all beside it: nothing is left of where they began"
+            self.note = (
+                "the motion rests at contact, and so do all beside it: nothing is left "
+                "of where they began"
+            )
             self.stretch[:] = -np.inf
             return frame
         frame, upper = np.linalg.qr(derivatives @ frame)
         with np.errstate(divide="ignore"):
             lengths = np.abs(np.diag(upper))
-            if self.system.model.holds_coordinates:  # lengths in directions held by contacts and frictions are 0, up to rounding
+            # lengths in directions held by contacts and frictions are 0, up to rounding
+            if self.system.model.holds_coordinates:
                 lengths[lengths < LYAPUNOV.rounding * lengths.max()] = 0.0
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
@@ -355,7 +481,9 @@ class _Run:
         return np.asarray(frame)
 
     def exponents(self, growth: np.ndarray) -> Exponents:
-        """The averages over the run, and over the growth of the distance of two trajectories in each period."""
+        """The averages over the run, and over the growth of the distance of two trajectories in
+        each period.
+        """
         found = Estimate.of(self.stretch / self.length)
         return Exponents(
             values=found.value,
@@ -376,7 +504,12 @@ class _Run:
 def _lost(motion: Motion) -> str | None:
     """Why a motion has no finite exponents; None if it has."""
     if motion.stop is Stop.LIMIT:
-        return f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0"
+        return (
+            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0"
+        )
     if not motion.phase_known:
-        return "impacts that lose nothing became too small to be followed, and the phase of the motion is lost"
+        return (
+            "impacts that lose nothing became too small to be followed, and the phase of the "
+            "motion is lost"
+        )
     return None

@@ -1,26 +1,33 @@
-"""Which contacts at rest stay closed, and contacts that close, one alone or several at one instant, as in cells that move alike.
+"""Which contacts at rest stay closed, and contacts that close, one alone or several at one instant,
+as in cells that move alike.
 
-Contacts whose coordinates neither the mass matrix nor E couples belong to different blocks. They do not act on one another at an
-impact, since no impulse of one changes the rate of another's gap, and their impacts are applied one after the other. In a
-neighbouring motion these impacts happen at different instants, shifted by t_1 and t_2. Let f be the time derivative of the state
-(f_0 before the impacts, f_1 and f_2 after one of them alone, f_12 after both), and R_1, R_2 the derivatives of the impact maps.
-At a fixed time the columns x of the tangent then become
+Contacts whose coordinates neither the mass matrix nor E couples belong to different blocks. They do
+not act on one another at an impact, since no impulse of one changes the rate of another's gap, and
+their impacts are applied one after the other. In a neighbouring motion these impacts happen at
+different instants, shifted by t_1 and t_2. Let f be the time derivative of the state (f_0 before
+the impacts, f_1 and f_2 after one of them alone, f_12 after both), and R_1, R_2 the derivatives of
+the impact maps. At a fixed time the columns x of the tangent then become
 
     R_2 (R_1 (x + f_0 t_1) + f_1 (t_2 - t_1)) - f_12 t_2,
 
-which is linear in x. It is the derivative if the other order of impacts gives the same result, that is, if
+which is linear in x. It is the derivative if the other order of impacts gives the same result, that
+is, if
 
     (R_2 f_1 + R_1 f_2 - R_2 R_1 f_0 - f_12) (t_2 - t_1) = 0.
 
-Otherwise there are only one-sided derivatives. Both orders are therefore tried. With springs between cells, whose forces do not
-jump, they agree. With a damper between them they differ: the impact of one mass changes the damper's force on the other mass, and
-the other mass's own impact reverses the effect of this force only if it comes later (no difference remains with e = 0, where the
-impact leaves no speed). Contacts of one block that close together have a derivative along columns that keep them together.
+Otherwise there are only one-sided derivatives. Both orders are therefore tried. With springs
+between cells, whose forces do not jump, they agree. With a damper between them they differ: the
+impact of one mass changes the damper's force on the other mass, and the other mass's own impact
+reverses the effect of this force only if it comes later (no difference remains with e = 0, where
+the impact leaves no speed). Contacts of one block that close together have a derivative along
+columns that keep them together.
 
-Accumulations of impacts in several blocks that end at one instant are also treated one after the other. Their order makes no
-difference, as no speed is left. At a release nothing jumps, however many contacts open.
+Accumulations of impacts in several blocks that end at one instant are also treated one after the
+other. Their order makes no difference, as no speed is left. At a release nothing jumps, however
+many contacts open.
 
-Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
+`flow/kernel/memory.py`.
 """
 
 from __future__ import annotations
@@ -30,7 +37,13 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import exchanged, fill_rubbing, is_pressed
-from saltus.flow.contacts.frictions import ALIKE, choose_slides, hold_frictions, rubs_along, slides_so
+from saltus.flow.contacts.frictions import (
+    ALIKE,
+    choose_slides,
+    hold_frictions,
+    rubs_along,
+    slides_so,
+)
 from saltus.flow.contacts.impacts import (
     apply_impulses,
     bring_to_rest,
@@ -74,14 +87,17 @@ from saltus.flow.kernel.roots import leading
 from saltus.flow.kernel.steps import expand, forget
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
 def violated(motion, candidates, zero):
-    """The candidates of which the first Taylor coefficient of the guard above `zero` contradicts the choice of closed contacts,
-    as bits; notes how many coefficients before it are 0."""
-    order, g, count, wrong = motion.order, motion.gap_series, motion.contacts.shape[0], 0
+    """The candidates of which the first Taylor coefficient of the guard above `zero` contradicts
+    the choice of closed contacts, as bits; notes how many coefficients before it are 0."""
+    order = motion.order
+    g = motion.gap_series
+    count = motion.contacts.shape[0]
+    wrong = 0
     for i in range(count):
         if not candidates >> i & 1:
             continue
@@ -103,12 +119,16 @@ def violated(motion, candidates, zero):
 
 @lean_jit
 def exchange_closed(motion, candidates, still, t, zero):
-    """As `choose_closed`, where there are too many contacts for trying all choices: by exchanges (`complementarity.py`)."""
+    """As `choose_closed`, where there are too many contacts for trying all choices: by exchanges
+    (`complementarity.py`).
+    """
     count = motion.contacts.shape[0]
     for number in range(3 ** motion.frictions.shape[0]):
         if not choose_slides(motion, still, number):
             continue
-        closed, wrong, least = candidates, candidates, count + 1
+        closed = candidates
+        wrong = candidates
+        least = count + 1
         for _ in range(count * count):
             for i in range(count):
                 if candidates >> i & 1:
@@ -127,11 +147,12 @@ def exchange_closed(motion, candidates, still, t, zero):
 
 @lean_jit
 def choose_closed(motion, candidates, still, t, zero):
-    """Decide which of the candidates, which are at rest at their positions, stay closed; False if no choice is consistent.
+    """Decide which of the candidates, which are at rest at their positions, stay closed; False if
+    no choice is consistent.
 
-    The choice fulfils 0 <= reaction _|_ second derivative of the gap >= 0; where both are 0, their first non-zero derivatives
-    decide likewise. It is decided together which of the frictions in `still`, which have the speed of their ground, stick: all
-    that can.
+    The choice fulfils 0 <= reaction _|_ second derivative of the gap >= 0; where both are 0, their
+    first non-zero derivatives decide likewise. It is decided together which of the frictions in
+    `still`, which have the speed of their ground, stick: all that can.
     """
     count = motion.contacts.shape[0]
     if count > MOST_TRIED:
@@ -156,9 +177,11 @@ def choose_closed(motion, candidates, still, t, zero):
 
 @lean_jit
 def note_ties(motion, candidates, t):
-    """Note for all candidates whose reaction is 0 within rounding that it is known to be 0, as for a contact that is released.
+    """Note for all candidates whose reaction is 0 within rounding that it is known to be 0, as for
+    a contact that is released.
 
-    Cells of a chain that move alike release their contacts at one instant, but with different rounding errors.
+    Cells of a chain that move alike release their contacts at one instant, but with different
+    rounding errors.
     """
     for i in range(motion.contacts.shape[0]):
         if candidates >> i & 1:
@@ -181,10 +204,14 @@ def is_there(motion, place):
 
 @jit
 def block_of(motion, hit, backwards):
-    """The block of the first contact in `hit`, or of the last: the contacts that the mass matrix or E couples with it, as
-    bits."""
-    local, count = motion.local, motion.contacts.shape[0]
-    joined, start, grows, block = np.zeros(local, np.bool_), 0, True, 0
+    """The block of the first contact in `hit`, or of the last: the contacts that the mass matrix or
+    E couples with it, as bits."""
+    local = motion.local
+    count = motion.contacts.shape[0]
+    joined = np.zeros(local, np.bool_)
+    start = 0
+    grows = True
+    block = 0
     fill_contact_matrices(motion)
     while not hit >> start & 1 or (backwards and start < count - 1 and hit >> start + 1):
         start += 1
@@ -195,16 +222,23 @@ def block_of(motion, hit, backwards):
         grows = False
         for a in range(local):
             for b in range(local):
-                if joined[a] and not joined[b] and (is_there(motion, local * a + b) or is_there(motion, local * b + a)):
+                if (
+                    joined[a]
+                    and not joined[b]
+                    and (is_there(motion, local * a + b) or is_there(motion, local * b + a))
+                ):
                     joined[b] = grows = True
         for i in range(count):
             for k in range(count):
-                a, b = motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]
+                a = motion.contacts[i, ContactColumn.COORDINATE]
+                b = motion.contacts[k, ContactColumn.COORDINATE]
                 if joined[a] != joined[b] and is_there(motion, local * local + count * i + k):
                     joined[a] = joined[b] = grows = True
         for k in range(motion.frictions.shape[0]):
             if motion.frictions[k, FrictionColumn.PRESSED] > 0:
-                a = motion.contacts[motion.frictions[k, FrictionColumn.PRESSED] - 1, ContactColumn.COORDINATE]
+                a = motion.contacts[
+                    motion.frictions[k, FrictionColumn.PRESSED] - 1, ContactColumn.COORDINATE
+                ]
                 b = motion.frictions[k, FrictionColumn.COORDINATE]
                 if joined[a] != joined[b]:
                     joined[a] = joined[b] = grows = True
@@ -215,19 +249,26 @@ def block_of(motion, hit, backwards):
 
 @lean_jit
 def impact_of(motion, t, hit):
-    """Apply the impact law to the contacts in `hit` and to those that are closed; an `ImpactDetail`, or -1 if it fails."""
-    count, detail = motion.contacts.shape[0], int(ImpactDetail.REGULAR)
-    regular, chosen = fill_contact_matrices(motion), hit
+    """Apply the impact law to the contacts in `hit` and to those that are closed; an
+    `ImpactDetail`, or -1 if it fails.
+    """
+    count = motion.contacts.shape[0]
+    detail = int(ImpactDetail.REGULAR)
+    regular = fill_contact_matrices(motion)
+    chosen = hit
     for i in range(count):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
     if motion.columns > 0:
         detail = int(closing_columns(motion, t, hit))
         note_velocities(motion, 0.0)
-    for i in range(count):  # a contact that is reached without a speed, to within the working precision
+    # a contact that is reached without a speed, to within the working precision
+    for i in range(count):
         if hit >> i & 1:
             motion.rates[i] = min(motion.rates[i], 0.0)
         motion.gaps[i] = motion.rates[i]
-    rubs, solved, acts = is_pressed(motion), True, 0
+    rubs = is_pressed(motion)
+    solved = True
+    acts = 0
     if not rubs:
         solved, acts = impact_impulses(motion, chosen, motion.rates)
     if not (regular and solved):
@@ -253,8 +294,8 @@ def impact_of(motion, t, hit):
 
 @lean_jit
 def rates_between(motion, t, hit):
-    """Fill the accelerations between two impacts in a row, after that of `hit`; returns the closed contacts that open, as
-    bits."""
+    """Fill the accelerations between two impacts in a row, after that of `hit`; returns the closed
+    contacts that open, as bits."""
     candidates = closed_bits(motion)
     if candidates & hit and not choose_closed(motion, candidates, 0, t, ZERO):
         for i in range(motion.contacts.shape[0]):
@@ -267,19 +308,26 @@ def rates_between(motion, t, hit):
 
 @lean_jit
 def is_apart(one, other):
-    """Whether two shifts differ by more than rounding, so that the events are not at one instant in neighbouring motions."""
+    """Whether two shifts differ by more than rounding, so that the events are not at one instant in
+    neighbouring motions.
+    """
     return not abs(one - other) <= APART * (abs(one) + abs(other))
 
 
 @jit
 def impacts_in_a_row(motion, t, hit, backwards):
-    """The impacts of contacts that close at one instant, block by block; an `ImpactDetail`, or -1 if one of them fails.
+    """The impacts of contacts that close at one instant, block by block; an `ImpactDetail`, or -1
+    if one of them fails.
 
-    `IMPULSES` then holds the impulses of all, and `EVENT_SHIFTS` the shift of the event, nan for columns along which the blocks'
-    instants differ. The columns are those at the last impact, with the accelerations after it.
+    `IMPULSES` then holds the impulses of all, and `EVENT_SHIFTS` the shift of the event, nan for
+    columns along which the blocks' instants differ. The columns are those at the last impact, with
+    the accelerations after it.
     """
-    total, opened = np.zeros(motion.contacts.shape[0]), 0
-    found, begun, together = int(ImpactDetail.REGULAR), False, motion.event_shifts
+    total = np.zeros(motion.contacts.shape[0])
+    opened = 0
+    found = int(ImpactDetail.REGULAR)
+    begun = False
+    together = motion.event_shifts
     while hit:
         block = hit & block_of(motion, hit, backwards) if hit & (hit - 1) else hit
         hit &= ~block
@@ -305,26 +353,44 @@ def impacts_in_a_row(motion, t, hit, backwards):
 
 @lean_jit
 def compare_orders(motion, other):
-    """Set the shifts of columns to nan that, taken back to a fixed time, differ from those of the other order of impacts; returns
-    whether there is any such column."""
-    own, dof, a, differs = motion.own, motion.dof, motion.acceleration_series, False
+    """Set the shifts of columns to nan that, taken back to a fixed time, differ from those of the
+    other order of impacts; returns whether there is any such column."""
+    own = motion.own
+    dof = motion.dof
+    a = motion.acceleration_series
+    differs = False
     for j in range(motion.columns):
-        u, shift, size, apart = own * (1 + j), motion.shifts[j], 0.0, 0.0
+        u = own * (1 + j)
+        shift = motion.shifts[j]
+        size = 0.0
+        apart = 0.0
         for i in range(own):
             v = motion.velocities[i]
-            size = max(size, abs(motion.coordinates[u + i]), abs(motion.velocities[u + i]), abs(shift * v), abs(shift * a[i, 0]))
+            size = max(
+                size,
+                abs(motion.coordinates[u + i]),
+                abs(motion.velocities[u + i]),
+                abs(shift * v),
+                abs(shift * a[i, 0]),
+            )
             apart = max(apart, abs(motion.coordinates[u + i] - shift * v - other[u + i]))
             if i < own - motion.first_order:  # the velocities of the others follow from the state
-                apart = max(apart, abs(motion.velocities[u + i] - shift * a[i, 0] - other[u + dof + i]))
+                apart = max(
+                    apart, abs(motion.velocities[u + i] - shift * a[i, 0] - other[u + dof + i])
+                )
         if apart > APART * size:
-            motion.shifts[j], differs = math.nan, True
+            motion.shifts[j] = math.nan
+            differs = True
     return differs
 
 
 @jit
 def impacts_in_any_order(motion, t, hit):
-    """As `impacts_in_a_row`, in both orders; columns are nan where the order of the blocks makes a difference."""
-    start, rows = motion.state.copy(), motion.contacts.copy()
+    """As `impacts_in_a_row`, in both orders; columns are nan where the order of the blocks makes a
+    difference.
+    """
+    start = motion.state.copy()
+    rows = motion.contacts.copy()
     impacts_in_a_row(motion, t, hit, True)
     rates_between(motion, t, hit)
     move_columns(motion, -1.0)
@@ -344,7 +410,9 @@ def impacts_in_any_order(motion, t, hit):
 
 @jit
 def contact_impact(motion, t, hit):
-    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just closed. PAUSED, or NO_IMPACT."""
+    """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just
+    closed. PAUSED, or NO_IMPACT.
+    """
     record_contact_event(motion, EventCode.IMPACT, hit, t)
     if hit & (hit - 1) and motion.columns > 0:
         detail = impacts_in_any_order(motion, t, hit)
@@ -364,8 +432,11 @@ def contact_impact(motion, t, hit):
 
 @jit
 def rests_in_a_row(motion, t, near):
-    """Bring the contacts in `near`, whose impacts accumulate, to rest: each block at the instant of its own last impact."""
-    total, jumped = np.zeros(motion.contacts.shape[0]), 0
+    """Bring the contacts in `near`, whose impacts accumulate, to rest: each block at the instant of
+    its own last impact.
+    """
+    total = np.zeros(motion.contacts.shape[0])
+    jumped = 0
     for i in range(motion.contacts.shape[0]):
         jumped |= 1 << i if near >> i & 1 and motion.gaps[i] == 0.0 and motion.rates[i] > 0.0 else 0
     several = jumped & (jumped - 1) != 0

@@ -1,9 +1,10 @@
-"""Linear complementarity problems of contacts: of a few solved by trying all sets of acting contacts, of many by exchanges; and
-impulses of frictions.
+"""Linear complementarity problems of contacts: of a few solved by trying all sets of acting
+contacts, of many by exchanges; and impulses of frictions.
 
-An exchange adds the rows of which the inequality is violated to those that act, or takes them away. All of them are exchanged as
-long as fewer and fewer are violated, and else the first one alone. With the first one alone the method ends at the only solution
-of a problem with a positive definite matrix (Murty 1974).
+An exchange adds the rows of which the inequality is violated to those that act, or takes them away.
+All of them are exchanged as long as fewer and fewer are violated, and else the first one alone.
+With the first one alone the method ends at the only solution of a problem with a positive definite
+matrix (Murty 1974).
 
 Its compiled part goes into one module with that of `kernel.py`.
 """
@@ -24,12 +25,14 @@ from saltus.flow.contacts.layout import (
 )
 from saltus.taylor import lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
 def eliminate(block, size, columns):
-    """Solve a linear system in place: the rows of `block` hold its matrix and its right-hand sides; False if it is singular."""
+    """Solve a linear system in place: the rows of `block` hold its matrix and its right-hand sides;
+    False if it is singular.
+    """
     for k in range(size):
         pivot = k
         for i in range(k + 1, size):
@@ -53,9 +56,10 @@ def eliminate(block, size, columns):
 def invert(numbers, size, first_order, block, inverse):
     """The inverse of a mass matrix that is given by its rows; False if it is singular.
 
-    The last rows, of coordinates of first order, have minus the coefficients g of dependent sums (`InGapCoordinates`). In place
-    of the inverse there are g M^-1, its transpose, and g M^-1 g', so that a force along a sum acts by the same entries as others;
-    they are 0 for coordinates that are no sums.
+    The last rows, of coordinates of first order, have minus the coefficients g of dependent sums
+    (`InGapCoordinates`). In place of the inverse there are g M^-1, its transpose, and g M^-1 g', so
+    that a force along a sum acts by the same entries as others; they are 0 for coordinates that are
+    no sums.
     """
     for i in range(size):
         for j in range(size):
@@ -75,7 +79,9 @@ def invert(numbers, size, first_order, block, inverse):
 
 @lean_jit
 def acting(matrix, right, size, bits, block, z):
-    """Find z such that right + matrix z = 0 in the rows in `bits`, with z = 0 in the other rows; False if there is none."""
+    """Find z such that right + matrix z = 0 in the rows in `bits`, with z = 0 in the other rows;
+    False if there is none.
+    """
     count = 0
     for i in range(size):
         z[i] = 0.0
@@ -100,7 +106,8 @@ def acting(matrix, right, size, bits, block, z):
 @lean_jit
 def exchanged(bits, wrong, least):
     """The bits after an exchange of those in `wrong`, and how few of them there have been."""
-    count, left = 0, wrong
+    count = 0
+    left = wrong
     while left:
         left &= left - 1
         count += 1
@@ -109,8 +116,11 @@ def exchanged(bits, wrong, least):
 
 @lean_jit
 def by_exchange(matrix, right, size, rounding, block, z):
-    """As `complementary`, by exchanges: whether a solution is found, and the bits of the rows that act."""
-    bits, least = 0, size + 1
+    """As `complementary`, by exchanges: whether a solution is found, and the bits of the rows that
+    act.
+    """
+    bits = 0
+    least = size + 1
     for _ in range(size * size):
         if not acting(matrix, right, size, bits, block, z):
             return False, 0
@@ -130,12 +140,15 @@ def by_exchange(matrix, right, size, rounding, block, z):
 
 @lean_jit
 def complementary(matrix, right, size, block, tried, z):
-    """Find z with 0 <= z _|_ right + matrix z >= 0; returns whether there is one, and the bits of the rows that act (z > 0).
+    """Find z with 0 <= z _|_ right + matrix z >= 0; returns whether there is one, and the bits of
+    the rows that act (z > 0).
 
-    The first set of acting rows that violates no inequality is taken; if all violate some, the set with the smallest violation,
-    as long as that may be rounding.
+    The first set of acting rows that violates no inequality is taken; if all violate some, the set
+    with the smallest violation, as long as that may be rounding.
     """
-    found, least, scale = 0, np.inf, 0.0
+    found = 0
+    least = np.inf
+    scale = 0.0
     for i in range(size):
         scale = max(scale, abs(right[i]))
     if size > MOST_TRIED:
@@ -153,7 +166,8 @@ def complementary(matrix, right, size, block, tried, z):
                     left += matrix[i, j] * tried[j]
                 worst = max(worst, -left)
         if worst < least:
-            found, least = bits, worst
+            found = bits
+            least = worst
             for i in range(size):
                 z[i] = tried[i]
         if worst <= 0.0:
@@ -161,7 +175,7 @@ def complementary(matrix, right, size, block, tried, z):
     return least <= VIOLATED * scale, found
 
 
-# --- impacts with friction -------------------------------------------------------------------------------------------------
+# --- impacts with friction ---------------------------------------------------
 
 
 @lean_jit
@@ -184,15 +198,22 @@ def rub_of(motion, i):
 
 @lean_jit
 def slip_sign(motion, k):
-    """The direction in which a friction slides after the impact, +1 or -1; 0 if it has no impulse or sticks."""
+    """The direction in which a friction slides after the impact, +1 or -1; 0 if it has no impulse
+    or sticks.
+    """
     way = motion.frictions[k, FrictionColumn.STRUCK]
-    return 1.0 if way == FrictionImpact.FORWARDS else -1.0 if way == FrictionImpact.BACKWARDS else 0.0
+    return (
+        1.0 if way == FrictionImpact.FORWARDS else -1.0 if way == FrictionImpact.BACKWARDS else 0.0
+    )
 
 
 @lean_jit
 def push(motion, a, i):
-    """The velocity that an impulse 1 of a contact, with that of its friction if this slides, gives to coordinate a."""
-    gain, k = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i], rub_of(motion, i)
+    """The velocity that an impulse 1 of a contact, with that of its friction if this slides, gives
+    to coordinate a.
+    """
+    gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
+    k = rub_of(motion, i)
     if k >= 0:
         slips = slip_sign(motion, k) * rub_coefficient(motion, k)
         gain -= slips * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
@@ -201,15 +222,20 @@ def push(motion, a, i):
 
 @lean_jit
 def fill_rubbing(motion):
-    """Let impulses of frictions in contacts act along with those of the contacts in `INVERSE` and `COUPLING`: they slide on in
-    their directions, or go on having the speed of the ground."""
-    local, inverse = motion.local, motion.inverse
+    """Let impulses of frictions in contacts act along with those of the contacts in `INVERSE` and
+    `COUPLING`: they slide on in their directions, or go on having the speed of the ground."""
+    local = motion.local
+    inverse = motion.inverse
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.PRESSED] > 0:
             c = motion.frictions[k, FrictionColumn.COORDINATE]
             rate = motion.velocities[c] - ground_speed(motion, k)
             motion.frictions[k, FrictionColumn.STRUCK] = (
-                FrictionImpact.FORWARDS if rate > 0.0 else FrictionImpact.BACKWARDS if rate < 0.0 else FrictionImpact.STUCK
+                FrictionImpact.FORWARDS
+                if rate > 0.0
+                else FrictionImpact.BACKWARDS
+                if rate < 0.0
+                else FrictionImpact.STUCK
             )
             own_inverse = inverse[c, c]
             for a in range(local if rate == 0.0 else 0):
@@ -221,17 +247,22 @@ def fill_rubbing(motion):
                 inverse[c, b] = 0.0
     for i in range(motion.contacts.shape[0]):
         for j in range(motion.contacts.shape[0]):
-            motion.coupling[i, j] = motion.signs[i] * push(motion, motion.contacts[i, ContactColumn.COORDINATE], j)
+            motion.coupling[i, j] = motion.signs[i] * push(
+                motion, motion.contacts[i, ContactColumn.COORDINATE], j
+            )
 
 
 @lean_jit
 def slides_on(motion, near):
-    """Whether the frictions in the contacts in `near` will not change what they do while these contacts lose their speeds.
+    """Whether the frictions in the contacts in `near` will not change what they do while these
+    contacts lose their speeds.
 
-    If so they are let act along with them (`fill_rubbing`). A contact with the speed u and the restitution e has impulses of
-    (1 + e) / (1 - e) u times its mass until it rests; where these are within the tolerance it does not matter what they do.
+    If so they are let act along with them (`fill_rubbing`). A contact with the speed u and the
+    restitution e has impulses of (1 + e) / (1 - e) u times its mass until it rests; where these are
+    within the tolerance it does not matter what they do.
     """
-    speed, on = 0.0, True
+    speed = 0.0
+    on = True
     for i in range(motion.contacts.shape[0]):
         if near >> i & 1:
             e = restitution(motion, i, i)
@@ -239,8 +270,10 @@ def slides_on(motion, near):
     for k in range(motion.frictions.shape[0]):
         i = motion.frictions[k, FrictionColumn.PRESSED] - 1
         if i >= 0 and near >> i & 1:
-            c, mu = motion.frictions[k, FrictionColumn.COORDINATE], rub_coefficient(motion, k)
-            rate, across = abs(motion.velocities[c] - ground_speed(motion, k)), motion.contacts[i, ContactColumn.COORDINATE]
+            c = motion.frictions[k, FrictionColumn.COORDINATE]
+            mu = rub_coefficient(motion, k)
+            rate = abs(motion.velocities[c] - ground_speed(motion, k))
+            across = motion.contacts[i, ContactColumn.COORDINATE]
             if rate == 0.0:
                 on = on and abs(motion.inverse[c, across]) <= mu * motion.inverse[c, c]
             else:
@@ -253,10 +286,15 @@ def slides_on(motion, near):
 
 @lean_jit
 def choose_ways(motion, chosen, acts, number):
-    """Let each friction that has an impulse at an impact stick or slide, by the base-3 digits of `number`; False if another
-    one has a digit other than 0. `impulses` are those that the contacts have besides those of the contacts in `acts`."""
+    """Let each friction that has an impulse at an impact stick or slide, by the base-3 digits of
+    `number`; False if another one has a digit other than 0. `impulses` are those that the contacts
+    have besides those of the contacts in `acts`."""
     for k in range(motion.frictions.shape[0]):
-        digit, number, contact = number % 3, number // 3, motion.frictions[k, FrictionColumn.PRESSED] - 1
+        digit, number, contact = (
+            number % 3,
+            number // 3,
+            motion.frictions[k, FrictionColumn.PRESSED] - 1,
+        )
         pushed = contact >= 0 and chosen >> contact & 1
         if pushed and (acts >> contact & 1 or motion.impulses[contact] > 0.0):
             motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.STUCK + digit
@@ -269,9 +307,10 @@ def choose_ways(motion, chosen, acts, number):
 
 @lean_jit
 def fill_sticking(motion, row, a, acts, last):
-    """Fill a row of `block` with what the impulses of the contacts in `acts`, then those of sticking frictions, give to
-    coordinate a; behind them comes `last`."""
-    column, block = 0, motion.block
+    """Fill a row of `block` with what the impulses of the contacts in `acts`, then those of
+    sticking frictions, give to coordinate a; behind them comes `last`."""
+    column = 0
+    block = motion.block
     for j in range(motion.contacts.shape[0]):
         if acts >> j & 1:
             block[row, column] = push(motion, a, j)
@@ -285,7 +324,9 @@ def fill_sticking(motion, row, a, acts, last):
 
 @lean_jit
 def unknown_impulses(motion, acts):
-    """The number of impulses that are solved for: those of contacts in `acts` and of sticking frictions."""
+    """The number of impulses that are solved for: those of contacts in `acts` and of sticking
+    frictions.
+    """
     size = 0
     for i in range(motion.contacts.shape[0]):
         size += acts >> i & 1
@@ -296,15 +337,20 @@ def unknown_impulses(motion, acts):
 
 @lean_jit
 def struck_velocities(motion, acts, after):
-    """Solve for the impulses of the contacts in `acts` with the ways of frictions that are chosen; `after` then has the
-    velocities. False if there is no solution. The rates of these contacts become -`right`, and sticking coordinates have the
-    speeds of their grounds.
+    """Solve for the impulses of the contacts in `acts` with the ways of frictions that are chosen;
+    `after` then has the velocities. False if there is no solution. The rates of these contacts
+    become -`right`, and sticking coordinates have the speeds of their grounds.
     """
-    local, count, row, size = motion.local, motion.contacts.shape[0], 0, unknown_impulses(motion, acts)
+    local = motion.local
+    count = motion.contacts.shape[0]
+    row = 0
+    size = unknown_impulses(motion, acts)
     for a in range(local):
         after[a] = motion.velocities[a]
         for j in range(count):
-            after[a] += push(motion, a, j) * motion.impulses[j] if motion.impulses[j] != 0.0 else 0.0
+            after[a] += (
+                push(motion, a, j) * motion.impulses[j] if motion.impulses[j] != 0.0 else 0.0
+            )
     for i in range(count):
         if acts >> i & 1:
             a = motion.contacts[i, ContactColumn.COORDINATE]
@@ -333,15 +379,21 @@ def add_unknown(motion, acts, after):
                 column += 1
         for k in range(motion.frictions.shape[0]):
             if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-                after[a] += motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]] * motion.block[column, size]
+                after[a] += (
+                    motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+                    * motion.block[column, size]
+                )
                 column += 1
 
 
 @lean_jit
 def worst_violation(motion, chosen, acts, after):
-    """By how much, as a speed, the solution in `block` violates the inequalities of an impact with friction; `tried` then has the
-    impulses of all contacts."""
-    worst, count, size, column = 0.0, motion.contacts.shape[0], unknown_impulses(motion, acts), 0
+    """By how much, as a speed, the solution in `block` violates the inequalities of an impact with
+    friction; `tried` then has the impulses of all contacts."""
+    worst = 0.0
+    count = motion.contacts.shape[0]
+    size = unknown_impulses(motion, acts)
+    column = 0
     for i in range(count):
         motion.tried[i] = motion.impulses[i]
         if acts >> i & 1:
@@ -349,11 +401,19 @@ def worst_violation(motion, chosen, acts, after):
             motion.tried[i] += motion.block[column, size]
             column += 1
         elif chosen >> i & 1:
-            worst = max(worst, -motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]] - motion.right[i])
+            worst = max(
+                worst,
+                -motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]]
+                - motion.right[i],
+            )
     for k in range(motion.frictions.shape[0]):
-        way, c = motion.frictions[k, FrictionColumn.STRUCK], motion.frictions[k, FrictionColumn.COORDINATE]
+        way = motion.frictions[k, FrictionColumn.STRUCK]
+        c = motion.frictions[k, FrictionColumn.COORDINATE]
         if way == FrictionImpact.STUCK:
-            most = rub_coefficient(motion, k) * motion.tried[motion.frictions[k, FrictionColumn.PRESSED] - 1]
+            most = (
+                rub_coefficient(motion, k)
+                * motion.tried[motion.frictions[k, FrictionColumn.PRESSED] - 1]
+            )
             worst = max(worst, (abs(motion.block[column, size]) - most) * motion.inverse[c, c])
             column += 1
         elif way != FrictionImpact.NOT:
@@ -363,6 +423,8 @@ def worst_violation(motion, chosen, acts, after):
 
 @lean_jit
 def tell_instant(motion):
-    """Tell the numbers of events, through `env`, the instant, which are functions of it where walls move."""
+    """Tell the numbers of events, through `env`, the instant, which are functions of it where walls
+    move.
+    """
     first = motion.parameters.size - motion.local - 2
     motion.parameters[first], motion.parameters[first + 1] = motion.time, motion.origin

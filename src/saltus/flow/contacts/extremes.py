@@ -1,4 +1,5 @@
-"""The extremes along a smooth segment of a motion with several contacts, in the places of `SegmentExtremes`.
+"""The extremes along a smooth segment of a motion with several contacts, in the places of
+`SegmentExtremes`.
 
 Its compiled part goes into one module with that of `segments.py`.
 """
@@ -8,41 +9,63 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contacts.impacts import gap_series
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentExtremes, SegmentPlan, contact_position
+from saltus.flow.contacts.layout import (
+    ContactColumn,
+    SegmentEnd,
+    SegmentExtremes,
+    SegmentPlan,
+    contact_position,
+)
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.roots import NOISE, horner, roots_within, scale_gap
 from saltus.taylor import lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-AT_REST = 1e-9  # the speed below which a contact opens from rest after an impact without restitution
+# the speed below which a contact opens from rest after an impact without restitution
+AT_REST = 1e-9
 HARDLY_OPEN = 1e-3  # a time in which a gap hardly opens
-ENDS = 1e-6  # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
+# share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
+ENDS = 1e-6
 
 
 @lean_jit
 def find_minimum(motion, c, t, h):
-    """Update `motion.least`, a least inner minimum and its time, with the minima of a series within a step."""
-    order, poly, roots, least = motion.order, motion.polynomial, motion.turns, motion.least
+    """Update `motion.least`, a least inner minimum and its time, with the minima of a series within
+    a step.
+    """
+    order = motion.order
+    poly = motion.polynomial
+    roots = motion.turns
+    least = motion.least
     size = abs(c[0])
     for k in range(1, order + 1):
         poly[k - 1] = k * c[k] * h**k
         size += abs(c[k] * h**k)
     for i in range(roots_within(poly, order - 1, roots, NOISE * size)):
-        turn, value = 0.0, horner(c, order, roots[i] * h)
+        turn = 0.0
+        value = horner(c, order, roots[i] * h)
         for k in range(order - 1, 0, -1):
             turn = turn * roots[i] + k * poly[k]
         if turn > 0.0 and value < least[0]:
-            least[0], least[1] = value, t + roots[i] * h
+            least[0] = value
+            least[1] = t + roots[i] * h
 
 
 @lean_jit
 def extremes_at_step(motion, t, h, begin, end, seen):
-    """Update the extremes with a step: extrema of the coordinates, inner minima of the guards, least values of the margins."""
-    order, own, count, poly = motion.order, motion.own, motion.contacts.shape[0], motion.polynomial
-    roots, least = motion.turns, motion.least
+    """Update the extremes with a step: extrema of the coordinates, inner minima of the guards,
+    least values of the margins.
+    """
+    order = motion.order
+    own = motion.own
+    count = motion.contacts.shape[0]
+    poly = motion.polynomial
+    roots = motion.turns
+    least = motion.least
     for a in range(own):
-        q, size = motion.coordinate_series[a], 0.0
+        q = motion.coordinate_series[a]
+        size = 0.0
         scale_gap(motion.velocity_series[a], 0, order, h, poly)
         for k in range(order + 1):
             size += abs(poly[k])
@@ -57,14 +80,22 @@ def extremes_at_step(motion, t, h, begin, end, seen):
             guard = motion.margin_series[i]
         else:
             gap_series(motion, i, contact_position(motion, i), order, guard)
-        least[0], least[1] = np.inf, 0.0
+        least[0] = np.inf
+        least[1] = 0.0
         find_minimum(motion, guard, t, h)
-        place = SegmentExtremes.FORCE if motion.contacts[i, ContactColumn.CLOSED] == 1 else SegmentExtremes.GAP
+        place = (
+            SegmentExtremes.FORCE
+            if motion.contacts[i, ContactColumn.CLOSED] == 1
+            else SegmentExtremes.GAP
+        )
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
         if inside and least[0] < seen[place]:
-            seen[place], seen[place + 1], seen[place + 2] = least[0], least[1], i
+            seen[place] = least[0]
+            seen[place + 1] = least[1]
+            seen[place + 2] = i
     for j in range(count, motion.margin_count):
-        place, m = SegmentExtremes.MARGINS + j - count, motion.margin_series[j]
+        place = SegmentExtremes.MARGINS + j - count
+        m = motion.margin_series[j]
         least[0] = min(m[0], horner(m, order, h))
         find_minimum(motion, m, t, h)
         seen[place] = min(seen[place], least[0])
@@ -72,60 +103,75 @@ def extremes_at_step(motion, t, h, begin, end, seen):
 
 @lean_jit
 def extremes_at_start(motion, hit, seen):
-    """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and of the acceleration with which
-    the contact `hit` opens, if it opens from rest."""
+    """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and
+    of the acceleration with which the contact `hit` opens, if it opens from rest."""
     for k in range(seen.size):
         seen[k] = np.inf
     seen[SegmentExtremes.TOP] = -np.inf
     for i in range(motion.contacts.shape[0]):
-        pull, coordinate = np.inf, motion.contacts[i, ContactColumn.COORDINATE]
+        pull = np.inf
+        coordinate = motion.contacts[i, ContactColumn.COORDINATE]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             pull = motion.margin_series[i, 0]
         elif i == hit and abs(motion.velocities[coordinate]) < AT_REST:
             pull = motion.signs[i] * motion.acceleration_series[coordinate, 0]
         if pull < seen[SegmentExtremes.PULL]:
-            seen[SegmentExtremes.PULL], seen[SegmentExtremes.PULL + 1] = pull, i
+            seen[SegmentExtremes.PULL] = pull
+            seen[SegmentExtremes.PULL + 1] = i
 
 
 @lean_jit
 def extremes_at_section(motion, t, seen):
-    """Update the extremes with the guards at the start of a segment without event there: a minimum may lie just at its start."""
+    """Update the extremes with the guards at the start of a segment without event there: a minimum
+    may lie just at its start.
+    """
     count = motion.contacts.shape[0]
     for i in range(count):
-        closed, x = (
-            motion.contacts[i, ContactColumn.CLOSED] == 1,
-            motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]],
-        )
+        closed = motion.contacts[i, ContactColumn.CLOSED] == 1
+        x = motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]]
         gap = motion.signs[i] * (x - contact_position(motion, i))
-        value, place = motion.margin_series[i, 0] if closed else gap, SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
+        value = motion.margin_series[i, 0] if closed else gap
+        place = SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
         if value < seen[place]:
-            seen[place], seen[place + 1], seen[place + 2] = value, t, i
+            seen[place] = value
+            seen[place + 1] = t
+            seen[place + 2] = i
 
 
 @lean_jit
 def extremes_at_end(motion, released, seen):
-    """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one that is released there."""
+    """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one
+    that is released there.
+    """
     for i in range(motion.contacts.shape[0]):
         reaction = motion.margin_series[i, 0]
-        if motion.contacts[i, ContactColumn.CLOSED] == 1 and i != released and reaction < seen[SegmentExtremes.TAIL]:
-            seen[SegmentExtremes.TAIL], seen[SegmentExtremes.TAIL + 1] = reaction, i
+        if (
+            motion.contacts[i, ContactColumn.CLOSED] == 1
+            and i != released
+            and reaction < seen[SegmentExtremes.TAIL]
+        ):
+            seen[SegmentExtremes.TAIL] = reaction
+            seen[SegmentExtremes.TAIL + 1] = i
 
 
 @lean_jit
 def gap_beside(motion, plan, s, duration, ends, seen):
-    """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of another contact whose speed the
-    impact changes.
+    """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of
+    another contact whose speed the impact changes.
 
-    Such a gap may have its minimum at the impact, which no smooth segment shows. A gap that has opened at the start of the
-    segment is divided by the power of the duration with which it grows; very short segments are skipped, where only rounding
-    would be left.
+    Such a gap may have its minimum at the impact, which no smooth segment shows. A gap that has
+    opened at the start of the segment is divided by the power of the duration with which it grows;
+    very short segments are skipped, where only rounding would be left.
     """
-    own, count, hit = motion.own, motion.contacts.shape[0], plan[s, SegmentPlan.CONTACT]
+    own = motion.own
+    count = motion.contacts.shape[0]
+    hit = plan[s, SegmentPlan.CONTACT]
     released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE
     for i in range(count):
         if i == hit or plan[s, SegmentPlan.ALONG] >> i & 1 or motion.coupling[i, hit] == 0.0:
             continue
-        sign, place = motion.signs[i], SegmentEnd.NUMBERS + motion.contacts[i, ContactColumn.COORDINATE]
+        sign = motion.signs[i]
+        place = SegmentEnd.NUMBERS + motion.contacts[i, ContactColumn.COORDINATE]
         position = contact_position(motion, i)
         gap = sign * (ends[place + 4 * own] - position)
         if sign * (ends[place] - position) < AT_REST:

@@ -1,49 +1,60 @@
-"""Dry friction in the kernel for several contacts: a sticking coordinate is held like one at a closed contact, but its friction
-force is bounded on both sides.
+"""Dry friction in the kernel for several contacts: a sticking coordinate is held like one at a
+closed contact, but its friction force is bounded on both sides.
 
-The kernel's array of contacts has a row for each friction behind those of the contacts, in the columns of `FrictionColumn`;
-`frictions` are these rows. The guard of a friction that slides is the speed q' - w in its direction; a friction that sticks has
-two guards, its margins (`stick_margins`). A surface has a row behind those of the frictions: its guard is the distance of the
-coordinate from its position on its side, and when it is reached the side changes. Directions and sides are kept in the
-parameters of `env`, before the numbers that say which coordinates are free.
+The kernel's array of contacts has a row for each friction behind those of the contacts, in the
+columns of `FrictionColumn`; `frictions` are these rows. The guard of a friction that slides is the
+speed q' - w in its direction; a friction that sticks has two guards, its margins (`stick_margins`).
+A surface has a row behind those of the frictions: its guard is the distance of the coordinate from
+its position on its side, and when it is reached the side changes. Directions and sides are kept in
+the parameters of `env`, before the numbers that say which coordinates are free.
 
-Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
+`flow/kernel/memory.py`.
 """
 
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, ground_speed, is_sum
+from saltus.flow.contacts.layout import (
+    ContactColumn,
+    FrictionColumn,
+    NoMargin,
+    ground_speed,
+    is_sum,
+)
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
 from saltus.flow.kernel.steps import columns_at_event, expand, step_size
 from saltus.taylor import lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-# If mu_s = mu_k, the acceleration with which sliding begins is 0, that is, by rounding, smaller than this. So is a margin of a
-# friction that can only just stick when its speed becomes that of the ground. In both cases the next coefficients decide.
+# If mu_s = mu_k, the acceleration with which sliding begins is 0, that is, by rounding, smaller
+# than this. So is a margin of a friction that can only just stick when its speed becomes that of
+# the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
 
 
 @lean_jit
 def hold_frictions(motion):
-    """Tell the model's functions, through `env`, in which direction each friction slides, and that sticking coordinates are not
-    free."""
+    """Tell the model's functions, through `env`, in which direction each friction slides, and that
+    sticking coordinates are not free."""
     first = motion.parameters.size - motion.local
     for k in range(motion.frictions.shape[0]):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
-        motion.parameters[first - 2 - motion.frictions.shape[0] + k] = 1.0 * slides if slides != 2 else 0.0
+        motion.parameters[first - 2 - motion.frictions.shape[0] + k] = (
+            1.0 * slides if slides != 2 else 0.0
+        )
         if slides == 0:
             motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 
 
 @lean_jit
 def begin_on_surfaces(motion, t):
-    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if there is none, or if both sides
-    of one lead away from it."""
+    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if
+    there is none, or if both sides of one lead away from it."""
     for _ in range(2):
         hold_frictions(motion)
         agrees = True
@@ -52,7 +63,9 @@ def begin_on_surfaces(motion, t):
             if row[FrictionColumn.MARGIN] != NoMargin.SURFACE:
                 continue
             expand(motion, t, 1.0, motion.order)
-            sliding_series(motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series)
+            sliding_series(
+                motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series
+            )
             i = leading(motion.gap_series, 0, motion.order)
             row[FrictionColumn.SKIP] = i
             if i > 0 and i < motion.order and motion.gap_series[i] < 0.0:
@@ -65,15 +78,22 @@ def begin_on_surfaces(motion, t):
 
 @lean_jit
 def leads_one_way(motion, t):
-    """Whether a motion that starts at rest on surfaces would move on to none but the sides that were chosen."""
+    """Whether a motion that starts at rest on surfaces would move on to none but the sides that
+    were chosen.
+    """
     one_way = True
     for k in range(motion.frictions.shape[0]):
         row = motion.frictions[k]
-        if row[FrictionColumn.MARGIN] == NoMargin.SURFACE and 1 < row[FrictionColumn.SKIP] < motion.order:
+        if (
+            row[FrictionColumn.MARGIN] == NoMargin.SURFACE
+            and 1 < row[FrictionColumn.SKIP] < motion.order
+        ):
             row[FrictionColumn.SLIDES] *= -1
             hold_frictions(motion)
             expand(motion, t, 1.0, motion.order)
-            sliding_series(motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series)
+            sliding_series(
+                motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series
+            )
             i = leading(motion.gap_series, 0, motion.order)
             one_way = one_way and not (i < motion.order and motion.gap_series[i] > 0.0)
             row[FrictionColumn.SLIDES] *= -1
@@ -83,8 +103,8 @@ def leads_one_way(motion, t):
 
 @lean_jit
 def slide_bits(motion, count):
-    """The direction of each friction plus 1 (0, 1 or 2; 3 of an open contact), in two bits each, behind the bits of `count`
-    contacts."""
+    """The direction of each friction plus 1 (0, 1 or 2; 3 of an open contact), in two bits each,
+    behind the bits of `count` contacts."""
     bits = 0
     for k in range(motion.frictions.shape[0]):
         bits |= (1 + motion.frictions[k, FrictionColumn.SLIDES]) << (count + 2 * k)
@@ -93,7 +113,9 @@ def slide_bits(motion, count):
 
 @lean_jit
 def sliding_series(motion, k, direction, order, g):
-    """The Taylor coefficients of a friction's sliding speed along a direction, or of the distance from a surface on a side."""
+    """The Taylor coefficients of a friction's sliding speed along a direction, or of the distance
+    from a surface on a side.
+    """
     v = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
     if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
         v = motion.coordinate_series[motion.frictions[k, FrictionColumn.COORDINATE]]
@@ -104,7 +126,9 @@ def sliding_series(motion, k, direction, order, g):
 
 @lean_jit
 def friction_step_size(motion, count, natural):
-    """The step, at most `natural`, that the series of the friction forces of sticking coordinates allow."""
+    """The step, at most `natural`, that the series of the friction forces of sticking coordinates
+    allow.
+    """
     tol = motion.tolerance
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for k in range(motion.frictions.shape[0]):
@@ -116,20 +140,25 @@ def friction_step_size(motion, count, natural):
 
 @lean_jit
 def first_friction(motion, count, h, whole):
-    """The friction whose guard reaches 0 first within the step, the instant, and its guard: margin 0 or 1, or 2 for the speed.
+    """The friction whose guard reaches 0 first within the step, the instant, and its guard: margin
+    0 or 1, or 2 for the speed.
 
     Then whether the step is too long to decide on a touch near its end.
     """
-    order, hit, first, which, shorter = motion.order, -1, NEVER, 2, False
+    order = motion.order
+    hit = -1
+    first = NEVER
+    which = 2
+    shorter = False
     for k in range(motion.frictions.shape[0]):
-        slides, skip = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP]
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
+        skip = motion.frictions[k, FrictionColumn.SKIP]
         for b in range(0 if slides == 2 or (slides == 0 and leans(motion, k)) else 2):
-            known, guard = skip, motion.gap_series
+            known = skip
+            guard = motion.gap_series
             if slides == 0:
-                known, guard = (
-                    skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0,
-                    motion.margin_series[count + 2 * k + b],
-                )
+                known = skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0
+                guard = motion.margin_series[count + 2 * k + b]
                 if known == 0 and guard[0] < -ZERO:
                     return k, 0.0, b, False
             elif b == 1:
@@ -142,7 +171,9 @@ def first_friction(motion, count, h, whole):
                 continue
             kind, u, touch = contact_root(guard, known, order, h, motion.polynomial)
             if kind == SIMPLE and u < first:
-                hit, first, which = k, u, b if slides == 0 else 2
+                hit = k
+                first = u
+                which = b if slides == 0 else 2
             shorter = shorter or (kind != SIMPLE and 0.75 < touch <= 1.0 and whole)
     return hit, first, which, shorter and hit < 0
 
@@ -151,10 +182,11 @@ def first_friction(motion, count, h, whole):
 def reach_ground_speed(motion, count, t, k, which, later):
     """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
-    If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a. At a surface the coordinate is
-    set to its position, and dt = -(u - p_c) / v.
+    If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.
+    At a surface the coordinate is set to its position, and dt = -(u - p_c) / v.
     """
-    own, rest = motion.own, motion.frictions[k, FrictionColumn.COORDINATE]
+    own = motion.own
+    rest = motion.frictions[k, FrictionColumn.COORDINATE]
     crossed = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
     if motion.columns > 0:
         expand(motion, t, 1.0, 1)
@@ -169,7 +201,10 @@ def reach_ground_speed(motion, count, t, k, which, later):
                 sliding = motion.velocities[own * (1 + j) + rest] - moved
                 motion.shifts[j] = -sliding / motion.acceleration_series[rest, 0]
                 if crossed:
-                    motion.shifts[j] = -(motion.coordinates[own * (1 + j) + rest] - moved) / motion.velocities[rest]
+                    motion.shifts[j] = (
+                        -(motion.coordinates[own * (1 + j) + rest] - moved)
+                        / motion.velocities[rest]
+                    )
         move_columns(motion, 1.0)
     if crossed:
         motion.coordinates[rest] = ground_speed(motion, k)
@@ -180,11 +215,12 @@ def reach_ground_speed(motion, count, t, k, which, later):
 
 @lean_jit
 def undecided(motion):
-    """The frictions with exactly the speed of their ground, as bits; for the others the direction in which they slide is noted,
-    and for a surface that has just been reached the other side.
+    """The frictions with exactly the speed of their ground, as bits; for the others the direction
+    in which they slide is noted, and for a surface that has just been reached the other side.
 
-    If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at the instant of another one's
-    event. Its direction is then kept, so that it has its own event next, to which it takes the tangent's columns.
+    If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at
+    the instant of another one's event. Its direction is then kept, so that it has its own event
+    next, to which it takes the tangent's columns.
     """
     bits = 0
     for k in range(motion.frictions.shape[0]):
@@ -197,11 +233,13 @@ def undecided(motion):
         rate = motion.velocities[place] - ground_speed(motion, k)
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         if is_lifted(motion, k):
-            motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP] = 2, 0
+            motion.frictions[k, FrictionColumn.SLIDES] = 2
+            motion.frictions[k, FrictionColumn.SKIP] = 0
         elif rate == 0.0:
             bits |= 1 << k
         elif abs(rate) > ZERO or rate * slides >= 0.0 or slides == 2:
-            motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.SKIP] = 1 if rate > 0.0 else -1, 0
+            motion.frictions[k, FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1
+            motion.frictions[k, FrictionColumn.SKIP] = 0
     return bits
 
 
@@ -214,8 +252,8 @@ def is_lifted(motion, k):
 
 @lean_jit
 def choose_slides(motion, candidates, choice):
-    """Let each of the candidates stick, slide forwards or slide backwards, by the base-3 digits of `choice`; False if a friction
-    that is no candidate has a digit other than 0."""
+    """Let each of the candidates stick, slide forwards or slide backwards, by the base-3 digits of
+    `choice`; False if a friction that is no candidate has a digit other than 0."""
     for k in range(motion.frictions.shape[0]):
         digit, choice = choice % 3, choice // 3
         if is_lifted(motion, k):
@@ -227,31 +265,43 @@ def choose_slides(motion, candidates, choice):
         elif digit > 0:
             return False
         elif motion.frictions[k, FrictionColumn.SLIDES] == 2:
-            rate = motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(motion, k)
-            motion.frictions[k, FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1 if rate < 0.0 else 0
+            rate = motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(
+                motion, k
+            )
+            motion.frictions[k, FrictionColumn.SLIDES] = (
+                1 if rate > 0.0 else -1 if rate < 0.0 else 0
+            )
     return True
 
 
 @lean_jit
 def slides_so(motion, count, candidates):
-    """Whether the first non-zero Taylor coefficients of their guards confirm the choice for the candidates; notes how many
-    coefficients before them are 0."""
-    order, g = motion.order, motion.gap_series
+    """Whether the first non-zero Taylor coefficients of their guards confirm the choice for the
+    candidates; notes how many coefficients before them are 0."""
+    order = motion.order
+    g = motion.gap_series
     for k in range(motion.frictions.shape[0]):
         if not candidates >> k & 1:
             continue
-        slides, reached = motion.frictions[k, FrictionColumn.SLIDES], motion.frictions[k, FrictionColumn.REACHED]
-        motion.frictions[k, FrictionColumn.SKIP], motion.frictions[k, FrictionColumn.MARGIN] = 0, 0
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
+        reached = motion.frictions[k, FrictionColumn.REACHED]
+        motion.frictions[k, FrictionColumn.SKIP] = 0
+        motion.frictions[k, FrictionColumn.MARGIN] = 0
         if slides == 2 or leans(motion, k):
             continue
         if slides == 0:
             for b in range(2):
                 row = motion.margin_series[count + 2 * k + b]
-                i = leading(row, 1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0, order)
+                i = leading(
+                    row,
+                    1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0,
+                    order,
+                )
                 if i < order and row[i] < 0.0:
                     return False
                 if i > 0:
-                    motion.frictions[k, FrictionColumn.SKIP], motion.frictions[k, FrictionColumn.MARGIN] = i, b
+                    motion.frictions[k, FrictionColumn.SKIP] = i
+                    motion.frictions[k, FrictionColumn.MARGIN] = b
             continue
         sliding_series(motion, k, 1.0 * slides, order, g)
         i = leading(g, 2 if reached > 0 and abs(g[1]) <= ALIKE else 1, order)
@@ -263,13 +313,20 @@ def slides_so(motion, count, candidates):
 
 @lean_jit
 def record_slides(motion, before, t):
-    """Record the frictions that have begun to stick or to slide, or have reversed, since the directions `before` (base-4
-    digits)."""
+    """Record the frictions that have begun to stick or to slide, or have reversed, since the
+    directions `before` (base-4 digits)."""
     for k in range(motion.frictions.shape[0]):
-        was, slides = before % 4 - 1, motion.frictions[k, FrictionColumn.SLIDES]
+        was = before % 4 - 1
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
         before //= 4
         if slides != was and slides != 2 and was != 2:
-            kind = EventCode.SLIP if was == 0 else EventCode.STICK if slides == 0 else EventCode.REVERSAL
+            kind = (
+                EventCode.SLIP
+                if was == 0
+                else EventCode.STICK
+                if slides == 0
+                else EventCode.REVERSAL
+            )
             if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
                 kind = EventCode.CROSSING
             record_contact_event(motion, kind, 1 << (motion.contacts.shape[0] + k), t)
@@ -287,14 +344,16 @@ def slides_before(motion):
 
 @lean_jit
 def stick_columns(motion, count):
-    """The columns of sticking coordinates: z = w_c, by the impulses p with which friction stops them in neighbouring motions that
-    slide, M dz = S p.
+    """The columns of sticking coordinates: z = w_c, by the impulses p with which friction stops
+    them in neighbouring motions that slide, M dz = S p.
 
-    When a friction begins to stick during the motion, no impulse is left. At the start of a motion, neighbouring motions slide
-    for a time of the order of their sliding speeds, in which nothing else changes to first order. Impulses of closed contacts
-    keep these closed.
+    When a friction begins to stick during the motion, no impulse is left. At the start of a motion,
+    neighbouring motions slide for a time of the order of their sliding speeds, in which nothing
+    else changes to first order. Impulses of closed contacts keep these closed.
     """
-    own, block, rows = motion.own, motion.block, motion.contacts.shape[0] + motion.frictions.shape[0]
+    own = motion.own
+    block = motion.block
+    rows = motion.contacts.shape[0] + motion.frictions.shape[0]
     for j in range(motion.columns):
         size = 0
         for row in range(rows):
@@ -307,7 +366,13 @@ def stick_columns(motion, count):
                         block[size, column] = motion.inverse[a, b]
                         column += 1
                 k = row - motion.contacts.shape[0]
-                moved = 0.0 if k < 0 else slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
+                moved = (
+                    0.0
+                    if k < 0
+                    else slope(
+                        motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k
+                    )
+                )
                 block[size, column] = moved - motion.velocities[own * (1 + j) + a]
                 size += 1
         eliminate(block, size, size + 1)
@@ -316,16 +381,24 @@ def stick_columns(motion, count):
             b = held_by(motion, row)
             if b >= 0:
                 for a in range(motion.local):
-                    motion.velocities[own * (1 + j) + a] += motion.inverse[a, b] * block[found, size]
+                    motion.velocities[own * (1 + j) + a] += (
+                        motion.inverse[a, b] * block[found, size]
+                    )
                 found += 1
 
 
 @lean_jit
 def held_by(motion, row):
-    """The coordinate that a contact or, behind the contacts, a friction holds; -1 for none, or one that its contact holds too."""
+    """The coordinate that a contact or, behind the contacts, a friction holds; -1 for none, or one
+    that its contact holds too.
+    """
     count = motion.contacts.shape[0]
     if row < count:
-        return motion.contacts[row, ContactColumn.COORDINATE] if motion.contacts[row, ContactColumn.CLOSED] == 1 else -1
+        return (
+            motion.contacts[row, ContactColumn.COORDINATE]
+            if motion.contacts[row, ContactColumn.CLOSED] == 1
+            else -1
+        )
     k = row - count
     if motion.frictions[k, FrictionColumn.SLIDES] != 0 or leans(motion, k):
         return -1
@@ -334,7 +407,9 @@ def held_by(motion, row):
 
 @lean_jit
 def leans(motion, k):
-    """Whether a closed contact holds the coordinate along which a friction acts, so that the friction carries what it can."""
+    """Whether a closed contact holds the coordinate along which a friction acts, so that the
+    friction carries what it can.
+    """
     found = False
     for i in range(motion.contacts.shape[0]):
         found = found or (motion.contacts[i, ContactColumn.CLOSED] == 1 and is_along(motion, k, i))
@@ -344,7 +419,10 @@ def leans(motion, k):
 @lean_jit
 def is_along(motion, k, i):
     """Whether a friction, no surface, acts along the coordinate of a contact."""
-    along = motion.contacts[i, ContactColumn.COORDINATE] == motion.frictions[k, FrictionColumn.COORDINATE]
+    along = (
+        motion.contacts[i, ContactColumn.COORDINATE]
+        == motion.frictions[k, FrictionColumn.COORDINATE]
+    )
     return along and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
 
 
@@ -359,8 +437,8 @@ def rubs_along(motion, i):
 
 @lean_jit
 def tear_loose(motion, i):
-    """Note of frictions that hold a coordinate together with a contact, whose reaction has just fallen to 0, that they too carry
-    all that they can."""
+    """Note of frictions that hold a coordinate together with a contact, whose reaction has just
+    fallen to 0, that they too carry all that they can."""
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.SLIDES] == 0 and is_along(motion, k, i):
             motion.frictions[k, FrictionColumn.REACHED] = 2 if motion.signs[i] > 0.0 else 1
@@ -368,9 +446,11 @@ def tear_loose(motion, i):
 
 @lean_jit
 def all_stand(motion):
-    """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest. As many may be free as there are
-    dependent sums."""
-    local, free, moves = motion.local, 0, motion.local < motion.own
+    """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest. As
+    many may be free as there are dependent sums."""
+    local = motion.local
+    free = 0
+    moves = motion.local < motion.own
     for i in range(local):
         free += 1 if motion.parameters[motion.parameters.size - local + i] != 0.0 else 0
         free -= 1 if is_sum(motion, i) else 0

@@ -1,6 +1,7 @@
 """Impacts of several contacts, and accumulations of them.
 
-Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
+`flow/kernel/memory.py`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
 from saltus.flow.kernel.steps import column_step, leaps, step_size
 from saltus.taylor import lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -49,7 +50,8 @@ def closed_bits(motion):
 @lean_jit
 def gap_series(motion, i, position, order, g):
     """The Taylor coefficients of a contact's gap."""
-    sign, coordinate = motion.signs[i], motion.contacts[i, ContactColumn.COORDINATE]
+    sign = motion.signs[i]
+    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     for k in range(order + 1):
         g[k] = sign * motion.coordinate_series[coordinate, k]
     g[0] -= sign * position
@@ -58,7 +60,9 @@ def gap_series(motion, i, position, order, g):
 @lean_jit
 def contact_step_size(motion, t, target, size):
     """The step that the series of the free coordinates and of the reactions allow."""
-    order, tol, own = motion.order, motion.tolerance, motion.own
+    order = motion.order
+    tol = motion.tolerance
+    own = motion.own
     natural = step_size(motion.velocity_series[:own], order, size, tol)
     if motion.columns > 0:
         natural = min(natural, column_step(motion))
@@ -74,12 +78,15 @@ def contact_step_size(motion, t, target, size):
 
 @lean_jit
 def fill_contact_matrices(motion):
-    """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state; False if the mass matrix is
-    singular."""
-    count, signs = motion.contacts.shape[0], motion.signs
+    """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state;
+    False if the mass matrix is singular."""
+    count = motion.contacts.shape[0]
+    signs = motion.signs
     tell_instant(motion)
     motion.matrices(motion.env, motion.piece, motion.state, motion.solver_numbers)
-    regular = invert(motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse)
+    regular = invert(
+        motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse
+    )
     for i in range(count):
         a = motion.contacts[i, ContactColumn.COORDINATE]
         for j in range(count):
@@ -92,8 +99,11 @@ def fill_contact_matrices(motion):
 
 @lean_jit
 def reduce_to(motion, chosen):
-    """Copy the coupling of the contacts in `chosen` to the first rows of `REDUCED`; returns the number of these contacts."""
-    row, count = 0, motion.contacts.shape[0]
+    """Copy the coupling of the contacts in `chosen` to the first rows of `REDUCED`; returns the
+    number of these contacts.
+    """
+    row = 0
+    count = motion.contacts.shape[0]
     for i in range(count):
         if chosen >> i & 1:
             column = 0
@@ -107,12 +117,17 @@ def reduce_to(motion, chosen):
 
 @lean_jit
 def impact_impulses(motion, chosen, rates):
-    """Find the impulses J of the contacts in `chosen`: 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G J.
+    """Find the impulses J of the contacts in `chosen`: 0 <= J _|_ v+ + E v- >= 0 with v+ = v- + G
+    J.
 
-    `rates` holds v- of all contacts, and afterwards v+. For a contact that acts v+ is set to -E v-, so that a rate of 0 is
-    exactly 0. Returns whether there is a solution, and the contacts that act as bits.
+    `rates` holds v- of all contacts, and afterwards v+. For a contact that acts v+ is set to -E v-,
+    so that a rate of 0 is exactly 0. Returns whether there is a solution, and the contacts that act
+    as bits.
     """
-    size, row, after, count = reduce_to(motion, chosen), 0, motion.tried, motion.contacts.shape[0]
+    size = reduce_to(motion, chosen)
+    row = 0
+    after = motion.tried
+    count = motion.contacts.shape[0]
     for i in range(count):
         if chosen >> i & 1:
             motion.right[row] = rates[i]
@@ -120,15 +135,19 @@ def impact_impulses(motion, chosen, rates):
                 if chosen >> j & 1:
                     motion.right[row] += restitution(motion, i, j) * rates[j]
             row += 1
-    solved, bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
+    solved, bits = complementary(
+        motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses
+    )
     if not solved:
         return False, 0
-    acts, row = 0, 0
+    acts = 0
+    row = 0
     for i in range(count):
         if chosen >> i & 1:
             acts |= (bits >> row & 1) << i
             row += 1
-    for i in range(count - 1, -1, -1):  # spread them from the chosen to all contacts, the last one first
+    # spread them from the chosen to all contacts, the last one first
+    for i in range(count - 1, -1, -1):
         if chosen >> i & 1:
             row -= 1
             motion.impulses[i] = motion.impulses[row]
@@ -153,18 +172,23 @@ def impact_impulses(motion, chosen, rates):
 
 @lean_jit
 def jump_place(motion, i, k):
-    """The place in `NUMBERS` of a coordinate of first order, by its number, after an impact on a contact."""
-    local, count = motion.local, motion.contacts.shape[0]
+    """The place in `NUMBERS` of a coordinate of first order, by its number, after an impact on a
+    contact.
+    """
+    local = motion.local
+    count = motion.contacts.shape[0]
     return local * local + count * count + count + motion.first_order * i + k
 
 
 @lean_jit
 def jump_first_order(motion, hit):
-    """Let the coordinates of first order jump at an impact of the contacts in `hit`, of several by the last; the matrices must be
-    those before it."""
+    """Let the coordinates of first order jump at an impact of the contacts in `hit`, of several by
+    the last; the matrices must be those before it."""
     for i in range(motion.contacts.shape[0]):
         for k in range(motion.first_order if hit >> i & 1 else 0):
-            motion.coordinates[motion.own - motion.first_order + k] = motion.solver_numbers[jump_place(motion, i, k)]
+            motion.coordinates[motion.own - motion.first_order + k] = motion.solver_numbers[
+                jump_place(motion, i, k)
+            ]
 
 
 @lean_jit
@@ -178,27 +202,35 @@ def apply_impulses(motion):
 
 @lean_jit
 def record_contact_event(motion, kind, which, t):
-    """Append an event: (period, kind, bits of contacts, 0) and (local time, velocities before and after, impulses).
+    """Append an event: (period, kind, bits of contacts, 0) and (local time, velocities before and
+    after, impulses).
 
     The velocities before are those of the state at this call; `fill_after` completes the event.
     """
-    labels, values = motion.event_labels, motion.event_values
-    i, own = motion.recorded_events, motion.own
-    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = motion.period, kind, which, 0
+    labels = motion.event_labels
+    values = motion.event_values
+    i = motion.recorded_events
+    own = motion.own
+    labels[i, 0] = motion.period
+    labels[i, 1] = kind
+    labels[i, 2] = which
+    labels[i, 3] = 0
     values[i, 0] = t
     for k in range(own):
         values[i, 1 + k] = values[i, 1 + own + k] = jumping(motion, k)
     for k in range(motion.contacts.shape[0]):
         values[i, 1 + 2 * own + k] = 0.0
     for j in range(motion.columns):
-        values[i, 1 + 2 * own + motion.contacts.shape[0] + j] = math.nan  # until `note_shifts` sets them
+        # until `note_shifts` sets them
+        values[i, 1 + 2 * own + motion.contacts.shape[0] + j] = math.nan
     motion.recorded_events = i + 1
 
 
 @lean_jit
 def fill_after(motion):
     """Complete the last event by the velocities after it and the impulses."""
-    values, own = motion.event_values, motion.own
+    values = motion.event_values
+    own = motion.own
     i = motion.recorded_events - 1
     for k in range(own):
         values[i, 1 + own + k] = jumping(motion, k)
@@ -208,19 +240,24 @@ def fill_after(motion):
 
 @lean_jit
 def settle_contact(motion, i, rate):
-    """Put the coordinate of a contact that takes part in an impact exactly at its position, with the rate after the impact."""
+    """Put the coordinate of a contact that takes part in an impact exactly at its position, with
+    the rate after the impact.
+    """
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     motion.coordinates[coordinate] = contact_position(motion, i)
     motion.velocities[coordinate] = motion.signs[i] * rate + 0.0
     motion.contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
-    motion.contacts[i, ContactColumn.SKIP], motion.contacts[i, ContactColumn.RELEASED] = 1, 0
+    motion.contacts[i, ContactColumn.SKIP] = 1
+    motion.contacts[i, ContactColumn.RELEASED] = 0
 
 
 @lean_jit
 def closed_pulls(motion, near, b, x, u, pull):
-    """The second derivatives of the gaps in `near`, where contacts at rest at 0 are closed if their reaction pushes; returns the
-    contacts that are at rest, as bits."""
-    still, row, count = 0, 0, motion.contacts.shape[0]
+    """The second derivatives of the gaps in `near`, where contacts at rest at 0 are closed if their
+    reaction pushes; returns the contacts that are at rest, as bits."""
+    still = 0
+    row = 0
+    count = motion.contacts.shape[0]
     for i in range(count):
         if near >> i & 1 and x[i] == 0.0 and u[i] == 0.0:
             still |= 1 << i
@@ -229,7 +266,9 @@ def closed_pulls(motion, near, b, x, u, pull):
         if still >> i & 1:
             motion.right[row] = b[i]
             row += 1
-    solved, bits = complementary(motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses)
+    solved, bits = complementary(
+        motion.reduced, motion.right, size, motion.block, motion.tried, motion.impulses
+    )
     for i in range(count):
         pull[i], row = b[i], 0
         for j in range(count):
@@ -249,8 +288,8 @@ def closed_pulls(motion, near, b, x, u, pull):
 def time_to_close(x, u, a):
     """The time at which x + u t + a t^2 / 2 falls to 0 from above; infinite if it never does.
 
-    It is 0 for a gap of 0 that is closing: such a gap has become smaller than the least number, by impacts that square it each
-    time.
+    It is 0 for a gap of 0 that is closing: such a gap has become smaller than the least number, by
+    impacts that square it each time.
     """
     if x == 0.0 and u < 0.0:
         return 0.0
@@ -264,14 +303,20 @@ def time_to_close(x, u, a):
 
 @lean_jit
 def frozen_accumulation(motion, near, beside, limit):
-    """The time in which the contacts in `near` lose all speed by impacts, if the accelerations stay constant.
+    """The time in which the contacts in `near` lose all speed by impacts, if the accelerations stay
+    constant.
 
-    Each gap then follows parabolas between its impacts. No other contact in `beside` may close meanwhile. If they do not lose
-    their speed within `limit`, minus the number of impacts that were followed is returned. Which of the contacts stay closed is
-    decided later.
+    Each gap then follows parabolas between its impacts. No other contact in `beside` may close
+    meanwhile. If they do not lose their speed within `limit`, minus the number of impacts that were
+    followed is returned. Which of the contacts stay closed is decided later.
     """
-    time, first, b, pull, count = 0.0, 0.0, motion.pulls, motion.falling_pulls, motion.contacts.shape[0]
-    x, u = motion.falling_gaps, motion.falling_rates
+    time = 0.0
+    first = 0.0
+    b = motion.pulls
+    pull = motion.falling_pulls
+    count = motion.contacts.shape[0]
+    x = motion.falling_gaps
+    u = motion.falling_rates
     for i in range(count):
         x[i], u[i] = motion.gaps[i], motion.rates[i]
         if beside >> i & 1 and not near >> i & 1:
@@ -284,17 +329,25 @@ def frozen_accumulation(motion, near, beside, limit):
             if near >> i & 1 and not (still >> i & 1 and pull[i] <= 0.0):
                 flight = min(flight, time_to_close(x[i], u[i], pull[i]))
         if flight == np.inf:
-            return time if still == near and max_rate(u, pull, near, still, count) == 0.0 else -1.0 - followed
+            return (
+                time
+                if still == near and max_rate(u, pull, near, still, count) == 0.0
+                else -1.0 - followed
+            )
         time += flight
         if not time <= limit:
             return -1.0 - followed
-        height, hit = 0.0, still
+        height = 0.0
+        hit = still
         for i in range(count):
             if near >> i & 1:
                 height = max(height, abs(u[i]) * flight)
         for i in range(count):
             if near >> i & 1 and not (still >> i & 1 and pull[i] <= 0.0):
-                x[i], u[i] = x[i] + flight * (u[i] + 0.5 * flight * pull[i]), u[i] + flight * pull[i]
+                x[i], u[i] = (
+                    x[i] + flight * (u[i] + 0.5 * flight * pull[i]),
+                    u[i] + flight * pull[i],
+                )
                 if x[i] <= 1e-12 * height and u[i] < 0.0:
                     x[i], hit = 0.0, hit | 1 << i
         solved, _ = impact_impulses(motion, hit, u)
@@ -313,7 +366,9 @@ def frozen_accumulation(motion, near, beside, limit):
 
 @lean_jit
 def max_rate(u, pull, near, still, count):
-    """The largest of the speeds of the contacts in `near` and of the accelerations with which resting ones open."""
+    """The largest of the speeds of the contacts in `near` and of the accelerations with which
+    resting ones open.
+    """
     largest = 0.0
     for i in range(count):
         if near >> i & 1:
@@ -325,10 +380,15 @@ def max_rate(u, pull, near, still, count):
 
 @lean_jit
 def near_contacts(motion, slow):
-    """The contacts that may take part in an accumulation with speeds up to `slow`, as bits; 0 if none of them bounces."""
-    near, bounces = 0, False
+    """The contacts that may take part in an accumulation with speeds up to `slow`, as bits; 0 if
+    none of them bounces.
+    """
+    near = 0
+    bounces = False
     for i in range(motion.contacts.shape[0]):
-        x, u, b = motion.gaps[i], motion.rates[i], motion.pulls[i]
+        x = motion.gaps[i]
+        u = motion.rates[i]
+        b = motion.pulls[i]
         if abs(u) <= slow and x * max(abs(b), 1.0) <= slow * slow:
             near |= 1 << i
             bounces = bounces or u > 0.0
@@ -337,7 +397,9 @@ def near_contacts(motion, slow):
 
 @lean_jit
 def smaller_set(motion, near):
-    """The contacts in `near` whose gap is 0, for an accumulation on a smaller scale; 0 if these are all of `near`."""
+    """The contacts in `near` whose gap is 0, for an accumulation on a smaller scale; 0 if these are
+    all of `near`.
+    """
     smaller = 0
     for i in range(motion.contacts.shape[0]):
         if near >> i & 1 and motion.gaps[i] == 0.0:
@@ -348,7 +410,8 @@ def smaller_set(motion, near):
 @lean_jit
 def bring_to_rest(motion, near):
     """Stop the contacts in `near` by impulses on these alone, and close them."""
-    count, row = motion.contacts.shape[0], 0
+    count = motion.contacts.shape[0]
+    row = 0
     size = reduce_to(motion, near)
     for i in range(count):
         if near >> i & 1:
@@ -371,7 +434,9 @@ def bring_to_rest(motion, near):
 
 @lean_jit
 def slow_impacts(tol):
-    """The speed of an impact below which the end of an accumulation may be near, as with one contact (`slow_speed`)."""
+    """The speed of an impact below which the end of an accumulation may be near, as with one
+    contact (`slow_speed`).
+    """
     return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
 
 
@@ -386,15 +451,20 @@ def only_open(contacts):
 
 @lean_jit
 def is_smooth(motion):
-    """Whether a motion without friction, and not in eigenmodes, is on a smooth arc, with no guards known to be 0 but those of
-    `only_open`."""
+    """Whether a motion without friction, and not in eigenmodes, is on a smooth arc, with no guards
+    known to be 0 but those of `only_open`."""
     together = motion.frictions.shape[0] == 0 and motion.eigenmodes.size == 0
     return motion.mode == Mode.ARC and together and only_open(motion.contacts)
 
 
 @lean_jit
 def undecide(motion, opened):
-    """Close those contacts in `opened` again that are at rest: which of them stay closed is decided later."""
+    """Close those contacts in `opened` again that are at rest: which of them stay closed is decided
+    later.
+    """
     for i in range(motion.contacts.shape[0]):
-        if opened >> i & 1 and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0:
+        if (
+            opened >> i & 1
+            and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0
+        ):
             motion.contacts[i, ContactColumn.CLOSED] = 1

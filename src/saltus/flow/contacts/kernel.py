@@ -1,14 +1,18 @@
-"""The flow of a motion with several contacts: smooth steps, impacts, releases, accumulations of impacts, rest.
+"""The flow of a motion with several contacts: smooth steps, impacts, releases, accumulations of
+impacts, rest.
 
-The compiled parts of the files that `kernel/compiled.py` names, of this file and of `kernel/loop.py`, which calls it, are
-compiled as one module, once for every model. All of a motion's memory is in `motion` (see `kernel/memory.py`):
-`motion.contacts` has a row for each contact, in the columns of `ContactColumn`, and the last of `motion.parameters` say for
-each coordinate whether it is free (1) or held (0).
+The compiled parts of the files that `kernel/compiled.py` names, of this file and of
+`kernel/loop.py`, which calls it, are compiled as one module, once for every model. All of a
+motion's memory is in `motion` (see `kernel/memory.py`): `motion.contacts` has a row for each
+contact, in the columns of `ContactColumn`, and the last of `motion.parameters` say for each
+coordinate whether it is free (1) or held (0).
 
-In a smooth step the closed contacts hold their coordinates, and the model's series are those of the constrained motion. Each
-contact has a guard: the gap if it is open, the reaction if it is closed. If a gap reaches 0, the impact law acts. After this, and
-if a reaction reaches 0 or the load jumps, it is decided again which of the contacts that are at rest at their positions stay
-closed. Frictions have rows behind those of the contacts (`frictions.py`), and it is decided together which of them stick.
+In a smooth step the closed contacts hold their coordinates, and the model's series are those of the
+constrained motion. Each contact has a guard: the gap if it is open, the reaction if it is closed.
+If a gap reaches 0, the impact law acts. After this, and if a reaction reaches 0 or the load jumps,
+it is decided again which of the contacts that are at rest at their positions stay closed. Frictions
+have rows behind those of the contacts (`frictions.py`), and it is decided together which of them
+stick.
 """
 
 from __future__ import annotations
@@ -17,7 +21,13 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.closings import block_of, choose_closed, contact_impact, note_ties, rests_in_a_row
+from saltus.flow.contacts.closings import (
+    block_of,
+    choose_closed,
+    contact_impact,
+    note_ties,
+    rests_in_a_row,
+)
 from saltus.flow.contacts.complementarity import is_pressed, slides_on
 from saltus.flow.contacts.frictions import (
     all_stand,
@@ -71,10 +81,19 @@ from saltus.flow.contacts.tangent import (
 from saltus.flow.kernel.layout import SHORTEST, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, margin_root, value_and_slope
-from saltus.flow.kernel.steps import columns_at_event, expand, in_modes, mode_arrays, motion_end, move, record_step, step_arrays
+from saltus.flow.kernel.steps import (
+    columns_at_event,
+    expand,
+    in_modes,
+    mode_arrays,
+    motion_end,
+    move,
+    record_step,
+    step_arrays,
+)
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -85,14 +104,19 @@ def rest_after(motion, near, beside, limit):
 
 @lean_jit
 def end_accumulation_of(motion, t):
-    """Bring contacts to rest whose impacts accumulate soon; returns the end of the accumulation, or t if there is none."""
-    count, tol = motion.contacts.shape[0], motion.tolerance
+    """Bring contacts to rest whose impacts accumulate soon; returns the end of the accumulation, or
+    t if there is none.
+    """
+    count = motion.contacts.shape[0]
+    tol = motion.tolerance
     if not fill_contact_matrices(motion):
         return t
-    slowest, last = slow_impacts(tol), -1
+    slowest = slow_impacts(tol)
+    last = -1
     for i in range(count):
         if 0.0 < motion.rates[i] <= slowest and motion.gaps[i] == 0.0:
-            slowest, last = motion.rates[i], i
+            slowest = motion.rates[i]
+            last = i
     if last < 0 or motion.contacts[last, ContactColumn.WAITS] > 0:
         if last >= 0:
             motion.contacts[last, ContactColumn.WAITS] -= 1
@@ -103,20 +127,27 @@ def end_accumulation_of(motion, t):
     if near == 0 or (turns and not slides_on(motion, near)):
         return t
     limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
-    together, moving = near, 0
-    left = rubbed_accumulation(motion, t, near, last, limit) if turns else rest_after(motion, near, -1, limit)
+    together = near
+    moving = 0
+    left = (
+        rubbed_accumulation(motion, t, near, last, limit)
+        if turns
+        else rest_after(motion, near, -1, limit)
+    )
     if left < 0.0 and not turns:
         near = smaller_set(motion, near)
         again = rest_after(motion, near, -1, limit) if near != 0 else -1.0
         left = again if again >= 0.0 else left + again
-    if left < 0.0 and not turns and count > MOST_TRIED:  # other blocks, which do not act on this one, may be bouncing too
+    # other blocks, which do not act on this one, may be bouncing too
+    if left < 0.0 and not turns and count > MOST_TRIED:
         block = block_of(motion, 1 << last, False)
         if together & ~block:
             near = together & block
             again = rest_after(motion, near, block, limit)
             left = again if again >= 0.0 else left + again
     slow = slow_impacts(tol)
-    while left < 0.0 and slow >= slowest and not turns:  # on ever smaller scales, as of bodies beside others that still move
+    # on ever smaller scales, as of bodies beside others that still move
+    while left < 0.0 and slow >= slowest and not turns:
         slow *= 1e-3
         slower = near_contacts(motion, slow)
         if slower != near and slower != 0:
@@ -142,7 +173,9 @@ def end_accumulation_of(motion, t):
 
 @lean_jit
 def decide_columns(motion, t):
-    """Take the columns from an event back to a fixed time, or from the start on, once it is known which contacts are closed."""
+    """Take the columns from an event back to a fixed time, or from the start on, once it is known
+    which contacts are closed.
+    """
     if motion.columns == 0:
         return
     if motion.leave_by == 1:
@@ -164,19 +197,29 @@ def decide_columns(motion, t):
 
 @lean_jit
 def decide_contacts(motion):
-    """Decide which contacts are closed and which frictions stick from here on. Returns PAUSED to go on, or NOT_UNIQUE."""
-    t, count, rested = motion.time, motion.contacts.shape[0], motion.rested == 1
+    """Decide which contacts are closed and which frictions stick from here on.
+
+    Returns PAUSED to go on, or NOT_UNIQUE.
+    """
+    t = motion.time
+    count = motion.contacts.shape[0]
+    rested = motion.rested == 1
     event_shifts(motion)
     settled = end_accumulation_of(motion, t)
-    candidates, before = closed_bits(motion), slides_before(motion)
+    candidates = closed_bits(motion)
+    before = slides_before(motion)
     fill_contact_matrices(motion)
     if motion.leave_by == 1 and not begin_on_surfaces(motion, t):
         return Status.NOT_UNIQUE
     still = undecided(motion)
     if (candidates or still) and not choose_closed(motion, candidates, still, t, ZERO):
         note_ties(motion, candidates, t)
-        if not (choose_closed(motion, candidates, still, t, ZERO) or choose_closed(motion, candidates, still, t, 1e3 * TIED)):
-            return Status.NOT_UNIQUE  # where nothing presses, what an accumulation leaves of gaps decides nothing
+        if not (
+            choose_closed(motion, candidates, still, t, ZERO)
+            or choose_closed(motion, candidates, still, t, 1e3 * TIED)
+        ):
+            # where nothing presses, what an accumulation leaves of gaps decides nothing
+            return Status.NOT_UNIQUE
     hold_coordinates(motion)
     hold_frictions(motion)
     opened = candidates & ~closed_bits(motion)
@@ -208,19 +251,24 @@ def decide_contacts(motion):
 
 # Series of a lower order than usual, for a step to the next impact on the same contact.
 FAST_IMPACT = 0.3  # After a faster impact the usual order is needed to reach the next one.
-RADIUS = 0.5  # A series of order n is assumed to be exact up to this times the n-th root of the tolerance.
+# A series of order n is assumed to be exact up to this times the n-th root of the tolerance.
+RADIUS = 0.5
 LEAST_ORDER = 6  # At lower orders the last coefficients may all vanish by symmetry.
 WORTH = 0.8  # A lower order is tried only below this share of the usual one.
 
 
 @lean_jit
 def first_guard(motion, h, whole):
-    """The contact whose guard reaches 0 first within the step, the instant, and whether the step is too long to decide on a touch
-    near its end."""
-    order, count = motion.order, motion.contacts.shape[0]
-    hit, first, shorter = -1, NEVER, False
+    """The contact whose guard reaches 0 first within the step, the instant, and whether the step is
+    too long to decide on a touch near its end."""
+    order = motion.order
+    count = motion.contacts.shape[0]
+    hit = -1
+    first = NEVER
+    shorter = False
     for i in range(count):
-        skip, guard = motion.contacts[i, ContactColumn.SKIP], motion.gap_series
+        skip = motion.contacts[i, ContactColumn.SKIP]
+        guard = motion.gap_series
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             guard = motion.margin_series[i]
             if skip == 0 and guard[0] < -ZERO:
@@ -231,20 +279,31 @@ def first_guard(motion, h, whole):
             gap_series(motion, i, contact_position(motion, i), order, guard)
         kind, u, touch = contact_root(guard, skip, order, h, motion.polynomial)
         if kind == SIMPLE and u < first:
-            hit, first = i, u
+            hit = i
+            first = u
         shorter = shorter or (kind != SIMPLE and 0.75 < touch <= 1.0 and whole)
     return hit, first, shorter and hit < 0
 
 
 @lean_jit
 def contacts_closing_with(motion, hit, tau):
-    """The open contacts that close with `hit` at `tau` within the step, to within rounding, as bits."""
-    order, count, bits, g = motion.order, motion.contacts.shape[0], 1 << hit, motion.gap_series
+    """The open contacts that close with `hit` at `tau` within the step, to within rounding, as
+    bits.
+    """
+    order = motion.order
+    count = motion.contacts.shape[0]
+    bits = 1 << hit
+    g = motion.gap_series
     for i in range(count):
         if i == hit or motion.contacts[i, ContactColumn.CLOSED] == 1:
             continue
         gap_series(motion, i, contact_position(motion, i), order, g)
-        size = abs(g[0]) + abs(g[1]) * tau + abs(g[2]) * tau * tau + GAP_ROUNDING * abs(contact_position(motion, i))
+        size = (
+            abs(g[0])
+            + abs(g[1]) * tau
+            + abs(g[2]) * tau * tau
+            + GAP_ROUNDING * abs(contact_position(motion, i))
+        )
         value, slope = value_and_slope(g, order, tau)
         if value <= NEAR * size and slope < 0.0:
             bits |= 1 << i
@@ -253,12 +312,14 @@ def contacts_closing_with(motion, hit, tau):
 
 @lean_jit
 def short_order(motion, t):
-    """The order of the series for a step to the next impact of a contact that has just impacted: lower than usual if that
-    suffices.
+    """The order of the series for a step to the next impact of a contact that has just impacted:
+    lower than usual if that suffices.
 
-    Until its next impact the gap is nearly a parabola, whose duration is known. Most impacts of accumulations are so close.
+    Until its next impact the gap is nearly a parabola, whose duration is known. Most impacts of
+    accumulations are so close.
     """
-    order, flight = motion.order, np.inf
+    order = motion.order
+    flight = np.inf
     for i in range(motion.contacts.shape[0]):
         rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
         if (
@@ -268,7 +329,10 @@ def short_order(motion, t):
         ):
             if flight == np.inf:
                 expand(motion, t, 1.0, 0)
-            pull = motion.signs[i] * motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE], 0]
+            pull = (
+                motion.signs[i]
+                * motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE], 0]
+            )
             if pull < 0.0:
                 flight = min(flight, -2.0 * rate / pull)
     if not flight < RADIUS:
@@ -281,12 +345,16 @@ def short_order(motion, t):
 def seek_event(motion, t, target):
     """Expand the motion, and find the first zero of a guard or of a margin within a step.
 
-    Returns the length of the step, and the length that the series allow; the contact, the friction and the margin, of which the
-    one with the first zero is given and the others are -1; which of the friction's guards it is; and the share of the step of the
-    zero.
+    Returns the length of the step, and the length that the series allow; the contact, the friction
+    and the margin, of which the one with the first zero is given and the others are -1; which of
+    the friction's guards it is; and the share of the step of the zero.
     """
-    order, count, margins = motion.order, motion.contacts.shape[0], motion.margin_count
-    size = expand(motion, t, 1.0, order) if motion.eigenmodes.size == 0 else in_modes(motion, t, order)
+    order = motion.order
+    count = motion.contacts.shape[0]
+    margins = motion.margin_count
+    size = (
+        expand(motion, t, 1.0, order) if motion.eigenmodes.size == 0 else in_modes(motion, t, order)
+    )
     natural = contact_step_size(motion, t, target, size)
     natural = friction_step_size(motion, count, natural)
     h = min(natural, target - t)
@@ -294,18 +362,24 @@ def seek_event(motion, t, target):
     hit, first, shorter = first_guard(motion, h, whole)
     rubs, first_rub, which, shorter_rub = first_friction(motion, count, h, whole)
     if rubs >= 0 and first_rub < first:
-        hit, first = -1, first_rub
+        hit = -1
+        first = first_rub
     else:
         rubs = -1
     if (shorter or shorter_rub) and hit < 0 and rubs < 0:
         h = 0.5 * h
-    limit, first_limit, held = -1, NEVER, count + 2 * motion.frictions.shape[0]
+    limit = -1
+    first_limit = NEVER
+    held = count + 2 * motion.frictions.shape[0]
     for j in range(held, margins):
         u = margin_root(motion.margin_series[j], order, h, motion.polynomial)
         if u < first_limit:
-            limit, first_limit = j, u
+            limit = j
+            first_limit = u
     if first_limit <= first and limit >= 0:
-        hit, rubs, first = -1, -1, first_limit
+        hit = -1
+        rubs = -1
+        first = first_limit
     else:
         limit = -1
     return h, natural, hit, rubs, limit, which, first
@@ -313,8 +387,13 @@ def seek_event(motion, t, target):
 
 @lean_jit
 def contact_arc(motion, target):
-    """One smooth step, up to the first zero of a guard or of a margin. Returns PAUSED, or why the motion ends."""
-    order, t, count = motion.order, motion.time, motion.contacts.shape[0]
+    """One smooth step, up to the first zero of a guard or of a margin.
+
+    Returns PAUSED, or why the motion ends.
+    """
+    order = motion.order
+    t = motion.time
+    count = motion.contacts.shape[0]
     held = count + 2 * motion.frictions.shape[0]
     motion.order = short_order(motion, t)
     h, natural, hit, rubs, limit, which, first = seek_event(motion, t, target)
@@ -346,7 +425,8 @@ def contact_arc(motion, target):
     if hit >= 0:
         if motion.columns > 0:
             release_columns(motion, motion.time, hit)
-        motion.mode, motion.contacts[hit, ContactColumn.RELEASED] = Mode.CONTACT, 1 if first > 0.0 else 0
+        motion.mode = Mode.CONTACT
+        motion.contacts[hit, ContactColumn.RELEASED] = 1 if first > 0.0 else 0
         if first > 0.0:
             tear_loose(motion, hit)
     if rubs >= 0:
@@ -392,9 +472,15 @@ def one_pass(motion, target, t_end):
 
 @jit
 def parts_of(numbers, state, env, functions, rows, buffers):
-    """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts, then of frictions."""
-    count, steps = functions.signs.size, step_arrays(numbers)
-    contacts, frictions = rows[:count], rows[count:]
+    """The memory of a motion but for its numbers as one named tuple; `rows` are those of contacts,
+    then of frictions.
+    """
+    count = functions.signs.size
+    steps = step_arrays(numbers)
+    contacts = rows[:count]
+    frictions = rows[count:]
     solver = solver_arrays(numbers.local, count, numbers.columns, frictions, numbers.first_order)
     modes = mode_arrays(numbers, functions.eigenmodes)
-    return ContactsParts(state, env, env[0], env[2], functions, contacts, frictions, steps, modes, solver, *buffers)
+    return ContactsParts(
+        state, env, env[0], env[2], functions, contacts, frictions, steps, modes, solver, *buffers
+    )

@@ -1,6 +1,8 @@
-"""What `lanes/handoff.py` needs of a model with several contacts, to let the scalar kernel move a lane.
+"""What `lanes/handoff.py` needs of a model with several contacts, to let the scalar kernel move a
+lane.
 
-Its compiled part goes into one module with that of `lanes/handoff.py`, in the place of `one_contact/lane_handoff.py`.
+Its compiled part goes into one module with that of `lanes/handoff.py`, in the place of
+`one_contact/lane_handoff.py`.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
 from saltus.flow.kernel.layout import EventCode, Mode
 from saltus.taylor import inline_jit, jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
@@ -38,12 +40,16 @@ def record_events(lane, motion, events):
     """Record the impacts of the scalar kernel's last call; returns the last event's detail."""
     detail = 0
     for i in range(motion.recorded_events):
-        kind, hit, detail = events.event_labels[i, 1], events.event_labels[i, 2], events.event_labels[i, 3]
+        kind = events.event_labels[i, 1]
+        hit = events.event_labels[i, 2]
+        detail = events.event_labels[i, 3]
         if kind == EventCode.IMPACT:
             lane.impacts += 1.0
             for k in range(lane.sizes.contacts):
                 if hit >> k & 1:
-                    lane.least_speed = min(lane.least_speed, abs(events.event_values[i, 1 + lane.sizes.coordinates[k]]))
+                    lane.least_speed = min(
+                        lane.least_speed, abs(events.event_values[i, 1 + lane.sizes.coordinates[k]])
+                    )
     return detail
 
 

@@ -1,11 +1,13 @@
-"""Impacts in lanes of a model with several contacts: one contact closes, alone or while others are closed.
+"""Impacts in lanes of a model with several contacts: one contact closes, alone or while others are
+closed.
 
-Its compiled part goes into one module with that of `contacts/lane_step.py`. The complementarity problem
+Its compiled part goes into one module with that of `contacts/lane_step.py`. The complementarity
+problem
 
     v+ = v- + M^-1 sum_i s_i J_i,    0 <= J _|_ (v+ + E v-) >= 0
 
-is solved by trying an impulse at the contact that closes alone, then impulses at this and all closed contacts. Lanes in which
-neither is a solution are solved one at a time (`scalar_impact.py`).
+is solved by trying an impulse at the contact that closes alone, then impulses at this and all
+closed contacts. Lanes in which neither is a solution are solved one at a time (`scalar_impact.py`).
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from saltus.flow.lanes.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -30,15 +32,20 @@ def write_closed(lane, contacts):
 
 @lean_jit
 def read_contacts(lane, contacts):
-    """Fill the scalar kernel's rows of contacts for a lane that moves smoothly; a gap that has just opened may still be 0.
+    """Fill the scalar kernel's rows of contacts for a lane that moves smoothly; a gap that has just
+    opened may still be 0.
 
-    `WAITS` is kept: looking for the end of an accumulation too often could take as long as all its impacts.
+    `WAITS` is kept: looking for the end of an accumulation too often could take as long as all its
+    impacts.
     """
     for i in range(lane.sizes.contacts):
         coordinate = lane.sizes.coordinates[i]
-        there, free = lane.position[coordinate] == lane.contacts[i], lane.free[coordinate] > 0.5
-        contacts[i, ContactColumn.COORDINATE], contacts[i, ContactColumn.CLOSED] = coordinate, 1 if there and not free else 0
-        contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1 if there and free else 0, 0
+        there = lane.position[coordinate] == lane.contacts[i]
+        free = lane.free[coordinate] > 0.5
+        contacts[i, ContactColumn.COORDINATE] = coordinate
+        contacts[i, ContactColumn.CLOSED] = 1 if there and not free else 0
+        contacts[i, ContactColumn.SKIP] = 1 if there and free else 0
+        contacts[i, ContactColumn.RELEASED] = 0
 
 
 @inline_jit
@@ -65,7 +72,8 @@ def acting_lanes(lanes, closing, i):
 @inline_jit
 def aim(lanes, closing, i):
     """The rate -E v- of a contact's gap after the impact, if the contact has an impulse."""
-    count, factor = lanes.sizes.contacts, splat(0.0)
+    count = lanes.sizes.contacts
+    factor = splat(0.0)
     for j in range(count):
         factor = select(mask(closing_lanes(closing, j)), lanes.restitution[count * i + j], factor)
     return factor * closing.speed
@@ -73,17 +81,21 @@ def aim(lanes, closing, i):
 
 @lean_jit
 def resolve_impacts(lanes, hit, which):
-    """Apply the impact law in the lanes in `hit`, where the contact `which` closes, at the new state; returns the resolved lanes.
+    """Apply the impact law in the lanes in `hit`, where the contact `which` closes, at the new
+    state; returns the resolved lanes.
 
-    Lanes are not resolved, and unchanged, if the speeds that are left are so small that an accumulation may end, or all 0.
+    Lanes are not resolved, and unchanged, if the speeds that are left are so small that an
+    accumulation may end, or all 0.
     """
-    speed, matrices = splat(0.0), lanes.code.impact
+    speed = splat(0.0)
+    matrices = lanes.code.impact
     matrices(lanes.memory, lanes.places)
     for i in range(lanes.sizes.contacts):
         rate = (1.0 * lanes.sizes.signs[i]) * lanes.new_velocity[lanes.sizes.coordinates[i]]
         speed = select(mask(hit & bits(absolute(which - 1.0 * i) < 0.5)), -rate, speed)
     lanes.new_speed = speed
-    resolved, left = 0, hit & bits(speed > 0.0)
+    resolved = 0
+    left = hit & bits(speed > 0.0)
     for together in range(2):
         if left:
             closing = Closing(left, which, speed, together)
@@ -97,17 +109,25 @@ def resolve_impacts(lanes, hit, which):
 
 @lean_jit
 def give_impulses(lanes, closing):
-    """Solve for the jumps of all velocities: those at the acting contacts are given, and no impulse acts on the others."""
-    local, free, jump, matrix = lanes.sizes.local, lanes.impulse_free, lanes.jump, lanes.matrix
+    """Solve for the jumps of all velocities: those at the acting contacts are given, and no impulse
+    acts on the others.
+    """
+    local = lanes.sizes.local
+    free = lanes.impulse_free
+    jump = lanes.jump
+    matrix = lanes.matrix
     for row in range(local):
-        free[row], jump[row] = splat(1.0), splat(0.0)
+        free[row] = splat(1.0)
+        jump[row] = splat(0.0)
     for i in range(lanes.sizes.contacts):
-        row, acts = lanes.sizes.coordinates[i], mask(acting_lanes(lanes, closing, i))
+        row = lanes.sizes.coordinates[i]
+        acts = mask(acting_lanes(lanes, closing, i))
         after = (1.0 * lanes.sizes.signs[i]) * aim(lanes, closing, i)
         free[row] = select(acts, splat(0.0), free[row])
         jump[row] = select(acts, after - lanes.new_velocity[row], jump[row])
     for row in range(local):
-        known, here = splat(0.0), free[row]
+        known = splat(0.0)
+        here = free[row]
         for column in range(local):
             entry = lanes.mass[local * row + column]
             known = fma(entry, jump[column] * (1.0 - free[column]), known)
@@ -119,7 +139,9 @@ def give_impulses(lanes, closing):
 
 @lean_jit
 def eliminate_in_lanes(matrix, right, size):
-    """Solve a linear system in place, without pivoting, which a positive definite matrix does not need."""
+    """Solve a linear system in place, without pivoting, which a positive definite matrix does not
+    need.
+    """
     for k in range(size):
         inverse = 1.0 / matrix[size * k + k]
         for row in range(k + 1, size):
@@ -137,12 +159,20 @@ def eliminate_in_lanes(matrix, right, size):
 
 @lean_jit
 def impulses_hold(lanes, closing):
-    """Bits of the lanes in which the jumps solve the problem, no slow speed is left, and some coordinate is free afterwards."""
-    local, jump, good, freed = lanes.sizes.local, lanes.jump, closing.hit, splat(1.0 * lanes.sizes.own)
+    """Bits of the lanes in which the jumps solve the problem, no slow speed is left, and some
+    coordinate is free afterwards.
+    """
+    local = lanes.sizes.local
+    jump = lanes.jump
+    good = closing.hit
+    freed = splat(1.0 * lanes.sizes.own)
     for i in range(lanes.sizes.contacts):
-        row, aimed, sign = lanes.sizes.coordinates[i], aim(lanes, closing, i), 1.0 * lanes.sizes.signs[i]
+        row = lanes.sizes.coordinates[i]
+        aimed = aim(lanes, closing, i)
+        sign = 1.0 * lanes.sizes.signs[i]
         concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
-        acts, impulse = acting_lanes(lanes, closing, i), splat(0.0)
+        acts = acting_lanes(lanes, closing, i)
+        impulse = splat(0.0)
         for column in range(local):
             impulse = fma(lanes.mass[local * row + column], jump[column], impulse)
         rate = select(mask(acts), aimed, sign * jump[row])
@@ -162,16 +192,23 @@ def take_impulses(lanes, closing):
         after = lanes.new_velocity[row]
         if row < lanes.sizes.local:
             after = after + lanes.jump[row]
-        lanes.after_position[row] = select(chosen, lanes.new_position[row], lanes.after_position[row])
+        lanes.after_position[row] = select(
+            chosen, lanes.new_position[row], lanes.after_position[row]
+        )
         lanes.after_velocity[row] = select(chosen, after, lanes.after_velocity[row])
-    for i in range(lanes.sizes.contacts):  # all contacts before `free` changes: it still says which were closed
+    # all contacts before `free` changes: it still says which were closed
+    for i in range(lanes.sizes.contacts):
         concerned = closing_lanes(closing, i) | (closed_lanes(lanes, i) & closing.hit)
         stays = mask(concerned & bits(absolute(lanes.rates[i]) <= 0.0))
         lanes.stays[i] = select(stays, splat(1.0), splat(0.0))
-        row, rate = lanes.sizes.coordinates[i], (1.0 * lanes.sizes.signs[i]) * lanes.rates[i]
-        lanes.after_velocity[row] = select(mask(acting_lanes(lanes, closing, i)), rate + 0.0, lanes.after_velocity[row])
+        row = lanes.sizes.coordinates[i]
+        rate = (1.0 * lanes.sizes.signs[i]) * lanes.rates[i]
+        lanes.after_velocity[row] = select(
+            mask(acting_lanes(lanes, closing, i)), rate + 0.0, lanes.after_velocity[row]
+        )
     for row in range(lanes.sizes.local):
         lanes.free[row] = select(chosen, splat(1.0), lanes.free[row])
     for i in range(lanes.sizes.contacts):
-        row, stays = lanes.sizes.coordinates[i], mask(closing.hit & bits(lanes.stays[i] > 0.5))
+        row = lanes.sizes.coordinates[i]
+        stays = mask(closing.hit & bits(lanes.stays[i] > 0.5))
         lanes.free[row] = select(stays, splat(0.0), lanes.free[row])

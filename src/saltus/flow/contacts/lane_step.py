@@ -1,12 +1,14 @@
-"""A step of all lanes of a model with several contacts: the smooth motion up to the first closing of a gap, and impacts.
+"""A step of all lanes of a model with several contacts: the smooth motion up to the first closing
+of a gap, and impacts.
 
-Its compiled part goes into one module with that of `lanes/driver.py`, in the place of `one_contact/lane_step.py`, and with that
-of `lane_impacts.py`. Lanes move together as long as all closed contacts certainly push and at most one gap closes. Releases,
-contacts that close together, slow impacts and rest are left to the scalar kernel, and so are all events of motions with a
+Its compiled part goes into one module with that of `lanes/driver.py`, in the place of
+`one_contact/lane_step.py`, and with that of `lane_impacts.py`. Lanes move together as long as all
+closed contacts certainly push and at most one gap closes. Releases, contacts that close together,
+slow impacts and rest are left to the scalar kernel, and so are all events of motions with a
 tangent. The scalar kernel does all steps of motions with frictions.
 
-If exactly one coordinate is free in every lane, all lanes share a series of this coordinate alone, even if it is not the same one
-in all lanes (`one_free.py`).
+If exactly one coordinate is free in every lane, all lanes share a series of this coordinate alone,
+even if it is not the same one in all lanes (`one_free.py`).
 """
 
 from __future__ import annotations
@@ -14,48 +16,85 @@ from __future__ import annotations
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.layout import Mode
-from saltus.flow.lanes.lane_steps import both_at, commit, find_contact, natural_step, row_step, series_true, state_size, sweep
+from saltus.flow.lanes.lane_steps import (
+    both_at,
+    commit,
+    find_contact,
+    natural_step,
+    row_step,
+    series_true,
+    state_size,
+    sweep,
+)
 from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
 from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_memory import one
-from saltus.taylor.lane_vectors import ALL, absolute, bits, first_lane, fma, lane_count, mask, minimum, select, splat, vector_lane
+from saltus.taylor.lane_vectors import (
+    ALL,
+    absolute,
+    bits,
+    first_lane,
+    fma,
+    lane_count,
+    mask,
+    minimum,
+    select,
+    splat,
+    vector_lane,
+)
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-COST_OF_SEVERAL = 3  # The time of a step with the series of all coordinates, in units of that with the series of one.
-TOGETHER = 1e-6  # Gaps that close within this share of a step may close together, which the scalar kernel decides.
+# The time of a step with the series of all coordinates, in units of that with the series of one.
+COST_OF_SEVERAL = 3
+# Gaps that close within this share of a step may close together, which the scalar kernel decides.
+TOGETHER = 1e-6
 SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close together with it.
 
 
 @lean_jit
 def begin_contact(lane, env, state):
-    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 for the side."""
-    local, count, sizes = lane.sizes.local, lane.sizes.contacts, lane.sizes
-    solved, contacts, matrices = lane.geometry[lane.index], lane.contact_rows[lane.index], lane.code.geometry
-    matrices(env, lane.piece, lane.memory, solved)  # any state will do: positions depend on parameters alone
+    """Tell a lane where its contacts are; returns the mode in which a motion begins, and 1 for the
+    side.
+    """
+    local = lane.sizes.local
+    count = lane.sizes.contacts
+    sizes = lane.sizes
+    solved = lane.geometry[lane.index]
+    contacts = lane.contact_rows[lane.index]
+    matrices = lane.code.geometry
+    # any state will do: positions depend on parameters alone
+    matrices(env, lane.piece, lane.memory, solved)
     mode = Mode.ARC
     for i in range(count):
-        coordinate, position, sign = sizes.coordinates[i], solved[local * local + count * count + i], sizes.signs[i]
+        coordinate = sizes.coordinates[i]
+        position = solved[local * local + count * count + i]
+        sign = sizes.signs[i]
         lane.contacts[i] = position
-        gap, rate = sign * (state[coordinate] - position), sign * state[state.size // 2 + coordinate]
+        gap = sign * (state[coordinate] - position)
+        rate = sign * state[state.size // 2 + coordinate]
         contacts[i, ContactColumn.COORDINATE] = coordinate
         contacts[i, ContactColumn.CLOSED] = 1 if gap == 0.0 and rate == 0.0 else 0
-        contacts[i, ContactColumn.SKIP], contacts[i, ContactColumn.RELEASED] = 1 if gap == 0.0 else 0, 0
+        contacts[i, ContactColumn.SKIP] = 1 if gap == 0.0 else 0
+        contacts[i, ContactColumn.RELEASED] = 0
         contacts[i, ContactColumn.WAITS] = 0
         if not (gap > 0.0 or (gap == 0.0 and rate >= 0.0)):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
             mode = Mode.CONTACT
     for k in range(sizes.frictions):
-        coordinate, row = sizes.coordinates[count + k], contacts[count + k]
+        coordinate = sizes.coordinates[count + k]
+        row = contacts[count + k]
         surface = coordinate < 0
         coordinate = -1 - coordinate if surface else coordinate
-        beyond, rate = state[coordinate], state[state.size // 2 + coordinate]
+        beyond = state[coordinate]
+        rate = state[state.size // 2 + coordinate]
         if not surface:
             beyond = rate
         beyond -= solved[solved.size - sizes.frictions + k]
-        row[FrictionColumn.COORDINATE], row[FrictionColumn.SKIP] = coordinate, 0
+        row[FrictionColumn.COORDINATE] = coordinate
+        row[FrictionColumn.SKIP] = 0
         row[FrictionColumn.SLIDES] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
         row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
         if surface:
@@ -70,33 +109,41 @@ def begin_contact(lane, env, state):
 
 @lean_jit
 def side_at_end(lane):
-    """1 plus the bits of the contacts that are closed at the end of a motion; within the step that went beyond it an impact may
-    have opened some of them."""
+    """1 plus the bits of the contacts that are closed at the end of a motion; within the step that
+    went beyond it an impact may have opened some of them."""
     closed = 0
     for i in range(lane.sizes.contacts):
         row = lane.sizes.coordinates[i]
-        if lane.position[row] == lane.contacts[i] and (lane.free[row] < 0.5 or lane.velocity[row] == 0.0):
+        if lane.position[row] == lane.contacts[i] and (
+            lane.free[row] < 0.5 or lane.velocity[row] == 0.0
+        ):
             closed |= 1 << i
     return 1 + closed
 
 
 @lean_jit
 def stays_positive(series, order, h):
-    """Bits of the lanes in which a series is certainly positive on [0, h]: by the Bernstein coefficients of its cubic part, and a
-    bound of the rest."""
+    """Bits of the lanes in which a series is certainly positive on [0, h]: by the Bernstein
+    coefficients of its cubic part, and a bound of the rest."""
     rest = splat(0.0)
     for k in range(order - 1, 3, -1):
         rest = fma(rest, h, absolute(series[k]))
     square = h * h
-    c0, c1, c2 = series[0], h * series[1], square * series[2]
+    c0 = series[0]
+    c1 = h * series[1]
+    c2 = square * series[2]
     end = c0 + c1 + c2 + square * h * series[3]
-    low = minimum(minimum(c0, c0 + c1 * (1.0 / 3.0)), minimum(c0 + (2.0 * c1 + c2) * (1.0 / 3.0), end))
+    low = minimum(
+        minimum(c0, c0 + c1 * (1.0 / 3.0)), minimum(c0 + (2.0 * c1 + c2) * (1.0 / 3.0), end)
+    )
     return bits(low > rest * (square * square))
 
 
 @lean_jit
 def guards_certain(lanes, h):
-    """Bits of the lanes in which certainly, over the step, all reactions of closed contacts and all margins stay positive."""
+    """Bits of the lanes in which certainly, over the step, all reactions of closed contacts and all
+    margins stay positive.
+    """
     sure = ALL
     for i in range(lanes.sizes.margins):
         closed = closed_lanes(lanes, i) if i < lanes.sizes.contacts else ALL
@@ -107,9 +154,12 @@ def guards_certain(lanes, h):
 
 @inline_jit
 def first_closing(lanes, h, alive):
-    """The first gap that closes in the step. Returns bits of the lanes in which one closes, bits of the lanes in doubt, the
-    times, and the contacts."""
-    hit, doubtful, tau, which = 0, 0, h, splat(0.0)
+    """The first gap that closes in the step. Returns bits of the lanes in which one closes, bits of
+    the lanes in doubt, the times, and the contacts."""
+    hit = 0
+    doubtful = 0
+    tau = h
+    which = splat(0.0)
     for i in range(lanes.sizes.contacts):
         row = lanes.sizes.coordinates[i]
         opened = alive & bits(lanes.free[row] > 0.5)
@@ -118,7 +168,9 @@ def first_closing(lanes, h, alive):
         start = lanes.position[row] - lanes.contacts[i]
         mean, v, a, bend = sweep(lanes, row, h)
         gap = Gap(row, start, splat(1.0 * lanes.sizes.signs[i]), bits(start * start <= 0.0))
-        closes, unclear, _, when, _ = find_contact(lanes, gap, h, (fma(mean, h, start), v, a, bend), opened, 0)
+        closes, unclear, _, when, _ = find_contact(
+            lanes, gap, h, (fma(mean, h, start), v, a, bend), opened, 0
+        )
         doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
         first = closes & (~hit | bits(when < tau))
         tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
@@ -128,17 +180,22 @@ def first_closing(lanes, h, alive):
 
 @inline_jit
 def put_new_state(lanes, tau, hit, which):
-    """Put the state at `tau`, with the contact that closes exactly at its position. Returns bits of the lanes in which another
-    gap is nearly 0 as well."""
+    """Put the state at `tau`, with the contact that closes exactly at its position. Returns bits of
+    the lanes in which another gap is nearly 0 as well."""
     near = 0
     for row in range(lanes.sizes.rows):
         x, v = both_at(lanes, row, tau)
-        lanes.new_position[row], lanes.new_velocity[row] = x, v
+        lanes.new_position[row] = x
+        lanes.new_velocity[row] = v
     for i in range(lanes.sizes.contacts if hit else 0):
-        row, contact = lanes.sizes.coordinates[i], lanes.contacts[i]
-        x, this = lanes.new_position[row], hit & bits(absolute(which - 1.0 * i) < 0.5)
+        row = lanes.sizes.coordinates[i]
+        contact = lanes.contacts[i]
+        x = lanes.new_position[row]
+        this = hit & bits(absolute(which - 1.0 * i) < 0.5)
         opened = bits(lanes.free[row] > 0.5)
-        near |= hit & ~this & opened & bits((x - contact) * (1.0 * lanes.sizes.signs[i]) < SMALL_GAP)
+        near |= (
+            hit & ~this & opened & bits((x - contact) * (1.0 * lanes.sizes.signs[i]) < SMALL_GAP)
+        )
         lanes.new_position[row] = select(mask(this), contact, x)
     return near
 
@@ -147,11 +204,14 @@ def put_new_state(lanes, tau, hit, which):
 def free_step(lanes, alive):
     """A step of all lanes, whichever coordinates are free, with the new state in its slots.
 
-    Returns bits of the lanes in which a gap closes, bits of the lanes in which nothing is in doubt, and the step.
+    Returns bits of the lanes in which a gap closes, bits of the lanes in which nothing is in doubt,
+    and the step.
     """
     series = lanes.code.series
     series(lanes.memory, lanes.places, lanes.sizes.order)
-    size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
+    size = state_size(lanes)
+    now = lanes.now
+    limit = lanes.step_limit
     natural = natural_step(lanes, size)
     h = minimum(natural, limit - now)
     sound = bits(natural > lanes.settings.shortest_step) & bits(size < FAST)
@@ -166,7 +226,7 @@ def free_step(lanes, alive):
     return hit, sound, Step(h, tau, bend, which)
 
 
-# --- one coordinate is free ------------------------------------------------------------------------------------------------
+# --- one coordinate is free --------------------------------------------------
 
 
 @inline_jit
@@ -188,7 +248,8 @@ def one_is_free(lanes):
 @lean_jit
 def free_guards_certain(lanes, tau):
     """`guards_certain` where one coordinate is free."""
-    sure, order = ALL, lanes.sizes.order
+    sure = ALL
+    order = lanes.sizes.order
     for i in range(lanes.sizes.guards):
         guard = lanes.margins[i]
         if i < lanes.sizes.own - 1:
@@ -203,22 +264,35 @@ def free_guards_certain(lanes, tau):
 
 @inline_jit
 def one_free_step(lanes, alive):
-    """As `free_step`, for lanes in which one coordinate is free; its series are in row 0, whichever coordinate it is."""
-    x, v, sign, contact, which = splat(0.0), splat(0.0), splat(1.0), splat(0.0), splat(0.0)
+    """As `free_step`, for lanes in which one coordinate is free; its series are in row 0, whichever
+    coordinate it is.
+    """
+    x = splat(0.0)
+    v = splat(0.0)
+    sign = splat(1.0)
+    contact = splat(0.0)
+    which = splat(0.0)
     for i in range(lanes.sizes.contacts):
         row = lanes.sizes.coordinates[i]
         free = mask(bits(lanes.free[row] > 0.5))
         x, v = select(free, lanes.position[row], x), select(free, lanes.velocity[row], v)
         sign = select(free, splat(1.0 * lanes.sizes.signs[i]), sign)
-        contact, which = select(free, lanes.contacts[i], contact), select(free, splat(1.0 * i), which)
+        contact, which = (
+            select(free, lanes.contacts[i], contact),
+            select(free, splat(1.0 * i), which),
+        )
     lanes.free_position, lanes.free_velocity, series = x, v, lanes.code.one_free
     series(lanes.memory, lanes.places, lanes.sizes.order)
-    size, now, limit = state_size(lanes), lanes.now, lanes.step_limit
+    size = state_size(lanes)
+    now = lanes.now
+    limit = lanes.step_limit
     natural = row_step(lanes.velocities[0], lanes.sizes.order, size, lanes.settings.limits)
-    h, start = minimum(natural, limit - now), x - contact
+    h = minimum(natural, limit - now)
+    start = x - contact
     sound = bits(natural > lanes.settings.shortest_step) & bits(size < FAST)
     mean, v, a, bend = sweep(lanes, 0, h)
-    gap, end = Gap(0, start, sign, bits(start * start <= 0.0)), (fma(mean, h, start), v, a, bend)
+    gap = Gap(0, start, sign, bits(start * start <= 0.0))
+    end = (fma(mean, h, start), v, a, bend)
     hit, doubtful, _, tau, at_root = find_contact(lanes, gap, h, end, alive & sound, 0)
     sound &= ~doubtful & free_guards_certain(lanes, tau)
     closing = mask(hit)
@@ -233,7 +307,9 @@ def one_free_step(lanes, alive):
 
 @inline_jit
 def of_free(lanes, part, which):
-    """The value, in a part of the memory, for the coordinate of the contact `which`, which was free in the step."""
+    """The value, in a part of the memory, for the coordinate of the contact `which`, which was free
+    in the step.
+    """
     value = splat(0.0)
     for i in range(lanes.sizes.contacts):
         was_free = mask(bits(absolute(which - 1.0 * i) < 0.5))
@@ -243,30 +319,41 @@ def of_free(lanes, part, which):
 
 @inline_jit
 def pass_ends_of_free(lanes, step, past):
-    """`pass_ends` for lanes in which only the coordinate of one contact was free: the other coordinates stay constant."""
-    since, chosen = lanes.period_end - lanes.now, mask(past)
+    """`pass_ends` for lanes in which only the coordinate of one contact was free: the other
+    coordinates stay constant.
+    """
+    since = lanes.period_end - lanes.now
+    chosen = mask(past)
     x, v = both_at(lanes, 0, since)
     for i in range(lanes.sizes.contacts):
-        row, was_free = lanes.sizes.coordinates[i], mask(bits(absolute(step.contact - 1.0 * i) < 0.5))
-        lanes.ended_position[row] = select(chosen, select(was_free, x, lanes.position[row]), lanes.ended_position[row])
-        lanes.ended_velocity[row] = select(chosen, select(was_free, v, splat(0.0)), lanes.ended_velocity[row])
+        row = lanes.sizes.coordinates[i]
+        was_free = mask(bits(absolute(step.contact - 1.0 * i) < 0.5))
+        lanes.ended_position[row] = select(
+            chosen, select(was_free, x, lanes.position[row]), lanes.ended_position[row]
+        )
+        lanes.ended_velocity[row] = select(
+            chosen, select(was_free, v, splat(0.0)), lanes.ended_velocity[row]
+        )
     if lanes.sizes.extrema > 0:
-        record_range(lanes, 0, Stretch(splat(0.0), since, lanes.free_velocity, x, v, step.h, step.bend), past)
+        record_range(
+            lanes, 0, Stretch(splat(0.0), since, lanes.free_velocity, x, v, step.h, step.bend), past
+        )
     keep_ended(lanes, past)
 
 
-# --- all lanes ----------------------------------------------------------------------------------------------------------------
+# --- all lanes ---------------------------------------------------------------
 
 
 @inline_jit
 def step_all(lanes):
-    """One step, either of all lanes in which exactly one coordinate is free, or of all other lanes: of those that are more
-    numerous relative to the cost of their step.
+    """One step, either of all lanes in which exactly one coordinate is free, or of all other lanes:
+    of those that are more numerous relative to the cost of their step.
 
-    The choice changes no motion, as the other lanes only wait. Returns bits for the scalar kernel, bits captured, and bits past
-    the end of their forcing period.
+    The choice changes no motion, as the other lanes only wait. Returns bits for the scalar kernel,
+    bits captured, and bits past the end of their forcing period.
     """
-    alive, single = lanes.busy & ~lanes.scalar, False
+    alive = lanes.busy & ~lanes.scalar
+    single = False
     if lanes.sizes.one_free > 0:
         with_one = alive & one_is_free(lanes)
         single = lane_count(alive & ~with_one) <= COST_OF_SEVERAL * lane_count(with_one)
@@ -276,7 +363,8 @@ def step_all(lanes):
     else:
         hit, sound, step = free_step(lanes, alive)
     hit &= sound & alive
-    resolved, moved = 0, alive & sound & ~hit
+    resolved = 0
+    moved = alive & sound & ~hit
     if hit and lanes.sizes.columns == 0:  # impacts with a tangent are left to the scalar kernel
         resolved = resolve_all(lanes, hit, step.contact)
     moved |= resolved
@@ -294,11 +382,18 @@ def step_all(lanes):
 
 @inline_jit
 def resolve_all(lanes, hit, which):
-    """Apply the impact law in the lanes in `hit`, together where that is possible; returns the resolved lanes."""
-    resolved = 0 if lanes.sizes.jumps > 0 or lanes.sizes.dependent > 0 else resolve_impacts(lanes, hit, which)
+    """Apply the impact law in the lanes in `hit`, together where that is possible; returns the
+    resolved lanes.
+    """
+    resolved = (
+        0
+        if lanes.sizes.jumps > 0 or lanes.sizes.dependent > 0
+        else resolve_impacts(lanes, hit, which)
+    )
     waiting = hit & ~resolved
     while waiting:
-        i, impact = first_lane(waiting), lanes.helpers.impact
+        i = first_lane(waiting)
+        impact = lanes.helpers.impact
         waiting &= waiting - 1
         if impact(one(lanes, i), 1 << int(vector_lane(which, i))):
             resolved |= 1 << i
@@ -307,15 +402,22 @@ def resolve_all(lanes, hit, which):
 
 @inline_jit
 def record_step(lanes, step, single, past, moved):
-    """Record the extrema of all coordinates up to the new state; in lanes `past` the end of a period, from this end."""
-    after, tau = mask(past), step.taken
+    """Record the extrema of all coordinates up to the new state; in lanes `past` the end of a
+    period, from this end.
+    """
+    after = mask(past)
+    tau = step.taken
     begin = select(after, lanes.period_end - lanes.now, splat(0.0))
     if single:  # held coordinates are constant, and the records of the period begin with them
-        v_begin = select(after, of_free(lanes, lanes.ended_velocity, step.contact), lanes.free_velocity)
-        x, v = of_free(lanes, lanes.new_position, step.contact), of_free(lanes, lanes.new_velocity, step.contact)
+        v_begin = select(
+            after, of_free(lanes, lanes.ended_velocity, step.contact), lanes.free_velocity
+        )
+        x = of_free(lanes, lanes.new_position, step.contact)
+        v = of_free(lanes, lanes.new_velocity, step.contact)
         record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
     else:
         v_begin = select(after, lanes.ended_velocity[0], lanes.velocities[0][0])
-        x, v = lanes.new_position[0], lanes.new_velocity[0]
+        x = lanes.new_position[0]
+        v = lanes.new_velocity[0]
         record_range(lanes, 0, Stretch(begin, tau, v_begin, x, v, step.h, step.bend), moved)
         record_others(lanes, step, past, moved)

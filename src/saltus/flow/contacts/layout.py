@@ -1,5 +1,5 @@
-"""Places in the arrays that the kernel for several contacts shares with its callers, its thresholds, and the arrays in which it
-solves for impacts and closed contacts."""
+"""Places in the arrays that the kernel for several contacts shares with its callers, its
+thresholds, and the arrays in which it solves for impacts and closed contacts."""
 
 from __future__ import annotations
 
@@ -16,20 +16,30 @@ class ContactColumn(IntEnum):
 
     COORDINATE = 0  # the coordinate that it holds
     CLOSED = 1  # 1 if it is closed: its gap and the gap's rate are then exactly 0
-    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
+    # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a
+    # step
+    SKIP = 2
     RELEASED = 3  # 1 if its reaction has just fallen to 0, and is known to be 0
     WAITS = 4  # after how many more of its impacts the end of an accumulation is looked for again
 
 
 class FrictionColumn(IntEnum):
-    """Columns of the rows behind those of the contacts, one row for each friction, then one for each surface."""
+    """Columns of the rows behind those of the contacts, one row for each friction, then one for
+    each surface.
+    """
 
     COORDINATE = 0  # the coordinate along which it acts
-    SLIDES = 1  # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above its position; 2 of a
+    # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above
+    # its position; 2 of a
+    SLIDES = 1
     # friction in a contact that is open
-    SKIP = 2  # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a step
-    MARGIN = 3  # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
-    REACHED = 4  # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached
+    # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a
+    # step
+    SKIP = 2
+    # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
+    MARGIN = 3
+    # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached
+    REACHED = 4
     PRESSED = 5  # 1 plus the number of the contact whose reaction presses it, 0 for none
     STRUCK = 6  # a `FrictionImpact`
 
@@ -53,10 +63,13 @@ class SegmentPlan(IntEnum):
     """Columns of the plan that describes each segment of an orbit (`segments.py`)."""
 
     ALONG = 0  # the contacts that are closed along the segment, as bits
-    KIND = 1  # the kind of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
+    # the kind of the event with which it ends: IMPACT or RELEASE of `EventCode`, -1 for none
+    KIND = 1
     CONTACT = 2  # the contact of that event
     AFTER = 3  # the contacts that are closed after it, as bits
-    POWER = 4  # its guard is divided by this power of its duration: 3 or 2 for excursions (`excursion_guard`), else 0
+    # its guard is divided by this power of its duration: 3 or 2 for excursions (`excursion_guard`),
+    # else 0
+    POWER = 4
     HIT = 5  # the contact whose impact begins it, -1 for none
 
 
@@ -67,7 +80,9 @@ class SegmentEnd(IntEnum):
     RATE = 1  # the guard's rate; at an impact minus the speed
     BY_START = 2  # the guard's derivative to the time of the segment's start
     BY_END = 3  # the guard's derivative to the time of its end
-    NUMBERS = 4  # state and rates at the start, both at the end, the state after the event: 10 numbers for each coordinate
+    # state and rates at the start, both at the end, the state after the event: 10 numbers for each
+    # coordinate
+    NUMBERS = 4
 
 
 class SegmentExtremes(IntEnum):
@@ -77,9 +92,13 @@ class SegmentExtremes(IntEnum):
     BOTTOM = 1  # the least value of any coordinate
     GAP = 2  # the lowest inner minimum of a gap, its time, and its contact
     FORCE = 5  # the lowest inner minimum of a reaction, its time, and its contact
-    PULL = 8  # at the start, the least reaction of a closed contact or acceleration of an opening one, and its contact
-    TAIL = 10  # at the end, the least reaction of a contact that stays closed up to the event, and its contact
-    BESIDE = 12  # at an impact that ends it, the least gap of another contact whose speed the impact changes
+    # at the start, the least reaction of a closed contact or acceleration of an opening one, and
+    # its contact
+    PULL = 8
+    # at the end, the least reaction of a contact that stays closed up to the event, and its contact
+    TAIL = 10
+    # at an impact that ends it, the least gap of another contact whose speed the impact changes
+    BESIDE = 12
     MARGINS = 13  # the least values of the margins, from here on
 
 
@@ -88,31 +107,51 @@ class ImpactDetail(IntEnum):
 
     REGULAR = 0
     NO_SPEED = 1  # a contact is reached without speed
-    APART = 2  # contacts that act on one another close at one instant, and in neighbouring motions one after the other
-    ORDERED = 3  # contacts that do not act on one another close at one instant, and their order makes a first-order difference
+    # contacts that act on one another close at one instant, and in neighbouring motions one after
+    # the other
+    APART = 2
+    # contacts that do not act on one another close at one instant, and their order makes a
+    # first-order difference
+    ORDERED = 3
 
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 NEAR = (
     2.0**-44
 )  # Contacts close together if, when one closes, the other's gap is no larger than this share of its size in the step.
 GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the contact's position.
-MOST_TRIED = 8  # For models with more contacts sets of them are found by exchanges, as there are too many to try them all.
-VIOLATED = 1e-12  # The largest violation of a complementarity problem that may be rounding, as a share of its right-hand side.
-MOST_FROZEN_IMPACTS = 100_000  # Impacts of an accumulation that are followed at most: e = 0.9996 needs so many for 16 digits.
-APART = 1e-9  # Contacts close together in neighbouring motions too if their shifts differ by less than this share.
-RELATIVE_STEP = 1e-4  # of the differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
-VANISHED = 1e-16  # A contact whose impacts are slower than the first one of an accumulation by this factor rests.
-FINISHED = 1e-14  # An accumulation is over if all speeds are smaller than the first one by this factor. It exceeds VANISHED, at
-# which accumulations of one contact within those of another are cut off: near that scale the cuts would keep the other one going.
-TRIED_AGAIN = 32  # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
-TIED = 1e-12  # Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.
+# For models with more contacts sets of them are found by exchanges, as there are too many to try
+# them all.
+MOST_TRIED = 8
+# The largest violation of a complementarity problem that may be rounding, as a share of its
+# right-hand side.
+VIOLATED = 1e-12
+# Impacts of an accumulation that are followed at most: e = 0.9996 needs so many for 16 digits.
+MOST_FROZEN_IMPACTS = 100_000
+# Contacts close together in neighbouring motions too if their shifts differ by less than this
+# share.
+APART = 1e-9
+# of the differences of an accumulation's duration: their error is its square, and 1e-12 by rounding
+RELATIVE_STEP = 1e-4
+# A contact whose impacts are slower than the first one of an accumulation by this factor rests.
+VANISHED = 1e-16
+# An accumulation is over if all speeds are smaller than the first one by this factor. It exceeds
+# VANISHED, at
+FINISHED = 1e-14
+# which accumulations of one contact within those of another are cut off: near that scale the cuts
+# would keep the other one going.
+# If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
+TRIED_AGAIN = 32
+# Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.
+TIED = 1e-12
 
 
 @jit
 def zeros(count):
-    """An array of zeros, made in a function of its own because numba would compile `np.zeros` anew at each call of it."""
+    """An array of zeros, made in a function of its own because numba would compile `np.zeros` anew
+    at each call of it.
+    """
     return np.zeros(count)
 
 
@@ -124,8 +163,11 @@ def rows_of_zeros(rows, columns):
 
 @jit
 def solver_arrays(local, count, columns, frictions, first_order):
-    """The arrays in which impacts are solved for, for so many columns of a tangent and with the rows of frictions."""
-    rubs, rows = 0, count + frictions.shape[0]
+    """The arrays in which impacts are solved for, for so many columns of a tangent and with the
+    rows of frictions.
+    """
+    rubs = 0
+    rows = count + frictions.shape[0]
     for k in range(frictions.shape[0]):
         rubs = 1 + frictions.shape[0] if frictions[k, FrictionColumn.PRESSED] > 0 else rubs
     most = max(2 * local, rows + 1)
@@ -162,21 +204,26 @@ def copy_all(given, target):
 @lean_jit
 def restitution(motion, i, j):
     """The entry E_ij of the restitution matrix."""
-    local, count = motion.local, motion.contacts.shape[0]
+    local = motion.local
+    count = motion.contacts.shape[0]
     return motion.solver_numbers[local * local + count * i + j]
 
 
 @lean_jit
 def contact_position(motion, i):
     """The position of a contact."""
-    local, count = motion.local, motion.contacts.shape[0]
+    local = motion.local
+    count = motion.contacts.shape[0]
     return motion.solver_numbers[local * local + count * count + i]
 
 
 @lean_jit
 def is_sum(motion, i):
-    """Whether a coordinate is a dependent sum: its row of the mass matrix has minus the coefficients of others."""
-    local, found = motion.local, False
+    """Whether a coordinate is a dependent sum: its row of the mass matrix has minus the
+    coefficients of others.
+    """
+    local = motion.local
+    found = False
     for j in range(local - motion.first_order if i >= local - motion.first_order else 0):
         found = found or motion.solver_numbers[local * i + j] != 0.0
     return found
@@ -184,7 +231,9 @@ def is_sum(motion, i):
 
 @lean_jit
 def jumping(motion, i):
-    """What of a coordinate may jump at an event: its velocity, or the value of one of first order that is no dependent sum."""
+    """What of a coordinate may jump at an event: its velocity, or the value of one of first order
+    that is no dependent sum.
+    """
     follows = i >= motion.own - motion.first_order and not is_sum(motion, i)
     return motion.coordinates[i] if follows else motion.velocities[i]
 
@@ -198,7 +247,9 @@ def ground_speed(motion, k):
 @lean_jit
 def has_phases(motion):
     """Whether impacts with friction have a phase of compression and one of expansion."""
-    return motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] - 1] > 0.0
+    return (
+        motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] - 1] > 0.0
+    )
 
 
 @lean_jit

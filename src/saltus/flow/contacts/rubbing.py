@@ -1,6 +1,8 @@
-"""Impacts with friction, in one or two phases, and their derivatives; the accelerations that accumulations follow from.
+"""Impacts with friction, in one or two phases, and their derivatives; the accelerations that
+accumulations follow from.
 
-Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
+`flow/kernel/memory.py`.
 """
 
 from __future__ import annotations
@@ -35,26 +37,39 @@ from saltus.flow.contacts.layout import (
     rub_coefficient,
     zeros,
 )
-from saltus.flow.contacts.tangent import fill_slopes, hold_columns, impulse_columns, lift_rate, note_velocities, slope
+from saltus.flow.contacts.tangent import (
+    fill_slopes,
+    hold_columns,
+    impulse_columns,
+    lift_rate,
+    note_velocities,
+    slope,
+)
 from saltus.flow.kernel.steps import expand
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
 def rubbing_phase(motion, chosen, scale):
-    """Solve an impact with friction, or one of its phases: with N = `impulses` + z of the contacts in `chosen`, and the
-    impulses P of frictions,
+    """Solve an impact with friction, or one of its phases: with N = `impulses` + z of the contacts
+    in `chosen`, and the impulses P of frictions,
 
-        v+ = v- + M^-1 (S N + T P),    0 <= z _|_ S' v+ + `right` >= 0,    P = -mu N s with s = sign(T' v+ - w), or T' v+ = w and
-        abs(P) <= mu N.
+        v+ = v- + M^-1 (S N + T P),    0 <= z _|_ S' v+ + `right` >= 0,    P = -mu N s with s =
+        sign(T' v+ - w), or T' v+ = w and abs(P) <= mu N.
 
-    All choices are tried, as in `complementary`, with speeds of the size `scale`. The velocities and `impulses` are set to those
-    after it, and `STRUCK` of the frictions. Returns the contacts with z > 0 as bits, or -1 if there is no solution.
+    All choices are tried, as in `complementary`, with speeds of the size `scale`. The velocities
+    and `impulses` are set to those after it, and `STRUCK` of the frictions. Returns the contacts
+    with z > 0 as bits, or -1 if there is no solution.
     """
-    local, count, frictions = motion.local, motion.contacts.shape[0], motion.frictions.shape[0]
-    after, found, ways, least = np.zeros(local), -1, 0, np.inf
+    local = motion.local
+    count = motion.contacts.shape[0]
+    frictions = motion.frictions.shape[0]
+    after = np.zeros(local)
+    found = -1
+    ways = 0
+    least = np.inf
     for number in range((1 << count) * 3**frictions):
         acts = number & ((1 << count) - 1)
         if acts & ~chosen or not choose_ways(motion, chosen, acts, number >> count):
@@ -62,7 +77,9 @@ def rubbing_phase(motion, chosen, scale):
         if struck_velocities(motion, acts, after):
             worst = worst_violation(motion, chosen, acts, after)
             if worst < least:
-                found, ways, least = acts, number >> count, worst
+                found = acts
+                ways = number >> count
+                least = worst
             if worst <= 0.0:
                 break
     if not least <= VIOLATED * scale:
@@ -75,34 +92,52 @@ def rubbing_phase(motion, chosen, scale):
     for i in range(count):
         motion.impulses[i] = max(motion.tried[i], 0.0)
         if found >> i & 1:
-            motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] = -motion.signs[i] * motion.right[i] + 0.0
+            motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] = (
+                -motion.signs[i] * motion.right[i] + 0.0
+            )
     for k in range(frictions):
         if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-            motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] = ground_speed(motion, k)
+            motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] = ground_speed(
+                motion, k
+            )
     return found
 
 
 @lean_jit
 def begin_rubbing(motion, chosen):
-    """Fill `right` by the restitution and clear the impulses; returns the size of the speeds at an impact."""
-    scale, count = 0.0, motion.contacts.shape[0]
+    """Fill `right` by the restitution and clear the impulses; returns the size of the speeds at an
+    impact.
+    """
+    scale = 0.0
+    count = motion.contacts.shape[0]
     for i in range(count):
         motion.impulses[i] = motion.right[i] = 0.0
         scale = max(scale, abs(motion.rates[i]) if chosen >> i & 1 else 0.0)
         for j in range(count):
-            motion.right[i] += restitution(motion, i, j) * motion.rates[j] if chosen >> j & 1 else 0.0
+            motion.right[i] += (
+                restitution(motion, i, j) * motion.rates[j] if chosen >> j & 1 else 0.0
+            )
     for k in range(motion.frictions.shape[0]):
-        scale = max(scale, abs(motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(motion, k)))
+        scale = max(
+            scale,
+            abs(
+                motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]]
+                - ground_speed(motion, k)
+            ),
+        )
     return scale
 
 
 @lean_jit
 def has_one_impulse(motion, chosen):
-    """Whether the impulses of frictions in the contacts in `chosen` are certainly the only ones: G_nn > mu abs(G_nt) of each."""
+    """Whether the impulses of frictions in the contacts in `chosen` are certainly the only ones:
+    G_nn > mu abs(G_nt) of each.
+    """
     for k in range(motion.frictions.shape[0]):
         i = motion.frictions[k, FrictionColumn.PRESSED] - 1
         if i >= 0 and chosen >> i & 1:
-            a, c = motion.contacts[i, ContactColumn.COORDINATE], motion.frictions[k, FrictionColumn.COORDINATE]
+            a = motion.contacts[i, ContactColumn.COORDINATE]
+            c = motion.frictions[k, FrictionColumn.COORDINATE]
             if not motion.inverse[a, a] > rub_coefficient(motion, k) * abs(motion.inverse[a, c]):
                 return False
     return True
@@ -110,16 +145,19 @@ def has_one_impulse(motion, chosen):
 
 @jit
 def rubbing_impact(motion, chosen, slopes):
-    """Apply the impact law with friction to the contacts in `chosen`, whose rates before it are in `rates`, which then has those
-    after it; the velocities are changed, and the columns if they have `slopes`. Returns the contacts that act as bits, or -1 if
-    there is no solution, or not only one.
+    """Apply the impact law with friction to the contacts in `chosen`, whose rates before it are in
+    `rates`, which then has those after it; the velocities are changed, and the columns if they have
+    `slopes`. Returns the contacts that act as bits, or -1 if there is no solution, or not only one.
 
-    With phases the first one ends with rates of 0, and the second one has the impulses e times those of the first, and more where
-    a contact would close again.
+    With phases the first one ends with rates of 0, and the second one has the impulses e times
+    those of the first, and more where a contact would close again.
     """
-    count, total, own_slopes = motion.contacts.shape[0], np.zeros(motion.contacts.shape[0]), motion.pull_slopes
+    count = motion.contacts.shape[0]
+    total = np.zeros(motion.contacts.shape[0])
+    own_slopes = motion.pull_slopes
     scale = begin_rubbing(motion, chosen)
-    acts, phases = -1, has_phases(motion)
+    acts = -1
+    phases = has_phases(motion)
     if not has_one_impulse(motion, chosen):
         return -1
     for j in range(motion.columns):
@@ -140,20 +178,26 @@ def rubbing_impact(motion, chosen, slopes):
     for i in range(count):
         motion.impulses[i] += total[i]
         rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
-        motion.rates[i] = -motion.right[i] + 0.0 if acts >> i & 1 else max(rate, 0.0) if chosen >> i & 1 else rate
+        motion.rates[i] = (
+            -motion.right[i] + 0.0 if acts >> i & 1 else max(rate, 0.0) if chosen >> i & 1 else rate
+        )
     return acts
 
 
 @jit
 def rubbing_columns(motion, acts, chosen, first):
-    """Differentiate an impact with friction, with the directions in which frictions slide after it and those that stick.
+    """Differentiate an impact with friction, with the directions in which frictions slide after it
+    and those that stick.
 
-    As `impulse_columns`, with M w = S N + T P: P = -mu s N of frictions that slide, and T' v+ = w of those that stick. N are
-    `impulses`, of which e times `first`, those of an earlier phase, do not follow from the rates. `PULL_SLOPES` has the slopes of
-    these, and then those of N.
+    As `impulse_columns`, with M w = S N + T P: P = -mu s N of frictions that slide, and T' v+ = w
+    of those that stick. N are `impulses`, of which e times `first`, those of an earlier phase, do
+    not follow from the rates. `PULL_SLOPES` has the slopes of these, and then those of N.
     """
-    own, local, count = motion.own, motion.local, motion.contacts.shape[0]
-    given, lifts = np.zeros(local), np.zeros(count)
+    own = motion.own
+    local = motion.local
+    count = motion.contacts.shape[0]
+    given = np.zeros(local)
+    lifts = np.zeros(count)
     fill_slopes(motion)
     for j in range(motion.columns):
         z = motion.velocities[own * (1 + j) : own * (2 + j)]
@@ -165,13 +209,20 @@ def rubbing_columns(motion, acts, chosen, first):
             given[a] = z[a]
             for b in range(local):
                 for c in range(local):
-                    given[a] -= motion.inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
+                    given[a] -= (
+                        motion.inverse[a, b] * slope(motion, j, local * b + c) * motion.jump[c]
+                    )
             for i in range(count):
-                given[a] += push_slope(motion, j, a, i) * motion.impulses[i] + push(motion, a, i) * motion.pull_slopes[j, i]
-        row, size = 0, unknown_impulses(motion, acts)
+                given[a] += (
+                    push_slope(motion, j, a, i) * motion.impulses[i]
+                    + push(motion, a, i) * motion.pull_slopes[j, i]
+                )
+        row = 0
+        size = unknown_impulses(motion, acts)
         for i in range(count):
             if acts >> i & 1:
-                a, change = motion.contacts[i, ContactColumn.COORDINATE], 0.0
+                a = motion.contacts[i, ContactColumn.COORDINATE]
+                change = 0.0
                 for k in range(count):
                     if chosen >> k & 1:
                         change += restitution(motion, i, k) * lifts[k]
@@ -180,10 +231,8 @@ def rubbing_columns(motion, acts, chosen, first):
                 row += 1
         for k in range(motion.frictions.shape[0]):
             if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-                a, place = (
-                    motion.frictions[k, FrictionColumn.COORDINATE],
-                    motion.solver_numbers.size - motion.frictions.shape[0] + k,
-                )
+                a = motion.frictions[k, FrictionColumn.COORDINATE]
+                place = motion.solver_numbers.size - motion.frictions.shape[0] + k
                 fill_sticking(motion, row, a, acts, slope(motion, j, place) - given[a])
                 row += 1
         eliminate(motion.block, size, size + 1)
@@ -204,12 +253,18 @@ def push_slope(motion, j, a, i):
     if k < 0:
         return 0.0
     moved = slope(motion, j, motion.solver_numbers.size - 2 * motion.frictions.shape[0] + k)
-    return -slip_sign(motion, k) * moved * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+    return (
+        -slip_sign(motion, k)
+        * moved
+        * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+    )
 
 
 @lean_jit
 def rest_columns(motion, near):
-    """The columns at the end of an accumulation, where impulses on the contacts in `near` alone take their speeds."""
+    """The columns at the end of an accumulation, where impulses on the contacts in `near` alone
+    take their speeds.
+    """
     local = motion.local
     for a in range(local):
         motion.jump[a] = 0.0
@@ -228,8 +283,11 @@ def rest_columns(motion, near):
 
 @lean_jit
 def free_pulls(motion, t):
-    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest relative rate of change."""
-    change, first = 0.0, motion.parameters.size - motion.local
+    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest
+    relative rate of change.
+    """
+    change = 0.0
+    first = motion.parameters.size - motion.local
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 2)
@@ -243,22 +301,26 @@ def free_pulls(motion, t):
 
 @lean_jit
 def turns_with(motion, i):
-    """1 plus the number of a friction on ground at rest along the coordinate of a contact, that turns with its bounces; or 0."""
+    """1 plus the number of a friction on ground at rest along the coordinate of a contact, that
+    turns with its bounces; or 0.
+    """
     rubs = rubs_along(motion, i)
     return rubs if rubs and ground_speed(motion, rubs - 1) == 0.0 else 0
 
 
 @lean_jit
 def rubbed_accumulation(motion, t, near, i, limit):
-    """The time in which a contact loses its speed by impacts if a friction along its coordinate turns at the top of each flight,
-    with constant accelerations b before it and c after it:
+    """The time in which a contact loses its speed by impacts if a friction along its coordinate
+    turns at the top of each flight, with constant accelerations b before it and c after it:
 
         (u / b + u / sqrt(b c)) / (1 - e sqrt(c / b))    for a speed u.
 
     -1 if it does not lose it within `limit`, or others in `near` take part.
     """
-    u, k = motion.rates[i], rubs_along(motion, i) - 1
-    coordinate, place = motion.contacts[i, ContactColumn.COORDINATE], motion.parameters.size - motion.local
+    u = motion.rates[i]
+    k = rubs_along(motion, i) - 1
+    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    place = motion.parameters.size - motion.local
     place += k - 2 - motion.frictions.shape[0]
     motion.parameters[place] = motion.signs[i]
     expand(motion, t, 1.0, 0)

@@ -1,6 +1,8 @@
-"""An impact of one lane of a model with several contacts, where all lanes together cannot resolve it.
+"""An impact of one lane of a model with several contacts, where all lanes together cannot resolve
+it.
 
-Its compiled part goes into one module with that of `lanes/handoff.py`; the driver calls it through a pointer.
+Its compiled part goes into one module with that of `lanes/handoff.py`; the driver calls it through
+a pointer.
 """
 
 from __future__ import annotations
@@ -23,27 +25,36 @@ from saltus.flow.lanes.function_types import CONTACTS_IMPACT
 from saltus.flow.lanes.handoff import own_env
 from saltus.taylor import by_reference, cached_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @cached_jit(CONTACTS_IMPACT)
 def contacts_impact(lane, hit):
-    """Apply the impact law to a lane at its new state, where the contacts in `hit` close; returns 1 if that was enough.
+    """Apply the impact law to a lane at its new state, where the contacts in `hit` close; returns 1
+    if that was enough.
 
-    Otherwise it returns 0 and leaves the lane unchanged, for the scalar kernel to take over: where the law has no solution, where
-    the remaining speeds are so small that an accumulation may end, and where everything is at rest.
+    Otherwise it returns 0 and leaves the lane unchanged, for the scalar kernel to take over: where
+    the law has no solution, where the remaining speeds are so small that an accumulation may end,
+    and where everything is at rest.
     """
-    (array, state, contacts, solver), own, env = lane.impact_space, lane.sizes.own, own_env(lane)
-    numbers, rates, speed = array[0], solver.rates, np.inf
+    (array, state, contacts, solver) = lane.impact_space
+    own = lane.sizes.own
+    env = own_env(lane)
+    numbers = array[0]
+    rates = solver.rates
+    speed = np.inf
     numbers.dof, numbers.own, numbers.local, numbers.piece = own, own, lane.sizes.local, lane.piece
     numbers.first_order = lane.sizes.first_order
     numbers.time, numbers.origin = lane.new_time, lane.origin
-    parts = LaneImpactParts(state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver)
+    parts = LaneImpactParts(
+        state_arrays(numbers, state), env, env[0], functions_of(lane), contacts, solver
+    )
     motion = by_reference(MotionMemory(numbers, parts))
     for row in range(2 * own):  # velocities follow the positions in both memories
         state[row] = lane.new_position[row]
     read_contacts(lane, contacts)
-    regular, chosen = fill_contact_matrices(motion), hit | closed_bits(motion)
+    regular = fill_contact_matrices(motion)
+    chosen = hit | closed_bits(motion)
     for i in range(contacts.shape[0]):
         if hit >> i & 1:
             speed = min(speed, -rates[i])

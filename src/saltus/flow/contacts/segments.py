@@ -1,8 +1,10 @@
-"""Smooth segments of motions with several contacts, from event to event, with their derivatives: the parts of periodic orbits.
+"""Smooth segments of motions with several contacts, from event to event, with their derivatives:
+the parts of periodic orbits.
 
-The events, their times and the contacts that are closed between them are given. The motion is followed whatever the signs of the
-gaps and the reactions; the orbit's equations make each event's guard 0 (see `orbits/equations/contacts.py`). A family of orbits
-therefore goes smoothly through the point at which one of its events disappears.
+The events, their times and the contacts that are closed between them are given. The motion is
+followed whatever the signs of the gaps and the reactions; the orbit's equations make each event's
+guard 0 (see `orbits/equations/contacts.py`). A family of orbits therefore goes smoothly through the
+point at which one of its events disappears.
 
 Its compiled part goes into one module with those of the files that it imports from.
 """
@@ -29,7 +31,14 @@ from saltus.flow.contacts.impacts import (
     impact_impulses,
     jump_first_order,
 )
-from saltus.flow.contacts.layout import ContactColumn, SegmentEnd, SegmentPlan, contact_position, restitution, solver_arrays
+from saltus.flow.contacts.layout import (
+    ContactColumn,
+    SegmentEnd,
+    SegmentPlan,
+    contact_position,
+    restitution,
+    solver_arrays,
+)
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     gap_derivative,
@@ -43,24 +52,31 @@ from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, Mo
 from saltus.flow.kernel.steps import columns_at_event, expand, move, state_arrays, step_arrays
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-MOST_STEPS = 10_000  # of one segment: only near a singular mass matrix do steps become so short that more would be needed
+# of one segment: only near a singular mass matrix do steps become so short that more would be
+# needed
+MOST_STEPS = 10_000
 
 
 @lean_jit
 def unit_columns(motion):
-    """Set the columns to the derivatives of the present state to itself, the unit matrix, and to the parameters, 0."""
+    """Set the columns to the derivatives of the present state to itself, the unit matrix, and to
+    the parameters, 0.
+    """
     own = motion.own
     for j in range(motion.columns):
         for i in range(own):
             place = own * (1 + j) + i
-            motion.coordinates[place], motion.velocities[place] = 1.0 if j == i else 0.0, 1.0 if j == own + i else 0.0
+            motion.coordinates[place] = 1.0 if j == i else 0.0
+            motion.velocities[place] = 1.0 if j == own + i else 0.0
 
 
 @lean_jit
 def hold_contacts(motion, closed):
-    """Close the contacts in `closed` and no others: their coordinates are put at the contacts' positions, also in the columns."""
+    """Close the contacts in `closed` and no others: their coordinates are put at the contacts'
+    positions, also in the columns.
+    """
     count = motion.contacts.shape[0]
     fill_slopes(motion)
     for i in range(count):
@@ -74,8 +90,12 @@ def hold_contacts(motion, closed):
 
 @lean_jit
 def follow_segment(motion, begin, end, seen):
-    """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it cannot be followed."""
-    order, t, forwards = motion.order, begin, end >= begin
+    """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it
+    cannot be followed.
+    """
+    order = motion.order
+    t = begin
+    forwards = end >= begin
     for count in range(MOST_STEPS):
         size = expand(motion, t, 1.0, order)
         natural = contact_step_size(motion, t, t + abs(end - t), size)
@@ -94,8 +114,8 @@ def follow_segment(motion, begin, end, seen):
 
 @lean_jit
 def stays_closed(motion, count, acts, after):
-    """Whether an impact opens none of the contacts in `after`: it opens a contact without an impulse that is coupled to the
-    contacts in `acts`, which have one."""
+    """Whether an impact opens none of the contacts in `after`: it opens a contact without an
+    impulse that is coupled to the contacts in `acts`, which have one."""
     for i in range(count):
         if after >> i & 1 and not acts >> i & 1:
             for k in range(count):
@@ -106,13 +126,14 @@ def stays_closed(motion, count, acts, after):
 
 @lean_jit
 def given_impact(motion, hit, after):
-    """Apply the impact of the contact `hit` whatever the sign of its speed; the contacts that act are those of an impact of unit
-    speed.
+    """Apply the impact of the contact `hit` whatever the sign of its speed; the contacts that act
+    are those of an impact of unit speed.
 
-    Returns False if the impact law has no solution, or if the impact opens one of the contacts in `after`, which are to be
-    closed.
+    Returns False if the impact law has no solution, or if the impact opens one of the contacts in
+    `after`, which are to be closed.
     """
-    count, unit = motion.contacts.shape[0], motion.falling_rates
+    count = motion.contacts.shape[0]
+    unit = motion.falling_rates
     fill_contact_matrices(motion)
     chosen = 1 << hit
     for i in range(count):
@@ -134,7 +155,8 @@ def given_impact(motion, hit, after):
     apply_impulses(motion)
     for i in range(count):
         if acts >> i & 1:
-            rate, place = 0.0, motion.contacts[i, ContactColumn.COORDINATE]
+            rate = 0.0
+            place = motion.contacts[i, ContactColumn.COORDINATE]
             for k in range(count):
                 if chosen >> k & 1:
                     rate -= restitution(motion, i, k) * motion.gaps[k]
@@ -162,13 +184,14 @@ def copy_columns(motion, columns):
     for j in range(motion.columns):
         for i in range(own):
             place = own * (1 + j) + i
-            columns[i, j], columns[own + i, j] = motion.coordinates[place], motion.velocities[place]
+            columns[i, j] = motion.coordinates[place]
+            columns[own + i, j] = motion.velocities[place]
 
 
 @lean_jit
 def start_slope(motion, ends, slopes):
-    """The derivative of a guard to the time of the segment's start, for a fixed state there: minus the derivative along the
-    motion."""
+    """The derivative of a guard to the time of the segment's start, for a fixed state there: minus
+    the derivative along the motion."""
     total = 0.0
     for j in range(2 * motion.own):
         total -= slopes[j] * ends[SegmentEnd.NUMBERS + 2 * motion.own + j]
@@ -177,16 +200,23 @@ def start_slope(motion, ends, slopes):
 
 @lean_jit
 def excursion_guard(motion, contact, power, h, ends, slopes):
-    """The gap at the end of an excursion of one step, divided by a power p of its duration h, and its derivatives.
+    """The gap at the end of an excursion of one step, divided by a power p of its duration h, and
+    its derivatives.
 
-    A contact that is released where its reaction is 0 opens with h^3, and one that opens from rest after an impact with h^2. The
-    series without its first p terms, which are 0, gives a quotient that is regular for all h, also at h = 0, where the excursion
-    appears. With the gap's coefficients c_k, their derivatives w_k to the time of the start, and Q = sum c_k h^(k-p):
+    A contact that is released where its reaction is 0 opens with h^3, and one that opens from rest
+    after an impact with h^2. The series without its first p terms, which are 0, gives a quotient
+    that is regular for all h, also at h = 0, where the excursion appears. With the gap's
+    coefficients c_k, their derivatives w_k to the time of the start, and Q = sum c_k h^(k-p):
 
         dQ/dh = sum (k-p) c_k h^(k-p-1),    dQ/dt_start = sum (w_k + (k+1) c_(k+1)) h^(k-p) - dQ/dh.
     """
-    own, sign, coordinate = motion.own, motion.signs[contact], motion.contacts[contact, ContactColumn.COORDINATE]
-    q, value, by_length, by_start = motion.coordinate_series, 0.0, 0.0, 0.0
+    own = motion.own
+    sign = motion.signs[contact]
+    coordinate = motion.contacts[contact, ContactColumn.COORDINATE]
+    q = motion.coordinate_series
+    value = 0.0
+    by_length = 0.0
+    by_start = 0.0
     for j in range(motion.columns):
         slopes[j] = 0.0
     for k in range(motion.order, power - 1, -1):
@@ -195,13 +225,16 @@ def excursion_guard(motion, contact, power, h, ends, slopes):
         by_start = by_start * h + (k + 1) * sign * q[coordinate, k + 1]
         for j in range(motion.columns):
             slopes[j] = slopes[j] * h + sign * q[own * (1 + j) + coordinate, k]
-    ends[SegmentEnd.GUARD], ends[SegmentEnd.BY_END] = value, by_length
+    ends[SegmentEnd.GUARD] = value
+    ends[SegmentEnd.BY_END] = by_length
     ends[SegmentEnd.BY_START] = by_start + start_slope(motion, ends, slopes) - by_length
 
 
 @lean_jit
 def divide_guard(motion, power, h, ends, slopes):
-    """Divide the guard of an excursion of several steps, and its derivatives, as `excursion_guard` does for one step."""
+    """Divide the guard of an excursion of several steps, and its derivatives, as `excursion_guard`
+    does for one step.
+    """
     divisor = h**power
     ends[SegmentEnd.GUARD] /= divisor
     turned = power * ends[SegmentEnd.GUARD] / h
@@ -216,14 +249,16 @@ def guard_at_end(motion, t, kind, contact, ends, slopes):
     """The guard of a segment's event, its rate, and its derivatives along the columns."""
     fill_slopes(motion)
     if kind == EventCode.RELEASE:
-        ends[SegmentEnd.GUARD], ends[SegmentEnd.RATE] = motion.margin_series[contact, 0], motion.margin_series[contact, 1]
+        ends[SegmentEnd.GUARD] = motion.margin_series[contact, 0]
+        ends[SegmentEnd.RATE] = motion.margin_series[contact, 1]
         ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE]
         columns_at_event(motion, EventCode.RELEASE, contact, t, 1.0)
         for j in range(motion.columns):
             slopes[j] = motion.shifts[j]
             motion.shifts[j] = 0.0
         return
-    sign, place = motion.signs[contact], motion.contacts[contact, ContactColumn.COORDINATE]
+    sign = motion.signs[contact]
+    place = motion.contacts[contact, ContactColumn.COORDINATE]
     ends[SegmentEnd.GUARD] = sign * (motion.coordinates[place] - contact_position(motion, contact))
     ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE] = sign * motion.velocities[place]
     for j in range(motion.columns):
@@ -232,8 +267,8 @@ def guard_at_end(motion, t, kind, contact, ends, slopes):
 
 @lean_jit
 def pass_event(motion, row, ends, maps):
-    """Take the state through the event of a row of the plan, with the derivatives of its map; False if the event is
-    impossible."""
+    """Take the state through the event of a row of the plan, with the derivatives of its map; False
+    if the event is impossible."""
     own = motion.own
     unit_columns(motion)
     impact = row[SegmentPlan.KIND] == EventCode.IMPACT
@@ -251,15 +286,24 @@ def pass_event(motion, row, ends, maps):
 @jit
 def follow_with(numbers, parts, request, results):
     """`follow_contact_segments` with the parts of the motion's memory in one named tuple."""
-    motion, own = by_reference(MotionMemory(numbers, parts)), numbers.own
-    plan, times, first = request.plan, request.times, request.first
-    ends, columns, maps, extremes = results.ends, results.columns, results.maps, results.extremes
+    motion = by_reference(MotionMemory(numbers, parts))
+    own = numbers.own
+    plan = request.plan
+    times = request.times
+    first = request.first
+    ends = results.ends
+    columns = results.columns
+    maps = results.maps
+    extremes = results.extremes
     nothing = np.zeros(1)
     for a in range(own):
         motion.coordinates[a], motion.velocities[a] = first[a], first[own + a]
     fill_contact_matrices(motion)
     for s in range(plan.shape[0]):
-        begin, end, kind, contact = times[s], times[s + 1], plan[s, SegmentPlan.KIND], plan[s, SegmentPlan.CONTACT]
+        begin = times[s]
+        end = times[s + 1]
+        kind = plan[s, SegmentPlan.KIND]
+        contact = plan[s, SegmentPlan.CONTACT]
         unit_columns(motion)
         hold_contacts(motion, plan[s, SegmentPlan.ALONG])
         expand(motion, begin, 1.0, 1)
@@ -301,18 +345,29 @@ def follow_with(numbers, parts, request, results):
 
 @cached_jit(CONTACT_SEGMENTS, nogil=True)
 def follow_contact_segments(numbers, env, functions, contacts, request, results):
-    """Follow segments one after the other, each from the state after the event before it; returns how many were followed.
+    """Follow segments one after the other, each from the state after the event before it; returns
+    how many were followed.
 
-    In `request`, `plan` describes each segment (`SegmentPlan`), `times` (n + 1) are the times of the segments' ends, and `first`
-    is the state at the first of them. In `results` are filled: `ends`, in the places of `SegmentEnd`; `columns`, the derivatives
-    of the state at the end, at a fixed time, and of the guard, to the state at the start and to the parameters; `maps`, the
-    derivatives of the state after the event to the state before it and to the parameters; and, if it has rows, `extremes`, in the
-    places of `SegmentExtremes`.
+    In `request`, `plan` describes each segment (`SegmentPlan`), `times` (n + 1) are the times of
+    the segments' ends, and `first` is the state at the first of them. In `results` are filled:
+    `ends`, in the places of `SegmentEnd`; `columns`, the derivatives of the state at the end, at a
+    fixed time, and of the guard, to the state at the start and to the parameters; `maps`, the
+    derivatives of the state after the event to the state before it and to the parameters; and, if
+    it has rows, `extremes`, in the places of `SegmentExtremes`.
     """
-    record, count = numbers[0], contacts.shape[0]
+    record = numbers[0]
+    count = contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
     solver = solver_arrays(record.local, count, record.columns, contacts[:0], record.first_order)
     parts = ContactsSegmentParts(
-        state, env, env[0], functions, contacts, step_arrays(record), solver, np.zeros(record.order + 2), np.zeros(2)
+        state,
+        env,
+        env[0],
+        functions,
+        contacts,
+        step_arrays(record),
+        solver,
+        np.zeros(record.order + 2),
+        np.zeros(2),
     )
     return follow_with(record, parts, request, results)

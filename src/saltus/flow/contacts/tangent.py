@@ -1,12 +1,15 @@
-"""The saltation of the tangent's columns at the events of several contacts (see `taylor/tracing.py`).
+"""The saltation of the tangent's columns at the events of several contacts (see
+`taylor/tracing.py`).
 
-An event's instant depends on the parameter c of a column. The columns (u, z) of coordinates and velocities are first taken to the
-derivatives of the state *at the event*, u + v dt and z + a dt, where dt is the shift of the event and a the acceleration before
-it. The event's map is differentiated there, with the contacts that act. Once it is known which contacts are closed afterwards,
-the columns are taken back to a fixed time with the velocity and acceleration after the event. Nothing jumps at a simple release,
-so that its saltation is the identity.
+An event's instant depends on the parameter c of a column. The columns (u, z) of coordinates and
+velocities are first taken to the derivatives of the state *at the event*, u + v dt and z + a dt,
+where dt is the shift of the event and a the acceleration before it. The event's map is
+differentiated there, with the contacts that act. Once it is known which contacts are closed
+afterwards, the columns are taken back to a fixed time with the velocity and acceleration after the
+event. Nothing jumps at a simple release, so that its saltation is the identity.
 
-Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of `flow/kernel/memory.py`.
+Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
+`flow/kernel/memory.py`.
 """
 
 from __future__ import annotations
@@ -15,7 +18,14 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.complementarity import acting, fill_rubbing, invert, is_pressed, push, tell_instant
+from saltus.flow.contacts.complementarity import (
+    acting,
+    fill_rubbing,
+    invert,
+    is_pressed,
+    push,
+    tell_instant,
+)
 from saltus.flow.contacts.impacts import frozen_accumulation, jump_place
 from saltus.flow.contacts.layout import (
     APART,
@@ -30,13 +40,16 @@ from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
 def move_columns(motion, sign):
-    """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time (-1): u + v dt, z + a dt."""
-    own, a = motion.own, motion.acceleration_series
+    """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time
+    (-1): u + v dt, z + a dt.
+    """
+    own = motion.own
+    a = motion.acceleration_series
     for j in range(motion.columns):
         shift = sign * motion.shifts[j]
         for i in range(own):
@@ -69,7 +82,9 @@ def slope(motion, j, place):
 @lean_jit
 def gap_derivative(motion, j, i):
     """The derivative of a contact's gap along column j."""
-    own, count, coordinate = motion.own, motion.contacts.shape[0], motion.contacts[i, ContactColumn.COORDINATE]
+    own = motion.own
+    count = motion.contacts.shape[0]
+    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     moved = slope(motion, j, motion.local * motion.local + count * count + i)
     return motion.signs[i] * (motion.coordinates[own * (1 + j) + coordinate] - moved)
 
@@ -77,32 +92,39 @@ def gap_derivative(motion, j, i):
 @lean_jit
 def lift_rate(motion, j, i):
     """The derivative of the rate of a contact's gap along column j."""
-    own, coordinate = motion.own, motion.contacts[i, ContactColumn.COORDINATE]
+    own = motion.own
+    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     return motion.signs[i] * motion.velocities[own * (1 + j) + coordinate]
 
 
 @lean_jit
 def jump_columns(motion, hit):
     """The columns of coordinates of first order at an impact, as `jump_first_order`, which follows."""
-    own, first = motion.own, motion.first_order
+    own = motion.own
+    first = motion.first_order
     if first > 0 and motion.columns > 0:
         fill_slopes(motion)
         for i in range(motion.contacts.shape[0]):
             for k in range(first if hit >> i & 1 else 0):
                 for j in range(motion.columns):
-                    motion.coordinates[own * (2 + j) - first + k] = slope(motion, j, jump_place(motion, i, k))
+                    motion.coordinates[own * (2 + j) - first + k] = slope(
+                        motion, j, jump_place(motion, i, k)
+                    )
 
 
 @lean_jit
 def hold_columns(motion, chosen):
-    """Set the columns of coordinates at the contacts in `chosen`: they move with the contact's position and, if it is closed,
-    have no velocity."""
-    own, count = motion.own, motion.contacts.shape[0]
+    """Set the columns of coordinates at the contacts in `chosen`: they move with the contact's
+    position and, if it is closed, have no velocity."""
+    own = motion.own
+    count = motion.contacts.shape[0]
     for j in range(motion.columns):
         for i in range(count):
             if chosen >> i & 1:
                 place = own * (1 + j) + motion.contacts[i, ContactColumn.COORDINATE]
-                motion.coordinates[place] = slope(motion, j, motion.local * motion.local + count * count + i)
+                motion.coordinates[place] = slope(
+                    motion, j, motion.local * motion.local + count * count + i
+                )
                 if motion.contacts[i, ContactColumn.CLOSED] == 1:
                     motion.velocities[place] = 0.0
 
@@ -119,7 +141,8 @@ def release_shifts(motion, t, i):
 def release_columns(motion, t, released):
     """Take the columns to the instant at which a reaction reaches 0.
 
-    `EVENT_SHIFTS` are the shifts of this instant, nan where another reaction reaches 0 at the same instant with another shift.
+    `EVENT_SHIFTS` are the shifts of this instant, nan where another reaction reaches 0 at the same
+    instant with another shift.
     """
     shifts = motion.event_shifts
     expand(motion, t, 1.0, 1)
@@ -127,10 +150,16 @@ def release_columns(motion, t, released):
     for j in range(motion.columns):
         shifts[j] = motion.shifts[j]
     for i in range(motion.contacts.shape[0]):
-        if i != released and motion.contacts[i, ContactColumn.CLOSED] == 1 and abs(motion.margin_series[i, 0]) <= TIED:
+        if (
+            i != released
+            and motion.contacts[i, ContactColumn.CLOSED] == 1
+            and abs(motion.margin_series[i, 0]) <= TIED
+        ):
             release_shifts(motion, t, i)
             for j in range(motion.columns):
-                if abs(motion.shifts[j] - shifts[j]) > APART * (abs(motion.shifts[j]) + abs(shifts[j])):
+                if abs(motion.shifts[j] - shifts[j]) > APART * (
+                    abs(motion.shifts[j]) + abs(shifts[j])
+                ):
                     shifts[j] = math.nan
     release_shifts(motion, t, released)
     move_columns(motion, 1.0)
@@ -138,7 +167,9 @@ def release_columns(motion, t, released):
 
 @lean_jit
 def closing_columns(motion, t, hit):
-    """Take the columns to the instant at which the contacts in `hit` close; returns an `ImpactDetail`."""
+    """Take the columns to the instant at which the contacts in `hit` close; returns an
+    `ImpactDetail`.
+    """
     detail = ImpactDetail.REGULAR
     expand(motion, t, 1.0, 0)
     fill_slopes(motion)
@@ -151,26 +182,39 @@ def closing_columns(motion, t, hit):
             if rate >= 0.0:
                 return ImpactDetail.NO_SPEED
             shift = -gap_derivative(motion, j, i) / rate
-            if known and abs(shift - motion.shifts[j]) > APART * (abs(shift) + abs(motion.shifts[j])):
-                shift, detail = math.nan, ImpactDetail.APART
-            motion.shifts[j], known = shift, True
+            if known and abs(shift - motion.shifts[j]) > APART * (
+                abs(shift) + abs(motion.shifts[j])
+            ):
+                shift = math.nan
+                detail = ImpactDetail.APART
+            motion.shifts[j] = shift
+            known = True
     move_columns(motion, 1.0)
     return detail
 
 
 @jit
 def impulse_columns(motion, acts, chosen):
-    """Differentiate an impact at which the contacts in `acts` have impulses and those in `chosen` enter its law.
+    """Differentiate an impact at which the contacts in `acts` have impulses and those in `chosen`
+    enter its law.
 
-    M w = S J with the jump w of the velocities; the rates of the acting gaps after it are -E v-, or 0 if `chosen` is empty:
+    M w = S J with the jump w of the velocities; the rates of the acting gaps after it are -E v-, or
+    0 if `chosen` is empty:
 
-        M dw + dM w = S dJ,    (dw)_i = -dv_i - sum_j (E_ij dv_j + dE_ij v_j)  of the acting contacts, along their signs.
+        M dw + dM w = S dJ,    (dw)_i = -dv_i - sum_j (E_ij dv_j + dE_ij v_j)  of the acting
+        contacts, along their signs.
 
-    `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in `JUMP`). For a dependent sum,
-    w = g w of the others, dg w is added.
+    `solver` holds the coupling, the inverse of M, the rates before the impact (in `GAPS`) and w (in
+    `JUMP`). For a dependent sum, w = g w of the others, dg w is added.
     """
-    own, local, count, signs = motion.own, motion.local, motion.contacts.shape[0], motion.signs
-    inverse, twist, turned, right = motion.inverse, np.zeros(local), np.zeros(local), motion.right
+    own = motion.own
+    local = motion.local
+    count = motion.contacts.shape[0]
+    signs = motion.signs
+    inverse = motion.inverse
+    twist = np.zeros(local)
+    turned = np.zeros(local)
+    right = motion.right
     moving = local - motion.first_order
     fill_slopes(motion)
     for j in range(motion.columns):
@@ -184,7 +228,10 @@ def impulse_columns(motion, acts, chosen):
                 for a in range(local):
                     twist[a] += inverse[a, b] * turned[b]
         for i in range(count):
-            right[i] = lift_rate(motion, j, i) - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
+            right[i] = (
+                lift_rate(motion, j, i)
+                - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
+            )
             for k in range(count):
                 if chosen >> k & 1:
                     right[i] += restitution(motion, i, k) * lift_rate(motion, j, k)
@@ -194,13 +241,17 @@ def impulse_columns(motion, acts, chosen):
             place = own * (1 + j) + a
             motion.velocities[place] -= twist[a]
             for i in range(count):
-                motion.velocities[place] += inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * signs[i] * motion.tried[i]
+                motion.velocities[place] += (
+                    inverse[a, motion.contacts[i, ContactColumn.COORDINATE]]
+                    * signs[i]
+                    * motion.tried[i]
+                )
 
 
 @lean_jit
 def note_velocities(motion, before):
-    """Put the velocities plus `before` times the present `JUMP` into `JUMP`: with 0 the velocities before an impact, then, with
-    -1, their jump."""
+    """Put the velocities plus `before` times the present `JUMP` into `JUMP`: with 0 the velocities
+    before an impact, then, with -1, their jump."""
     for a in range(motion.local):
         velocity = motion.velocities[a]
         motion.jump[a] = velocity if before == 0.0 else velocity + before * motion.jump[a]
@@ -208,18 +259,24 @@ def note_velocities(motion, before):
 
 @lean_jit
 def note_shifts(motion, shifts):
-    """Record with the last event its shift along each column, which are the numbers of `shifts` from `first` on."""
+    """Record with the last event its shift along each column, which are the numbers of `shifts`
+    from `first` on.
+    """
     for j in range(motion.columns):
-        motion.event_values[motion.recorded_events - 1, 1 + 2 * motion.own + motion.contacts.shape[0] + j] = shifts[j]
+        motion.event_values[
+            motion.recorded_events - 1, 1 + 2 * motion.own + motion.contacts.shape[0] + j
+        ] = shifts[j]
 
 
 @lean_jit
 def pull_slopes(motion, t):
-    """Fill `PULL_SLOPES`, the derivatives of the gaps' second derivatives with all contacts open, at an event.
+    """Fill `PULL_SLOPES`, the derivatives of the gaps' second derivatives with all contacts open,
+    at an event.
 
     All coordinates must be free, and the columns must have been taken to the event.
     """
-    own, a = motion.own, motion.acceleration_series
+    own = motion.own
+    a = motion.acceleration_series
     expand(motion, t, 1.0, 0)
     move_columns(motion, -1.0)
     expand(motion, t, 1.0, 2)
@@ -233,9 +290,11 @@ def pull_slopes(motion, t):
 
 @lean_jit
 def perturb(motion, j, step):
-    """Move all quantities on which the duration of an accumulation depends by a step along column j; gaps and rates that are 0
-    stay 0."""
-    local, count, signs = motion.local, motion.contacts.shape[0], motion.signs
+    """Move all quantities on which the duration of an accumulation depends by a step along column
+    j; gaps and rates that are 0 stay 0."""
+    local = motion.local
+    count = motion.contacts.shape[0]
+    signs = motion.signs
     numbers = motion.solver_numbers
     for i in range(count):
         if motion.gaps[i] != 0.0:
@@ -248,7 +307,10 @@ def perturb(motion, j, step):
     invert(numbers, local, motion.first_order, motion.block, motion.inverse)
     for i in range(count):
         for k in range(count):
-            entry = motion.inverse[motion.contacts[i, ContactColumn.COORDINATE], motion.contacts[k, ContactColumn.COORDINATE]]
+            entry = motion.inverse[
+                motion.contacts[i, ContactColumn.COORDINATE],
+                motion.contacts[k, ContactColumn.COORDINATE],
+            ]
             motion.coupling[i, k] = signs[i] * signs[k] * entry
     if is_pressed(motion):
         fill_rubbing(motion)
@@ -256,12 +318,16 @@ def perturb(motion, j, step):
 
 @jit
 def accumulation_shifts(motion, near, t):
-    """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until the accumulation ends:
-    central differences of this time over the gaps, rates, accelerations and numbers."""
-    local, count = motion.local, motion.contacts.shape[0]
+    """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until
+    the accumulation ends: central differences of this time over the gaps, rates, accelerations and
+    numbers."""
+    local = motion.local
+    count = motion.contacts.shape[0]
     fill_slopes(motion)
     pull_slopes(motion, t)
-    gaps, rates, pulls = motion.gaps.copy(), motion.rates.copy(), motion.pulls.copy()
+    gaps = motion.gaps.copy()
+    rates = motion.rates.copy()
+    pulls = motion.pulls.copy()
     numbers = motion.solver_numbers.copy()
     for j in range(motion.columns):
         largest = 0.0  # the largest relative change along the column
@@ -274,7 +340,8 @@ def accumulation_shifts(motion, near, t):
                     largest = max(largest, abs(gap_derivative(motion, j, i) / gaps[i]))
         for k in range(local * local + count * count):
             largest = max(largest, abs(slope(motion, j, k)))
-        change, step = 0.0, RELATIVE_STEP / max(largest, 1e-300)
+        change = 0.0
+        step = RELATIVE_STEP / max(largest, 1e-300)
         for sign in (1.0, -1.0):
             perturb(motion, j, sign * step)
             left = frozen_accumulation(motion, near, near, np.inf)
@@ -300,20 +367,31 @@ def project(motion, closed, vector):
 @jit
 def fall_back(motion, t, closed, j):
     """Column j for a start at closed contacts, see `start_columns`."""
-    own, local, count, right = motion.own, motion.local, motion.contacts.shape[0], motion.right
-    u, z = motion.coordinates[own * (1 + j) : own * (2 + j)], motion.velocities[own * (1 + j) : own * (2 + j)]
-    given, rates = u.copy(), z.copy()
+    own = motion.own
+    local = motion.local
+    count = motion.contacts.shape[0]
+    right = motion.right
+    u = motion.coordinates[own * (1 + j) : own * (2 + j)]
+    z = motion.velocities[own * (1 + j) : own * (2 + j)]
+    given = u.copy()
+    rates = z.copy()
     for i in range(count):
         right[i] = gap_derivative(motion, j, i)
     project(motion, closed, u)
-    after, lost = u.copy(), np.zeros(own)
+    after = u.copy()
+    lost = np.zeros(own)
     fallen = given - after  # K h
-    for sign in (0.5, -0.5):  # the odd parts of a_v K h and M' K h, without the effect of parameters
+    # the odd parts of a_v K h and M' K h, without the effect of parameters
+    for sign in (0.5, -0.5):
         for a in range(own):
             u[a], z[a] = 0.0, math.copysign(1.0, sign) * fallen[a]
         expand(motion, t, 1.0, 0)
         for a in range(own):
-            gained = motion.velocity_series if a >= own - motion.first_order else motion.acceleration_series
+            gained = (
+                motion.velocity_series
+                if a >= own - motion.first_order
+                else motion.acceleration_series
+            )
             lost[a] += sign * gained[own * (1 + j) + a, 0]
             u[a] = math.copysign(1.0, sign) * motion.velocities[a]
         motion.shifts[j] = math.copysign(1.0, sign)
@@ -322,7 +400,9 @@ def fall_back(motion, t, closed, j):
         for a in range(local - motion.first_order):
             for b in range(local):
                 for c in range(local):
-                    lost[a] += sign * motion.inverse[a, b] * slope(motion, j, local * b + c) * fallen[c]
+                    lost[a] += (
+                        sign * motion.inverse[a, b] * slope(motion, j, local * b + c) * fallen[c]
+                    )
     for a in range(own):
         u[a], z[a] = after[a], rates[a] - lost[a]
         if a >= own - motion.first_order:
@@ -337,21 +417,26 @@ def fall_back(motion, t, closed, j):
 
 @lean_jit
 def start_columns(motion, t, closed):
-    """The one-sided derivatives of a motion that starts with contacts closed, to the side on which their gaps open.
+    """The one-sided derivatives of a motion that starts with contacts closed, to the side on which
+    their gaps open.
 
-    A small gap h closes, and its bounces end, within a time of the order of sqrt(h). The impulses of these contacts do not change
-    the velocities y = (1 - K S') v with K = M^-1 S (S' M^-1 S)^-1, so that to first order in h
+    A small gap h closes, and its bounces end, within a time of the order of sqrt(h). The impulses
+    of these contacts do not change the velocities y = (1 - K S') v with K = M^-1 S (S' M^-1 S)^-1,
+    so that to first order in h
 
         u+ = u - K h,    z+ = (1 - K S') (z - a_v K h) + K' h,
 
-    where K' is the time derivative of K. Where impacts lose nothing the bounces never end, and there is no derivative.
+    where K' is the time derivative of K. Where impacts lose nothing the bounces never end, and
+    there is no derivative.
     """
-    own, count = motion.own, motion.contacts.shape[0]
+    own = motion.own
+    count = motion.contacts.shape[0]
     fill_slopes(motion)
     if is_pressed(motion):
         fill_rubbing(motion)
     for j in range(motion.columns):
-        lifted, lossless = 0.0, False
+        lifted = 0.0
+        lossless = False
         for i in range(count):
             if closed >> i & 1:
                 opened = abs(gap_derivative(motion, j, i))
@@ -371,13 +456,18 @@ def start_columns(motion, t, closed):
 
 @lean_jit
 def event_shifts(motion):
-    """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at this instant, which are nan if
-    contacts close at several instants in neighbouring motions."""
+    """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at
+    this instant, which are nan if contacts close at several instants in neighbouring motions."""
     for i in range(motion.contacts.shape[0]):
         if motion.contacts[i, ContactColumn.RELEASED] == 1:
             return  # `release_columns` has filled them
-    first, last = 1 + 2 * motion.own + motion.contacts.shape[0], motion.recorded_events - 1
+    first = 1 + 2 * motion.own + motion.contacts.shape[0]
+    last = motion.recorded_events - 1
     for j in range(motion.columns):
         motion.event_shifts[j] = motion.shifts[j]
-        if last >= 0 and motion.event_labels[last, 1] == EventCode.IMPACT and motion.event_values[last, 0] == motion.time:
+        if (
+            last >= 0
+            and motion.event_labels[last, 1] == EventCode.IMPACT
+            and motion.event_values[last, 0] == motion.time
+        ):
             motion.event_shifts[j] = motion.event_values[last, first + j]

@@ -1,4 +1,6 @@
-"""The compiled code with which one motion is followed: a kernel for each kind of model, and the functions of each structure."""
+"""The compiled code with which one motion is followed: a kernel for each kind of model, and the
+functions of each structure.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,12 @@ from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts.one_free import OneFree, equations_of_one_free
 from saltus.flow.kernel import event_derivatives, layout, loop, memory, roots, steps
-from saltus.flow.kernel.memory import INSTANT, ContactsFunctions, OneContactFunctions, behind_parameters
+from saltus.flow.kernel.memory import (
+    INSTANT,
+    ContactsFunctions,
+    OneContactFunctions,
+    behind_parameters,
+)
 from saltus.flow.one_contact import impacts, kernel
 from saltus.systems import System, numbers
 from saltus.taylor import (
@@ -48,7 +55,8 @@ from saltus.taylor import (
 )
 from saltus.taylor.vectors import SCALAR
 
-MOST_COEFFICIENTS = 24  # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
+# length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
+MOST_COEFFICIENTS = 24
 _SIGNATURES = f"""import math
 
 import numpy as np
@@ -75,7 +83,8 @@ class Sizes(NamedTuple):
     first_order: int  # how many of the model's own coordinates, the last ones, are of first order
     own: int  # the model's own coordinates
     columns: int  # of the tangent
-    local: int  # the first of its own coordinates, on which impacts act; those behind them have mass 1
+    # the first of its own coordinates, on which impacts act; those behind them have mass 1
+    local: int
 
 
 @dataclass(frozen=True)
@@ -84,24 +93,37 @@ class CompiledStructure:
 
     sizes: Sizes
     constant_count: int
-    # The functions that the kernel calls, in the order of `OneContactFunctions` or, with several contacts, `ContactsFunctions`.
+    # The functions that the kernel calls, in the order of `OneContactFunctions` or, with several
+    # contacts, `ContactsFunctions`.
     functions: tuple[Pointer, ...]
-    tables: tuple[Pointer, ...]  # `constants` and `geometry` (with several contacts `matrices`), which the lanes' driver calls
+    # `constants` and `geometry` (with several contacts `matrices`), which the lanes' driver calls
+    tables: tuple[Pointer, ...]
     several: bool
     signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
     def prepare(
-        self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray], data: Any = (), eigenmodes: Any = ()
+        self,
+        parameters: np.ndarray,
+        records: tuple[np.ndarray, np.ndarray],
+        data: Any = (),
+        eigenmodes: Any = (),
     ) -> tuple[tuple[Any, ...], Any]:
-        """The arguments `env` and `model` of the kernel for given numbers (see `one_contact/kernel.py`). Those of modes, `data`,
-        follow the constants."""
-        constants, geometry = np.append(np.zeros(self.constant_count), data), np.zeros(3)
+        """The arguments `env` and `model` of the kernel for given numbers (see
+        `one_contact/kernel.py`). Those of modes, `data`, follow the constants."""
+        constants = np.append(np.zeros(self.constant_count), data)
+        geometry = np.zeros(3)
         fill_constants, fill_geometry = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
-            env = (np.append(parameters, behind_parameters(self.frictions, self.sizes.local)), constants, *records)
-            return env, ContactsFunctions._make((*self.functions, np.array(self.signs, float), np.array(eigenmodes, float)))
+            env = (
+                np.append(parameters, behind_parameters(self.frictions, self.sizes.local)),
+                constants,
+                *records,
+            )
+            return env, ContactsFunctions._make(
+                (*self.functions, np.array(self.signs, float), np.array(eigenmodes, float))
+            )
         env = (parameters, constants, *records)
         fill_geometry(self.tables[1], env, geometry)
         return env, OneContactFunctions._make((*self.functions[:4], geometry, self.functions[4]))
@@ -132,7 +154,9 @@ def _load_fillers() -> tuple[Callable[..., None], Callable[..., None]]:
 
 @cache
 def load_kernel() -> Callable[..., int]:
-    """The kernel of models with at most one contact, `advance` of `kernel/loop.py`, called without numba's dispatch on types."""
+    """The kernel of models with at most one contact, `advance` of `kernel/loop.py`, called without
+    numba's dispatch on types.
+    """
     return entry_point(kernel_module().advance)
 
 
@@ -148,7 +172,9 @@ def one_contact_text() -> str:
 
 @cache
 def load_contacts_kernel() -> Callable[..., int]:
-    """The kernel for models with several contacts, `advance` with the functions of `contacts/kernel.py`."""
+    """The kernel for models with several contacts, `advance` with the functions of
+    `contacts/kernel.py`.
+    """
     return entry_point(contacts_module().advance)
 
 
@@ -159,8 +185,18 @@ def contacts_module() -> ModuleType:
 
 def contacts_text() -> str:
     """The source of the kernel of models with several contacts."""
-    parts = (contact_layout, complementarity, contact_impacts, tangent, rubbing, frictions, closings)
-    return kernel_text(layout, roots, steps, *parts, contacts_kernel, loop).replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
+    parts = (
+        contact_layout,
+        complementarity,
+        contact_impacts,
+        tangent,
+        rubbing,
+        frictions,
+        closings,
+    )
+    return kernel_text(layout, roots, steps, *parts, contacts_kernel, loop).replace(
+        "(ADVANCE)", "(ADVANCE_CONTACTS)"
+    )
 
 
 def kernel_text(*modules: ModuleType) -> str:
@@ -173,7 +209,8 @@ def load_structure(trace: Trace) -> CompiledStructure:
     made = load_functions("structure", structure_functions(trace), trace)
     one = ("series", "contact_series", "reset", "contact_damping", "tangent")
     names = ContactsFunctions._fields[: len(one)] if trace.several else one
-    stops, steep = len(trace.reactions) + len(trace.margins), int(is_steep(trace.acceleration))
+    stops = len(trace.reactions) + len(trace.margins)
+    steep = int(is_steep(trace.acceleration))
     first = len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order
     return CompiledStructure(
         Sizes(*first, trace.dof, trace.columns, trace.local),
@@ -186,24 +223,37 @@ def load_structure(trace: Trace) -> CompiledStructure:
     )
 
 
-# --- the functions of a structure ------------------------------------------------------------------------------------------
+# --- the functions of a structure --------------------------------------------
 
 
 def structure_functions(trace: Trace) -> list[WrittenFunction]:
     """A structure's functions; equal structures have equal functions, whatever their numbers."""
     known = constants(trace)
-    impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [number(0.0)] * 2
+    impact = [x for x in (trace.next_side, trace.velocity_after) if x is not None] or [
+        number(0.0)
+    ] * 2
     damping = [number(0.0) if trace.contact_damping is None else trace.contact_damping]
     instant = ("side", "env", "piece")
-    functions = [_series(trace, known), _table("constants", Places(("parameters", "constants"), ENV), list(known), {})]
+    functions = [
+        _series(trace, known),
+        _table("constants", Places(("parameters", "constants"), ENV), list(known), {}),
+    ]
     if trace.several:
         inputs = () if trace.modes is None or trace.columns else trace.modes.inputs
-        loads = {MOST_COEFFICIENTS * (each.place - 1 - trace.local): each.of for each in inputs if not each.local}
+        loads = {
+            MOST_COEFFICIENTS * (each.place - 1 - trace.local): each.of
+            for each in inputs
+            if not each.local
+        }
         events = _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)
         return [*functions, *events, _in_time("load_series", loads, known)]
     return [
         *functions,
-        _in_time("contact_series", {} if trace.contact_acceleration is None else {0: trace.contact_acceleration}, known),
+        _in_time(
+            "contact_series",
+            {} if trace.contact_acceleration is None else {0: trace.contact_acceleration},
+            known,
+        ),
         _at_impact("reset", ("t", "origin", "v0", *instant), impact, known),
         _at_impact("contact_damping", ("t", "origin", *instant), damping, known),
         _tangent(trace, known),
@@ -212,29 +262,51 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
 
 
 def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
-    """A function of one motion; its signature has its name in `memory.py`. It has no places of what it does not read in
-    a state."""
+    """A function of one motion; its signature has its name in `memory.py`. It has no places of what
+    it does not read in a state."""
     if not isinstance(content, SeriesOf):
         read = {op for case in content for op in case.leaves}
-        leaves = {op: place for op, place in places.leaves.items() if op in read or place[0] != "state"}
+        leaves = {
+            op: place for op, place in places.leaves.items() if op in read or place[0] != "state"
+        }
         places = replace(places, leaves=leaves)
     return WrittenFunction(name, getattr(memory, name.upper()), places, SCALAR, content)
 
 
 def constants(trace: Trace) -> dict[Expr, int]:
-    """The table of constants: the parts of a structure's expressions that depend on parameters alone, with their places."""
-    roots = [*trace.acceleration, *motion_roots(trace), *_geometry(trace), *trace.contact_numbers, *trace.inputs_of_loops]
-    rest = (trace.contact_acceleration, trace.next_side, trace.velocity_after, trace.contact_damping)
+    """The table of constants: the parts of a structure's expressions that depend on parameters
+    alone, with their places.
+    """
+    roots = [
+        *trace.acceleration,
+        *motion_roots(trace),
+        *_geometry(trace),
+        *trace.contact_numbers,
+        *trace.inputs_of_loops,
+    ]
+    rest = (
+        trace.contact_acceleration,
+        trace.next_side,
+        trace.velocity_after,
+        trace.contact_damping,
+    )
     roots += [x for x in rest if x is not None]
     roots += [x for *_, new in event_derivatives.changes(trace) for x in new.values()]
-    sums = [*event_derivatives.number_slopes(trace).values(), *(each for *_, each in event_derivatives.shifts(trace))]
+    sums = [
+        *event_derivatives.number_slopes(trace).values(),
+        *(each for *_, each in event_derivatives.shifts(trace)),
+    ]
     roots += [x for each in sums for x in each.expressions]
     return shared_constants(roots + (equations.roots if (equations := one_free(trace)) else []))
 
 
 def motion_roots(trace: Trace) -> list[Expr]:
-    """Gap, reactions and margins of a trace, with the accelerations substituted: their series are computed with the motion's."""
-    accelerations = {Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])}
+    """Gap, reactions and margins of a trace, with the accelerations substituted: their series are
+    computed with the motion's.
+    """
+    accelerations = {
+        Expr("acceleration", (), i): a for i, a in enumerate(trace.acceleration[: trace.dof])
+    }
     return [
         *([] if trace.gap is None else [trace.gap]),
         *(substitute(root, accelerations) for root in (*trace.reactions, *trace.margins.values())),
@@ -242,7 +314,9 @@ def motion_roots(trace: Trace) -> list[Expr]:
 
 
 def one_free(trace: Trace) -> OneFree | None:
-    """The equations of motion of a trace with several contacts while one coordinate is free; None if it has none."""
+    """The equations of motion of a trace with several contacts while one coordinate is free; None
+    if it has none.
+    """
     if trace not in _one_free:
         _one_free[trace] = equations_of_one_free(trace, motion_roots(trace)[len(trace.reactions) :])
     return _one_free[trace]
@@ -255,26 +329,48 @@ def _geometry(trace: Trace) -> list[Expr]:
     """The coordinate at contact and the gap's rate there on both sides."""
     if trace.contact is None or trace.gap_rate is None:
         return []
-    return [trace.contact, *(substitute(trace.gap_rate, {Expr("side"): side}) for side in (1.0, -1.0))]
+    return [
+        trace.contact,
+        *(substitute(trace.gap_rate, {Expr("side"): side}) for side in (1.0, -1.0)),
+    ]
 
 
 def _series(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the margins from one state."""
-    rows, inputs, gap = trace.local_rows, trace.inputs_of_loops, [("g", 0)] if trace.gap is not None else []
+    """The Taylor coefficients of the coordinates, velocities, accelerations, the gap and the
+    margins from one state.
+    """
+    rows = trace.local_rows
+    inputs = trace.inputs_of_loops
+    gap = [("g", 0)] if trace.gap is not None else []
     margins = [("m", j) for j in range(len(trace.reactions) + len(trace.margins))]
     targets = [*(("a", i) for i in rows), *gap, *margins, *[None] * len(inputs)]
     leaves = LEAVES | _free(trace) | _data(known)
-    places = Places(("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves)
+    places = Places(
+        ("t", "origin", "side", "env", "piece", "q", "v", "a", "g", "m", "w", "order"), leaves
+    )
     loops = trace.loop_rows((("q", 0), ("v", 0), ("a", 0)), with_accelerations=True)
-    (q, v), first_order = ([(name, i) for i in rows] for name in ("q", "v")), [i for i in trace.first_order_rows if i in rows]
-    layout = Rows(q, v, targets, MOST_COEFFICIENTS, True, first_order=first_order, coordinates=rows, loops=loops)
+    (q, v) = ([(name, i) for i in rows] for name in ("q", "v"))
+    first_order = [i for i in trace.first_order_rows if i in rows]
+    layout = Rows(
+        q,
+        v,
+        targets,
+        MOST_COEFFICIENTS,
+        True,
+        first_order=first_order,
+        coordinates=rows,
+        loops=loops,
+    )
     roots = [*(trace.acceleration[i] for i in rows), *motion_roots(trace), *inputs]
     return _function("series", places, SeriesOf(layout, tape(roots, known, series=True)))
 
 
 def _free(trace: Trace) -> dict[str, tuple[str, int]]:
-    """The places behind the parameters: in which direction each friction slides, and, behind an instant, what is free."""
-    first, count = len(trace.parameters), len(trace.friction_coordinates)
+    """The places behind the parameters: in which direction each friction slides, and, behind an
+    instant, what is free.
+    """
+    first = len(trace.parameters)
+    count = len(trace.friction_coordinates)
     return {"slide": ("parameters", first), "free": ("parameters", first + count + len(INSTANT))}
 
 
@@ -287,35 +383,53 @@ def _in_time(name: str, roots: dict[int, Expr], known: dict[Expr, int]) -> Writt
     """The Taylor coefficients of expressions of the time, by their places."""
     places = Places(("t", "origin", "side", "env", "piece", "b", "w", "order"), LEAVES)
     layout = Rows([], [], [("b", i) for i in roots], MOST_COEFFICIENTS, any_order=True)
-    return _function(name, places, SeriesOf(layout, tape(list(roots.values()), known, series=True)) if roots else [])
+    return _function(
+        name,
+        places,
+        SeriesOf(layout, tape(list(roots.values()), known, series=True)) if roots else [],
+    )
 
 
 def _matrices(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; zeros are there from the beginning."""
-    filled = {("out", i): root for i, root in enumerate(trace.contact_numbers) if root is not number(0.0)}
-    places = Places(("env", "piece", "state", "out"), ENV | HERE | event_derivatives.places_at_event(trace))
+    """The numbers that events at contacts need (`Trace.contact_numbers`) at a state; zeros are
+    there from the beginning.
+    """
+    filled = {
+        ("out", i): root for i, root in enumerate(trace.contact_numbers) if root is not number(0.0)
+    }
+    places = Places(
+        ("env", "piece", "state", "out"), ENV | HERE | event_derivatives.places_at_event(trace)
+    )
     return _function("matrices", places, [Case(tape(list(filled.values()), known), list(filled))])
 
 
 def _matrix_slopes(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one column after the other."""
-    slopes, leaves = event_derivatives.number_slopes(trace), ENV | HERE | event_derivatives.places_at_event(trace)
+    """The derivatives, along each column of the tangent, of the numbers that `matrices` fills; one
+    column after the other.
+    """
+    slopes = event_derivatives.number_slopes(trace)
+    leaves = ENV | HERE | event_derivatives.places_at_event(trace)
     filled = {(("out", i), len(trace.contact_numbers)): along for i, along in slopes.items()}
     cases = [Case.of_columns(trace, filled, known)] if filled else []
     return _function("matrix_slopes", Places(("env", "piece", "state", "out"), leaves), cases)
 
 
-def _at_impact(name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
+def _at_impact(
+    name: str, arguments: tuple[str, ...], roots: list[Expr], known: dict[Expr, int]
+) -> WrittenFunction:
     """A function that returns the values of expressions at an instant, for the velocity `v0`."""
     case = Case(tape(roots, known), [None] * len(roots))
     return _function(name, Places(arguments, LEAVES | {"velocity": ("v0", 0)}), [case])
 
 
 def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
-    """The function that transforms the tangent's columns, in the kernel's state, at each kind of event."""
+    """The function that transforms the tangent's columns, in the kernel's state, at each kind of
+    event.
+    """
     count = len(trace.acceleration)
     starts = {"coordinate": 0, "velocity": count, "shift": 2 * count}
-    state, cases = {op: ("state", start) for op, start in starts.items()}, list[Case]()
+    state = {op: ("state", start) for op, start in starts.items()}
+    cases = list[Case]()
     for *event, changes in event_derivatives.changes(trace):
         targets = [("state", starts[leaf.op] + leaf.value) for leaf in changes]
         when = tuple(zip(("kind", "detail"), map(int, event), strict=True))
@@ -324,12 +438,20 @@ def _tangent(trace: Trace, known: dict[Expr, int]) -> WrittenFunction:
         when = tuple(zip(("kind", "detail"), map(int, event), strict=True))
         cases.append(Case.of_columns(trace, {(state["shift"], 1): shift}, known, when))
     leaves = LEAVES | _free(trace) | _data(known) | state
-    return _function("tangent", Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), leaves), cases)
+    return _function(
+        "tangent",
+        Places(("kind", "detail", "t", "origin", "side", "env", "piece", "state"), leaves),
+        cases,
+    )
 
 
 def _table(name: str, places: Places, roots: list[Expr], known: dict[Expr, int]) -> WrittenFunction:
     """A function that fills its last argument with the values of expressions of the parameters."""
-    return _function(name, places, [Case(tape(roots, known), [(places.arguments[-1], i) for i in range(len(roots))])])
+    return _function(
+        name,
+        places,
+        [Case(tape(roots, known), [(places.arguments[-1], i) for i in range(len(roots))])],
+    )
 
 
 @dataclass(frozen=True)
@@ -348,28 +470,43 @@ class Program:
         data: np.ndarray = self.env[1][self.structure.constant_count :]
         return data
 
-    def with_numbers(self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]) -> Program:
+    def with_numbers(
+        self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]
+    ) -> Program:
         """The same with other numbers."""
         env, model = self.structure.prepare(parameters, records, self.data)
         return replace(self, env=env, model=model)
 
 
-def program(system: System, limits: tuple[str, ...] | None = None, sensitivities: tuple[str, ...] | None = None) -> Program:
-    """A system ready to run, by default with the margins that end a motion in any case, and with a tangent if asked for. Its
-    structure is traced and compiled unless it is known; its numbers are filled in at the first time."""
-    structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
+def program(
+    system: System,
+    limits: tuple[str, ...] | None = None,
+    sensitivities: tuple[str, ...] | None = None,
+) -> Program:
+    """A system ready to run, by default with the margins that end a motion in any case, and with a
+    tangent if asked for. Its structure is traced and compiled unless it is known; its numbers are
+    filled in at the first time."""
+    # what a system remembers is forgotten where values that its classes read have changed
+    structure_key(system)
     return known_program(system, limits_of(system, ()) if limits is None else limits, sensitivities)
 
 
-def known_program(system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None) -> Program:
+def known_program(
+    system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None
+) -> Program:
     """The same, for a caller who has asked for the structure's key already."""
-    run: Program = system._remembered((limits, sensitivities), lambda: _made(system, limits, sensitivities))
+    run: Program = system._remembered(
+        (limits, sensitivities), lambda: _made(system, limits, sensitivities)
+    )
     if not run.structure.several:
         return run
-    return replace(run, env=(run.env[0].copy(), *run.env[1:]))  # the kernel writes which coordinates are free
+    # the kernel writes which coordinates are free
+    return replace(run, env=(run.env[0].copy(), *run.env[1:]))
 
 
-def _made(system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None) -> Program:
+def _made(
+    system: System, limits: tuple[str, ...], sensitivities: tuple[str, ...] | None
+) -> Program:
     asked = (structure_key(system), limits, sensitivities)
     if asked not in _structures:
         traced = trace(system, *asked[1:])
@@ -388,8 +525,11 @@ _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}
 
 
 def limits_of(system: System, stop_at: Iterable[str]) -> tuple[str, ...]:
-    """The margins that end a motion: the model's own stops, in coordinates of its gaps, and those asked for."""
-    model, asked = system.in_gap_coordinates.model, check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
+    """The margins that end a motion: the model's own stops, in coordinates of its gaps, and those
+    asked for.
+    """
+    model = system.in_gap_coordinates.model
+    asked = check_names("stop_at", stop_at, "margins, such as ['kinematic_limit']")
     own = system._remembered("limits", lambda: (*model.stops, *model.friction_limits))
     return tuple(dict.fromkeys((*own, *asked)))
 

@@ -1,8 +1,9 @@
-"""Definitions that the scalar kernel shares with its callers: modes, reasons to return, events, places in its arrays, and
-thresholds; and the rule for the side on which a state moves on, which lanes share.
+"""Definitions that the scalar kernel shares with its callers: modes, reasons to return, events,
+places in its arrays, and thresholds; and the rule for the side on which a state moves on, which
+lanes share.
 
-Members of the enumerations become plain numbers in the compiled text (see `compiled_part`). The thresholds below the marker are
-compiled together with the kernel.
+Members of the enumerations become plain numbers in the compiled text (see `compiled_part`). The
+thresholds below the marker are compiled together with the kernel.
 """
 
 from __future__ import annotations
@@ -28,15 +29,18 @@ class EventCode(IntEnum):
     SLIP = 8
     REVERSAL = 9
     CROSSING = 10
-    RESET_SLOPES = 11  # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
+    # no event, but a request to `tangent`: the derivatives of the reset alone, at a fixed instant
+    RESET_SLOPES = 11
 
 
 class RestDetail(IntEnum):
     """The way in which a system comes to rest, which decides the derivatives at rest."""
 
     AFTER_IMPACTS = 0  # as the limit of an accumulation of impacts
-    AT_ONCE = 1  # after an impact that leaves no speed; motions from neighbouring states come to rest soon after
-    NEVER_AGAIN = 2  # at once, but impacts lose nothing, so that motions from neighbouring states never come to rest
+    # after an impact that leaves no speed; motions from neighbouring states come to rest soon after
+    AT_ONCE = 1
+    # at once, but impacts lose nothing, so that motions from neighbouring states never come to rest
+    NEVER_AGAIN = 2
 
 
 class ReleaseDetail(IntEnum):
@@ -83,7 +87,9 @@ class GrazingDetail(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Places in the array of a structure's geometry: the coordinate at contact, and how the gap changes with it on each side."""
+    """Places in the array of a structure's geometry: the coordinate at contact, and how the gap
+    changes with it on each side.
+    """
 
     CONTACT = 0
     RATE_UP = 1
@@ -91,11 +97,14 @@ class Geometry(IntEnum):
 
 
 class SegmentValue(IntEnum):
-    """Columns of the numbers at the ends of each smooth segment of an orbit with one contact (`one_contact/segments.py`)."""
+    """Columns of the numbers at the ends of each smooth segment of an orbit with one contact
+    (`one_contact/segments.py`).
+    """
 
     QUOTIENT = 0  # (x - contact) / duration
     RESET_DRIFT = 1  # dv+/dt
-    FIRST_STATE = 2  # from here on coordinates, velocities and accelerations at the end, then at the start
+    # from here on coordinates, velocities and accelerations at the end, then at the start
+    FIRST_STATE = 2
 
 
 class SegmentColumn(IntEnum):
@@ -111,47 +120,75 @@ class SegmentColumn(IntEnum):
     LEAST_MARGIN = 7  # the least values of the margins, from here on
 
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-LOWEST_ORDER, HIGHEST_ORDER = 14, 22  # of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
+# of a lane's series, at 1e-6 and at 1e-15; even, as coefficients are made in pairs
+LOWEST_ORDER = 14
+HIGHEST_ORDER = 22
 SERIES_LENGTH = HIGHEST_ORDER + 1
 
 
 # The length of a step.
-SAFETY = 0.9  # The error of a step is then a tenth of tol, and the energy drifts by less than 1e-12 in 1000 periods.
-GAP = 0.65  # largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for a sine
-SMALLEST = 1e-6  # The error of a step is relative to the size of the state, but absolute below this size.
-SHORTEST = 1e-9  # A shorter step, in units of time or of a shorter forcing period, means that the acceleration is singular.
-ROUGHER = 100.0  # The tolerance of a column's series in units of tol; so the motion alone decides nearly all steps.
-DEFECT = 100.0  # The largest defect of a series in the equation at the end of a step, in tol size / h; sound steps stay below 4.
+# The error of a step is then a tenth of tol, and the energy drifts by less than 1e-12 in 1000
+# periods.
+SAFETY = 0.9
+# largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for
+# a sine
+GAP = 0.65
+# The error of a step is relative to the size of the state, but absolute below this size.
+SMALLEST = 1e-6
+# A shorter step, in units of time or of a shorter forcing period, means that the acceleration is
+# singular.
+SHORTEST = 1e-9
+# The tolerance of a column's series in units of tol; so the motion alone decides nearly all steps.
+ROUGHER = 100.0
+# The largest defect of a series in the equation at the end of a step, in tol size / h; sound steps
+# stay below 4.
+DEFECT = 100.0
 BATCH = 100_000  # passes of the loop before the kernel returns to Python, which can then see Ctrl-C
 
 # Rest and release.
-ZERO = 1e-14  # A smaller acceleration at the contact counts as zero, as it is a difference of loads of order 1.
-EXACT = 1e-15  # The tolerance at rest: a small error could turn a touch into a release, and steps cost little there.
+# A smaller acceleration at the contact counts as zero, as it is a difference of loads of order 1.
+ZERO = 1e-14
+# The tolerance at rest: a small error could turn a touch into a release, and steps cost little
+# there.
+EXACT = 1e-15
 TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a number
 
 # Accumulations of impacts.
 SLOW = 3.0  # in sqrt(tol): after faster impacts the end of an accumulation is not looked for
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
-CHATTER_SPEED = 1e-5  # Here the averaged law has an error of 5e-5 of the speed, and a unit of time would have 1e5 impacts.
-SLOWLY = 0.02  # the largest change of the contact accelerations over two impacts for which the averaged law is used
-GAUSS_NODES = np.array([0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263])
-GAUSS_WEIGHTS = np.array([0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269])
+# Here the averaged law has an error of 5e-5 of the speed, and a unit of time would have 1e5
+# impacts.
+CHATTER_SPEED = 1e-5
+# the largest change of the contact accelerations over two impacts for which the averaged law is
+# used
+SLOWLY = 0.02
+GAUSS_NODES = np.array(
+    [0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263]
+)
+GAUSS_WEIGHTS = np.array(
+    [0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269]
+)
 
 
 @lean_jit
 def side_of_state(sides, position, velocity, geometry):
-    """The mode and the side of a state: from the gap; at the contact from the velocity; at rest there the mode CONTACT decides.
+    """The mode and the side of a state: from the gap; at the contact from the velocity; at rest
+    there the mode CONTACT decides.
 
-    The mode is BEYOND if the state lies on no side of the contact. A motion that starts at the contact with a velocity that
-    closes the gap of every side is on an ARC that begins with its impact.
+    The mode is BEYOND if the state lies on no side of the contact. A motion that starts at the
+    contact with a velocity that closes the gap of every side is on an ARC that begins with its
+    impact.
     """
     if sides == 0:
         return Mode.ARC, 1
-    into, open_side, pressed = 0, 0, False
+    into = 0
+    open_side = 0
+    pressed = False
     for i in range(sides):
-        side, rate = 1 - 2 * i, geometry[Geometry.RATE_UP + i]
+        side = 1 - 2 * i
+        rate = geometry[Geometry.RATE_UP + i]
         gap = rate * (position - geometry[Geometry.CONTACT])
         if gap > 0.0 and open_side == 0:
             open_side = side

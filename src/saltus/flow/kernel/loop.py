@@ -1,7 +1,7 @@
 """The loop of both scalar kernels: steps, forcing periods, and the reasons to return.
 
-Its compiled part goes into one module with that of `one_contact/kernel.py`, or with that of `contacts/kernel.py`, which has
-functions of the same names.
+Its compiled part goes into one module with that of `one_contact/kernel.py`, or with that of
+`contacts/kernel.py`, which has functions of the same names.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from saltus.flow.kernel.steps import next_target, state_arrays
 from saltus.flow.one_contact.kernel import begin, is_smooth, one_pass, parts_of, waits
 from saltus.taylor import by_reference, cached_jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -43,11 +43,12 @@ def advance_with(numbers, parts):
 
 @cached_jit(ADVANCE)
 def advance(numbers, state, env, functions, rows, buffers):
-    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the reason.
+    """Advance a motion until it ends, a buffer is full, or a batch of steps is done; returns the
+    reason.
 
-    All of the motion's state is in `numbers`, a record MOTION, in `state`, and in the `rows` of contacts and frictions, so that a
-    call goes on where the last one stopped. `env` = (parameters, constants, record breakpoints, record table); `buffers` are
-    those of steps and of events.
+    All of the motion's state is in `numbers`, a record MOTION, in `state`, and in the `rows` of
+    contacts and frictions, so that a call goes on where the last one stopped. `env` = (parameters,
+    constants, record breakpoints, record table); `buffers` are those of steps and of events.
     """
     record = numbers[0]
     parts = parts_of(record, state_arrays(record, state), env, functions, rows, buffers)

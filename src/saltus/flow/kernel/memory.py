@@ -1,10 +1,11 @@
 """The memory of the scalar kernels in words.
 
-`motion`, which the compiled functions take, is a named tuple by its address: of a record with the numbers of the motion, the
-arrays of its state, those of a step, the buffers of its records, and the functions of its structure. All of their fields are
-attributes of `motion` itself (see `taylor/numba_types.py`), so that a compiled function reads `motion.time` or
-`motion.velocities[0]`, whichever part they are in. The types that numba is told follow at the end, with those of a structure's
-functions.
+`motion`, which the compiled functions take, is a named tuple by its address: of a record with the
+numbers of the motion, the arrays of its state, those of a step, the buffers of its records, and the
+functions of its structure. All of their fields are attributes of `motion` itself (see
+`taylor/numba_types.py`), so that a compiled function reads `motion.time` or `motion.velocities[0]`,
+whichever part they are in. The types that numba is told follow at the end, with those of a
+structure's functions.
 """
 
 from __future__ import annotations
@@ -19,17 +20,20 @@ from numba import from_dtype, types
 
 from saltus.taylor import written_type
 
-_WHOLE, _REAL = np.int64, np.float64
+_WHOLE = np.int64
+_REAL = np.float64
 
 MOTION = np.dtype(
     [
-        # What is given at the start, up to the tolerance: where the motion is, when it ends, and how it is computed.
+        # What is given at the start, up to the tolerance: where the motion is, when it ends, and
+        # how it is computed.
         ("time", _REAL),  # within the forcing period
         ("period", _WHOLE),  # the forcing period
         ("mode", _WHOLE),  # a `Mode`
         ("side", _WHOLE),
         ("piece", _WHOLE),  # of the records
-        ("leave_by", _WHOLE),  # the side that the caller has chosen for a motion from rest that is not unique; or 0
+        # the side that the caller has chosen for a motion from rest that is not unique; or 0
+        ("leave_by", _WHOLE),
         ("dense", _WHOLE),  # whether steps are recorded
         ("last_period", _WHOLE),  # in which the motion ends
         ("end", _REAL),  # of the motion, as a time within its last forcing period
@@ -37,7 +41,9 @@ MOTION = np.dtype(
         ("tolerance", _REAL),
         # What the kernel itself begins with 0.
         ("origin", _REAL),  # the time at which the forcing period began
-        ("skip", _WHOLE),  # order of the gap's known zero at the start of an arc; the side just released in CONTACT from rest
+        # order of the gap's known zero at the start of an arc; the side just released in CONTACT
+        # from rest
+        ("skip", _WHOLE),
         ("new_piece", _WHOLE),  # whether it has just begun, so that the load may have jumped
         ("rested", _WHOLE),  # whether the motion was at rest or in chatter before
         ("chatter_speed", _REAL),  # of the gap, while impacts without loss are averaged
@@ -47,18 +53,23 @@ MOTION = np.dtype(
             "horizon",
             _REAL,
         ),  # for the scalar steps of a lane, which end with its forcing period: the local time at its motion's end
-        ("until_smooth", _WHOLE),  # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
+        # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
+        ("until_smooth", _WHOLE),
         ("order", _WHOLE),  # of the Taylor series
         # The sizes of the structure.
         ("dof", _WHOLE),  # coordinates that are followed, own (1 + columns)
         ("margin_count", _WHOLE),  # the number of margins at which the motion stops
         ("workspace_rows", _WHOLE),
         ("sides", _WHOLE),  # of the contact
-        ("checked", _WHOLE),  # whether steps are checked: the structure has functions with steep changes that a series may miss
-        ("first_order", _WHOLE),  # how many of the model's own coordinates, the last ones, are of first order
+        # whether steps are checked: the structure has functions with steep changes that a series
+        # may miss
+        ("checked", _WHOLE),
+        # how many of the model's own coordinates, the last ones, are of first order
+        ("first_order", _WHOLE),
         ("own", _WHOLE),  # the model's own coordinates
         ("columns", _WHOLE),  # of the tangent
-        ("local", _WHOLE),  # the first of its own coordinates, on which impacts act; those behind them have mass 1
+        # the first of its own coordinates, on which impacts act; those behind them have mass 1
+        ("local", _WHOLE),
     ]
 )
 _NAMES: Any = MOTION.names
@@ -67,23 +78,30 @@ SIZES = list(_NAMES[_NAMES.index("dof") :])
 
 
 def _packed(names: tuple[str, ...]) -> Struct:
-    """The first fields of a record as Python's numbers: NumPy takes as long for one of them as this for all."""
+    """The first fields of a record as Python's numbers: NumPy takes as long for one of them as this
+    for all.
+    """
     return Struct("=" + "".join("d" if MOTION[name] == _REAL else "q" for name in names))
 
 
-WHOLE_RECORD, AT_START = _packed(_NAMES), _packed(_NAMES[: _NAMES.index("tolerance") + 1])
+WHOLE_RECORD = _packed(_NAMES)
+AT_START = _packed(_NAMES[: _NAMES.index("tolerance") + 1])
 MotionNumbers: Any = namedtuple("MotionNumbers", _NAMES)  # type: ignore[misc]  # a record as Python's numbers
 
 
 @cache
 def blank_record(order: int, sizes: tuple[int, ...]) -> bytes:
-    """The bytes of a record MOTION for motions of a structure: all but the order and the sizes are 0."""
+    """The bytes of a record MOTION for motions of a structure: all but the order and the sizes are
+    0.
+    """
     known = {"order": order, **dict(zip(SIZES, sizes, strict=True))}
     return WHOLE_RECORD.pack(*(known.get(name, 0) for name in _NAMES))
 
 
 def motion_record(order: int, sizes: tuple[int, ...]) -> tuple[np.ndarray, bytearray]:
-    """An array of one record, all but the order and the sizes 0, and its bytes; NumPy's own way takes ten times as long."""
+    """An array of one record, all but the order and the sizes 0, and its bytes; NumPy's own way
+    takes ten times as long.
+    """
     memory = bytearray(blank_record(order, sizes))
     return np.ndarray((1,), MOTION, memory), memory
 
@@ -92,7 +110,9 @@ INSTANT = ("time", "origin")  # of an event, behind the parameters of a model wi
 
 
 def behind_parameters(frictions: int, local: int) -> list[float]:
-    """What stands behind the parameters at the start: the slidings, an instant, and that all coordinates are free."""
+    """What stands behind the parameters at the start: the slidings, an instant, and that all
+    coordinates are free.
+    """
     return [0.0] * (frictions + len(INSTANT)) + [1.0] * local
 
 
@@ -106,7 +126,8 @@ class MotionMemory(NamedTuple):
 class StateArrays(NamedTuple):
     """The state and its parts."""
 
-    state: Any  # all coordinates, including those of the tangent's columns, their velocities, and the shifts
+    # all coordinates, including those of the tangent's columns, their velocities, and the shifts
+    state: Any
     coordinates: Any
     velocities: Any
     shifts: Any  # of the last event, along each column
@@ -135,7 +156,9 @@ class StepBuffers(NamedTuple):
 
 
 class EventBuffers(NamedTuple):
-    """The recorded events: (period, kind, side, detail), and (local time, velocities before and after, more, shifts)."""
+    """The recorded events: (period, kind, side, detail), and (local time, velocities before and
+    after, more, shifts).
+    """
 
     event_labels: Any
     event_values: Any
@@ -157,11 +180,13 @@ class ContactsFunctions(NamedTuple):
 
     series: Any
     matrices: Any
-    matrix_slopes: Any  # the derivatives, along each column of the tangent, of the numbers that `matrices` fills
+    # the derivatives, along each column of the tangent, of the numbers that `matrices` fills
+    matrix_slopes: Any
     tangent: Any
     load_series: Any  # of the load's channels, for eigenmodes
     signs: Any
-    eigenmodes: Any  # the table of `systems/eigenmodes.py`; empty for motions that are not followed in them
+    # the table of `systems/eigenmodes.py`; empty for motions that are not followed in them
+    eigenmodes: Any
 
 
 class ModeArrays(NamedTuple):
@@ -197,7 +222,9 @@ class SegmentRequest(NamedTuple):
     """The segments of an orbit of a model with one contact."""
 
     spans: Any  # (n, 3): begin, end, and the gap's speed before the impact that starts it
-    sides: Any  # (n, 2): the side before that impact (0: starts from a state), and the side of the segment (0: all)
+    # (n, 2): the side before that impact (0: starts from a state), and the side of the segment (0:
+    # all)
+    sides: Any
     states: Any  # (n, 2 own): where it starts, unless by an impact
 
 
@@ -231,7 +258,9 @@ class ImpactEquations(NamedTuple):
 class SolverArrays(NamedTuple):
     """The arrays in which impacts and closed contacts are solved for."""
 
-    solver_numbers: Any  # filled by `matrices`: mass matrix by rows, E by rows, positions, speeds of the frictions' grounds
+    # filled by `matrices`: mass matrix by rows, E by rows, positions, speeds of the frictions'
+    # grounds
+    solver_numbers: Any
     inverse: Any  # of the mass matrix
     coupling: Any  # the rates that unit impulses of the contacts give to the gaps, signs included
     block: Any  # the rows of a linear system, with its right-hand sides behind them
@@ -247,7 +276,8 @@ class SolverArrays(NamedTuple):
     falling_pulls: Any
     slopes: Any  # a row for each column of the tangent: the derivatives of `solver_numbers`
     jump: Any  # of the velocities at an impact
-    event_shifts: Any  # by how much an impact, a release or the end of an accumulation moves with each column
+    # by how much an impact, a release or the end of an accumulation moves with each column
+    event_shifts: Any
     pull_slopes: Any  # the derivatives of `pulls`, a row for each column
 
 
@@ -257,7 +287,9 @@ class ContactsParts(NamedTuple):
     state_arrays: StateArrays
     env: Any
     parameters: (
-        Any  # the last ones say in which direction each friction slides, and whether each coordinate is free (1) or held (0)
+        # the last ones say in which direction each friction slides, and whether each coordinate is
+        # free (1) or held (0)
+        Any
     )
     breaks: Any
     functions: ContactsFunctions
@@ -312,7 +344,8 @@ class LaneImpactParts(NamedTuple):
     solver: SolverArrays
 
 
-_f, _i = types.float64, types.int64
+_f = types.float64
+_i = types.int64
 _f1, _f2, _f3 = (types.Array(_f, n, "C") for n in (1, 2, 3))
 _i1, _i2 = (types.Array(_i, n, "C") for n in (1, 2))
 ENV = types.Tuple((_f1, _f1, _f1, _f3))  # parameters, constants, record breakpoints, record table
@@ -346,5 +379,7 @@ CONTACT_SEGMENTS = _i(
     types.NamedTuple((_f2, _f3, _f3, _f2), ContactsSegmentResults),
 )
 IMPACT_EQUATIONS = types.void(
-    types.NamedTuple((_f2, _f1, _f1, _f, _i), ImpactRequest), _results, types.NamedTuple((_f2, _f3, _f3, _f3), ImpactEquations)
+    types.NamedTuple((_f2, _f1, _f1, _f, _i), ImpactRequest),
+    _results,
+    types.NamedTuple((_f2, _f3, _f3, _f3), ImpactEquations),
 )

@@ -1,4 +1,6 @@
-"""The smooth segments of periodic orbits, followed with their derivatives: what orbits ask of the compiled code."""
+"""The smooth segments of periodic orbits, followed with their derivatives: what orbits ask of the
+compiled code.
+"""
 
 from __future__ import annotations
 
@@ -23,53 +25,76 @@ from saltus.taylor import entry_point, load_module
 
 @cache
 def load_segments() -> tuple[Callable[..., int], Callable[..., None]]:
-    """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations` of
-    `one_contact/segments.py`."""
+    """The functions with which periodic orbits are solved: `follow_segments` and `impact_equations`
+    of `one_contact/segments.py`."""
     module = load_module("segments", kernel_text(layout, roots, steps, impacts, segments))
     return entry_point(module.follow_segments), entry_point(module.impact_equations)
 
 
 @cache
 def load_contact_segments() -> Callable[..., int]:
-    """The function with which orbits with several contacts are solved, `follow_contact_segments` of `contacts/segments.py`."""
+    """The function with which orbits with several contacts are solved, `follow_contact_segments` of
+    `contacts/segments.py`.
+    """
     parts = (contact_layout, complementarity, contact_impacts, tangent, extremes, contact_segments)
-    return entry_point(load_module("contact_segments", kernel_text(layout, roots, steps, *parts)).follow_contact_segments)
+    return entry_point(
+        load_module(
+            "contact_segments", kernel_text(layout, roots, steps, *parts)
+        ).follow_contact_segments
+    )
 
 
 class SegmentFollower:
-    """Follows the segments of orbits of one structure at a tolerance; numbers are given with each call."""
+    """Follows the segments of orbits of one structure at a tolerance; numbers are given with each
+    call.
+    """
 
     def __init__(self, run: Program, tol: float) -> None:
-        self._run, (self._numbers, _) = run, motion_record(taylor_order(tol), run.structure.sizes)
+        self._run = run
+        (self._numbers, _) = motion_record(taylor_order(tol), run.structure.sizes)
         self._numbers["tolerance"] = tol
         record = self._numbers[0]
         self.own = int(record["own"])  # degrees of freedom
-        self._columns, self._margins = int(record["columns"]), max(1, int(record["margin_count"]))
+        self._columns = int(record["columns"])
+        self._margins = max(1, int(record["margin_count"]))
 
     def follow_segments(
         self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False
     ) -> SegmentResults | None:
-        """The smooth motions of a model with one contact along the segments of a `SegmentRequest`, with their extremes if asked
-        for; None where a segment cannot be followed.
+        """The smooth motions of a model with one contact along the segments of a `SegmentRequest`,
+        with their extremes if asked for; None where a segment cannot be followed.
 
         `numbers` are those of `CompiledStructure.prepare`.
         """
-        n, own = len(request[0]), self.own
-        ends, columns = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own)), np.zeros((n, 4 * own, self._columns))
+        n = len(request[0])
+        own = self.own
+        ends = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own))
+        columns = np.zeros((n, 4 * own, self._columns))
         extremes = np.zeros((n if with_extremes else 0, SegmentColumn.LEAST_MARGIN + self._margins))
         results = SegmentResults(ends, columns, extremes)
-        return None if load_segments()[0](self._numbers, *numbers, request, results) < n else results
+        return (
+            None if load_segments()[0](self._numbers, *numbers, request, results) < n else results
+        )
 
     def follow_contacts(
         self, numbers: tuple[Any, Any], request: tuple[Any, ...], with_extremes: bool = False
     ) -> ContactsSegmentResults | None:
-        """The same for a model with several contacts and the segments of a `ContactsSegmentRequest`."""
-        held, n, own = self._run.trace.contact_coordinates, len(request[0]), self.own
+        """The same for a model with several contacts and the segments of a
+        `ContactsSegmentRequest`.
+        """
+        held = self._run.trace.contact_coordinates
+        n = len(request[0])
+        own = self.own
         contacts = np.zeros((len(held), len(FrictionColumn)), dtype=np.int64)
         contacts[:, ContactColumn.COORDINATE] = held
-        ends, columns = np.zeros((n, SegmentEnd.NUMBERS + 10 * own)), np.zeros((n, 2 * own + 1, self._columns))
+        ends = np.zeros((n, SegmentEnd.NUMBERS + 10 * own))
+        columns = np.zeros((n, 2 * own + 1, self._columns))
         maps = np.zeros((n, 2 * own, self._columns))
         margins = len(self._run.trace.margins)
         extremes = np.zeros((n if with_extremes else 0, SegmentExtremes.MARGINS + max(1, margins)))
         results = ContactsSegmentResults(ends, columns, maps, extremes)
-        return None if load_contact_segments()(self._numbers, *numbers, contacts, request, results) < n else results
+        return (
+            None
+            if load_contact_segments()(self._numbers, *numbers, contacts, request, results) < n
+            else results
+        )

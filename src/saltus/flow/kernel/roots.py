@@ -1,6 +1,7 @@
 """The first root of a polynomial on [0, 1]: exclusion, Bernstein subdivision, bracketed Newton.
 
-This text is compiled together with each kernel (see `compiled.py`), so it uses plain loops and the decorator `jit`.
+This text is compiled together with each kernel (see `compiled.py`), so it uses plain loops and the
+decorator `jit`.
 """
 
 from __future__ import annotations
@@ -10,13 +11,17 @@ import numpy as np
 from saltus.flow.kernel.layout import ZERO
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-NONE, SIMPLE = 0, 1
+NONE = 0
+SIMPLE = 1
 NEVER = 2.0  # stands for no root: later than any u in [0, 1]
-NARROW = 2.0**-26  # square root of the working precision: two roots closer than this are one tangency
-NOISE = 4.0 * 2.0**-52  # rounding of a Bernstein coefficient, relative to the sum of the polynomial's terms
-DEPTH = 64  # the most boxes on the stack; a bisection down to NARROW leaves one behind at each of 26 levels
+# square root of the working precision: two roots closer than this are one tangency
+NARROW = 2.0**-26
+# rounding of a Bernstein coefficient, relative to the sum of the polynomial's terms
+NOISE = 4.0 * 2.0**-52
+# the most boxes on the stack; a bisection down to NARROW leaves one behind at each of 26 levels
+DEPTH = 64
 
 
 @jit
@@ -30,8 +35,11 @@ def horner(c, n, x):
 
 @jit
 def value_and_slope(c, n, x):
-    """sum_{k=0..n} c[k] x^k and its derivative, n >= 1: in one loop, as each waits for its own last sum."""
-    value, slope = c[n], n * c[n]
+    """sum_{k=0..n} c[k] x^k and its derivative, n >= 1: in one loop, as each waits for its own last
+    sum.
+    """
+    value = c[n]
+    slope = n * c[n]
     for k in range(n - 1, 0, -1):
         value, slope = value * x + c[k], slope * x + k * c[k]
     return value * x + c[0], slope
@@ -40,7 +48,8 @@ def value_and_slope(c, n, x):
 @jit
 def both_sums(a, b, n, x):
     """sum_{k=0..n} a[k] x^k and sum_{k=0..n} b[k] x^k."""
-    first, second = a[n], b[n]
+    first = a[n]
+    second = b[n]
     for k in range(n - 1, -1, -1):
         first, second = first * x + a[k], second * x + b[k]
     return first, second
@@ -48,11 +57,16 @@ def both_sums(a, b, n, x):
 
 @jit
 def keeps_sign(p, n):
-    """Whether certainly p != 0 on [0, 1]: because p0 + p1 u + p2 u^2 stays farther from 0 than the sum of abs(p_k), k >= 3."""
-    sign, rest = (1.0 if p[0] > 0.0 else -1.0), 0.0
+    """Whether certainly p != 0 on [0, 1]: because p0 + p1 u + p2 u^2 stays farther from 0 than the
+    sum of abs(p_k), k >= 3.
+    """
+    sign = 1.0 if p[0] > 0.0 else -1.0
+    rest = 0.0
     for k in range(3, n + 1):
         rest += abs(p[k])
-    first, second, third = sign * p[0], sign * p[1], sign * p[2]
+    first = sign * p[0]
+    second = sign * p[1]
+    third = sign * p[2]
     low = min(first, first + second + third)
     if third > 0.0 and 0.0 < -second < 2.0 * third:
         low = first - second * second / (4.0 * third)
@@ -67,7 +81,9 @@ def excluded(p, n):
 
 @jit
 def to_bernstein(p, n, b):
-    """Bernstein coefficients on [0, 1]: b_i = sum_k C(i,k)/C(n,k) p_k, by repeated sums as in Pascal's triangle."""
+    """Bernstein coefficients on [0, 1]: b_i = sum_k C(i,k)/C(n,k) p_k, by repeated sums as in
+    Pascal's triangle.
+    """
     binomial = 1.0
     for k in range(n + 1):
         b[k] = p[k] / binomial
@@ -79,9 +95,10 @@ def to_bernstein(p, n, b):
 
 @jit
 def variations(b, n):
-    """The number of sign variations of the coefficients, zeros left out: the number of roots is this or less by an even
-    number."""
-    count, last = 0, 0
+    """The number of sign variations of the coefficients, zeros left out: the number of roots is
+    this or less by an even number."""
+    count = 0
+    last = 0
     for i in range(n + 1):
         sign = 1 if b[i] > 0.0 else (-1 if b[i] < 0.0 else 0)
         if sign != 0:
@@ -102,10 +119,14 @@ def leading_sign(b, n):
 
 @jit
 def newton(p, n, low, high):
-    """The root of p in [low, high], p(low) > 0 >= p(high): Newton's steps, bisection where one leaves the bracket."""
-    at_low, at_high = horner(p, n, low), horner(p, n, high)
+    """The root of p in [low, high], p(low) > 0 >= p(high): Newton's steps, bisection where one
+    leaves the bracket.
+    """
+    at_low = horner(p, n, low)
+    at_high = horner(p, n, high)
     share = at_low / (at_low - at_high) if at_low > 0.0 > at_high else 0.5
-    if not 0.01 < share < 0.99:  # p may be nearly zero at an end, where rounding decides its sign: begin in the middle
+    # p may be nearly zero at an end, where rounding decides its sign: begin in the middle
+    if not 0.01 < share < 0.99:
         share = 0.5
     u = low + share * (high - low)
     for _ in range(200):
@@ -115,7 +136,8 @@ def newton(p, n, low, high):
         else:
             high = u
         following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
-        if not low <= following <= high:  # at equality the step has converged: bisection would lose nine digits
+        # at equality the step has converged: bisection would lose nine digits
+        if not low <= following <= high:
             following = 0.5 * (low + high)
         if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
             return following
@@ -127,29 +149,38 @@ def newton(p, n, low, high):
 def first_root(p, n):
     """The first root in (0, 1] of a polynomial of degree n that starts positive.
 
-    Returns (kind, u, touch): SIMPLE and the root, or NONE; and the first place before it at which p touches zero, within the
-    working precision, without changing its sign (a grazing), or NEVER.
+    Returns (kind, u, touch): SIMPLE and the root, or NONE; and the first place before it at which p
+    touches zero, within the working precision, without changing its sign (a grazing), or NEVER.
     """
     if excluded(p, n):
         return NONE, NEVER, NEVER
-    size, steep, end = abs(p[0]), 0.0, p[0]
+    size = abs(p[0])
+    steep = 0.0
+    end = p[0]
     for k in range(1, n + 1):
         size += abs(p[k])
         steep += k * abs(p[k])
         end += p[k]
     noise = NOISE * size
-    if p[0] > 0.0 > p[1] and -2.0 * p[1] > steep * (1.0 + NOISE) and end < -noise:  # it falls everywhere, as a small bounce does
+    # it falls everywhere, as a small bounce does
+    if p[0] > 0.0 > p[1] and -2.0 * p[1] > steep * (1.0 + NOISE) and end < -noise:
         return SIMPLE, newton(p, n, 0.0, 1.0), NEVER
     boxes = np.empty((DEPTH, n + 1))
-    left, width = np.empty(DEPTH), np.empty(DEPTH)
+    left = np.empty(DEPTH)
+    width = np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])
-    left[0], width[0] = 0.0, 1.0
-    top, touch = 1, NEVER
+    left[0] = 0.0
+    width[0] = 1.0
+    top = 1
+    touch = NEVER
     while top > 0:
         top -= 1
-        b, low, wide = boxes[top], left[top], width[top]
+        b = boxes[top]
+        low = left[top]
+        wide = width[top]
         count = variations(b, n)
-        if low > 0.0 and (b[0] <= 0.0 or (b[0] <= noise and count == 0)):  # a root where two boxes meet
+        # a root where two boxes meet
+        if low > 0.0 and (b[0] <= 0.0 or (b[0] <= noise and count == 0)):
             if leading_sign(b, n) <= 0:
                 return SIMPLE, low, touch
             touch = min(touch, low)
@@ -167,16 +198,21 @@ def first_root(p, n):
             continue
         half = 0.5 * wide
         split(boxes, top, n)
-        left[top], width[top] = low + half, half
-        left[top + 1], width[top + 1] = low, half
+        left[top] = low + half
+        width[top] = half
+        left[top + 1] = low
+        width[top + 1] = half
         top += 2
     return NONE, NEVER, touch
 
 
 @jit
 def split(boxes, top, n):
-    """Bisect the box at `top` by de Casteljau: its right half takes its place, its left half goes on top, to be next."""
-    right, first = boxes[top], boxes[top + 1]
+    """Bisect the box at `top` by de Casteljau: its right half takes its place, its left half goes
+    on top, to be next.
+    """
+    right = boxes[top]
+    first = boxes[top + 1]
     for i in range(n + 1):
         first[i] = right[0]
         for k in range(n - i):
@@ -185,7 +221,9 @@ def split(boxes, top, n):
 
 @jit
 def scale_gap(g, skip, order, h, p):
-    """p_k = g_{k + skip} h^k for k = 0..order - skip, else 0: the series on [0, 1] without its known root at 0."""
+    """p_k = g_{k + skip} h^k for k = 0..order - skip, else 0: the series on [0, 1] without its
+    known root at 0.
+    """
     power = 1.0
     for k in range(p.size):
         p[k] = 0.0
@@ -196,12 +234,16 @@ def scale_gap(g, skip, order, h, p):
 
 @jit
 def contact_root(g, skip, order, h, poly):
-    """The first zero of the gap within the step, apart from a known zero of order `skip` at its start."""
-    if skip == 0 and g[0] <= 0.0:  # rounding left the last step's end on the wrong side of the contact
+    """The first zero of the gap within the step, apart from a known zero of order `skip` at its
+    start.
+    """
+    # rounding left the last step's end on the wrong side of the contact
+    if skip == 0 and g[0] <= 0.0:
         if g[1] < 0.0:
             return SIMPLE, 0.0, NEVER
         skip = 1
-    while skip < order - 2 and g[skip] <= 0.0:  # leaving from rest: lower coefficients are zero up to rounding
+    # leaving from rest: lower coefficients are zero up to rounding
+    while skip < order - 2 and g[skip] <= 0.0:
         skip += 1
     scale_gap(g, skip, order, h, poly)
     return first_root(poly, order - skip)
@@ -209,8 +251,8 @@ def contact_root(g, skip, order, h, poly):
 
 @lean_jit
 def margin_root(m, order, h, poly):
-    """The instant at which a margin reaches zero within the step, as a share of it; 0 if it is not positive at the start, NEVER
-    if it does not reach zero."""
+    """The instant at which a margin reaches zero within the step, as a share of it; 0 if it is not
+    positive at the start, NEVER if it does not reach zero."""
     if m[0] <= 0.0:
         return 0.0
     scale_gap(m, 0, order, h, poly)
@@ -220,7 +262,9 @@ def margin_root(m, order, h, poly):
 
 @lean_jit
 def leading(coefficients, start, order, zero=ZERO):
-    """The index from `start` on of the first coefficient that is larger than `zero`; `order` if there is none."""
+    """The index from `start` on of the first coefficient that is larger than `zero`; `order` if
+    there is none.
+    """
     for k in range(start, order):
         if abs(coefficients[k]) > zero:
             return k
@@ -242,27 +286,34 @@ def root_between(p, n, low, high, rises):
 
 @jit
 def roots_within(p, n, roots, noise):
-    """Fill `roots` with the places in (0, 1) at which a polynomial of degree n changes its sign by more than `noise`; returns
-    their number."""
+    """Fill `roots` with the places in (0, 1) at which a polynomial of degree n changes its sign by
+    more than `noise`; returns their number."""
     if keeps_sign(p, n):
         return 0
-    steep, end = 0.0, p[0]
+    steep = 0.0
+    end = p[0]
     for k in range(1, n + 1):
         steep += k * abs(p[k])
         end += p[k]
-    if min(abs(p[0]), abs(end)) > noise and 2.0 * abs(p[1]) > steep * (1.0 + NOISE):  # it rises or falls everywhere
+    # it rises or falls everywhere
+    if min(abs(p[0]), abs(end)) > noise and 2.0 * abs(p[1]) > steep * (1.0 + NOISE):
         if p[0] * end > 0.0:
             return 0
         roots[0] = root_between(p, n, 0.0, 1.0, p[0] < 0.0)
         return 1
     boxes = np.empty((DEPTH, n + 1))
-    left, width = np.empty(DEPTH), np.empty(DEPTH)
+    left = np.empty(DEPTH)
+    width = np.empty(DEPTH)
     to_bernstein(p, n, boxes[0])
-    left[0], width[0] = 0.0, 1.0
-    top, found = 1, 0
+    left[0] = 0.0
+    width[0] = 1.0
+    top = 1
+    found = 0
     while top > 0:
         top -= 1
-        b, low, wide = boxes[top], left[top], width[top]
+        b = boxes[top]
+        low = left[top]
+        wide = width[top]
         count = variations(b, n)
         largest = 0.0
         for i in range(n + 1):
@@ -272,12 +323,15 @@ def roots_within(p, n, roots, noise):
         if count == 1 or wide < NARROW or top + 2 > DEPTH:
             if count % 2 == 0:
                 continue
-            roots[found] = root_between(p, n, low, low + wide, leading_sign(b, n) < 0)  # b[0] may be 0
+            # b[0] may be 0
+            roots[found] = root_between(p, n, low, low + wide, leading_sign(b, n) < 0)
             found += 1
             continue
         half = 0.5 * wide
         split(boxes, top, n)
-        left[top], width[top] = low + half, half
-        left[top + 1], width[top + 1] = low, half
+        left[top] = low + half
+        width[top] = half
+        left[top + 1] = low
+        width[top + 1] = half
         top += 2
     return found

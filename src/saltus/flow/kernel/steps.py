@@ -15,15 +15,18 @@ from saltus.flow.kernel.memory import ModeArrays, StateArrays, StepArrays
 from saltus.flow.kernel.roots import NOISE, both_sums, horner
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
 def step_arrays(numbers):
     """The arrays of a step."""
-    dof, order, margins = numbers.dof, numbers.order, max(numbers.margin_count, 1)
+    dof = numbers.dof
+    order = numbers.order
+    margins = max(numbers.margin_count, 1)
     count = order + 2
-    rows = np.zeros((3 * dof + margins + 4, count))  # one piece of memory for each shape: lanes ask for them at every slow impact
+    # one piece of memory for each shape: lanes ask for them at every slow impact
+    rows = np.zeros((3 * dof + margins + 4, count))
     pairs = np.zeros((3 * dof + margins + 1, 2))
     return StepArrays(
         rows[:dof],
@@ -34,7 +37,13 @@ def step_arrays(numbers):
         np.zeros((numbers.workspace_rows, order + 6)),
         rows[3 * dof + 1],
         rows[3 * dof + 2 : 3 * dof + 4],
-        (pairs[:dof], pairs[dof : 2 * dof], pairs[2 * dof : 3 * dof], pairs[3 * dof], pairs[3 * dof + 1 :]),
+        (
+            pairs[:dof],
+            pairs[dof : 2 * dof],
+            pairs[2 * dof : 3 * dof],
+            pairs[3 * dof],
+            pairs[3 * dof + 1 :],
+        ),
     )
 
 
@@ -53,13 +62,19 @@ def columns_at_event(motion, kind, detail, t, side):
 
 @lean_jit
 def expand(motion, t, side, order):
-    """Expand the state in its Taylor series at time `t`; returns the size of the model's own part of the state.
+    """Expand the state in its Taylor series at time `t`; returns the size of the model's own part
+    of the state.
 
-    The velocities of coordinates of first order follow from the state, and are put into it; as their accelerations are
-    derivatives of these, they need order 1 at least.
+    The velocities of coordinates of first order follow from the state, and are put into it; as
+    their accelerations are derivatives of these, they need order 1 at least.
     """
-    q, v, a, size = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, 0.0
-    g, m, w = motion.gap_series, motion.margin_series, motion.recurrences
+    q = motion.coordinate_series
+    v = motion.velocity_series
+    a = motion.acceleration_series
+    size = 0.0
+    g = motion.gap_series
+    m = motion.margin_series
+    w = motion.recurrences
     if motion.first_order > 0:
         order = max(order, 1)
     for i in range(motion.dof):
@@ -77,7 +92,9 @@ def expand(motion, t, side, order):
 
 @lean_jit
 def growth(coefficients, first, last, size):
-    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius of convergence by these terms."""
+    """The largest log(abs(c_k) / size) / k for first <= k <= last: minus the log of the radius of
+    convergence by these terms.
+    """
     largest = -np.inf
     for k in range(first, last + 1):
         term = 0.0
@@ -105,11 +122,13 @@ def grow_faster(coefficients, first, last, size, rate):
 def step_size(coefficients, order, size, tol):
     """The step h at which the last two terms of the series are tol, relative to `size`.
 
-    By symmetry both terms may be far too small: for x'' = -x^3 from x = 0 only every fourth coefficient is not 0. The growth of
-    the series is then taken from the upper half of the coefficients.
+    By symmetry both terms may be far too small: for x'' = -x^3 from x = 0 only every fourth
+    coefficient is not 0. The growth of the series is then taken from the upper half of the
+    coefficients.
     """
     size = max(size, SMALLEST)
-    at_end, before_end = growth(coefficients, order, order, size), growth(coefficients, order - 1, order - 1, size)
+    at_end = growth(coefficients, order, order, size)
+    before_end = growth(coefficients, order - 1, order - 1, size)
     step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
     if grow_faster(coefficients, order // 2, order - 2, size, max(at_end, before_end) + GAP):
         step = min(step, math.log(tol) / order - growth(coefficients, order // 2, order - 2, size))
@@ -118,17 +137,34 @@ def step_size(coefficients, order, size, tol):
 
 @lean_jit
 def leaps(motion, t, side, h, size):
-    """Whether a step passes a feature of the acceleration that its series cannot show, such as the bend of a saturated tanh,
-    whose coefficients are below rounding far away from it.
+    """Whether a step passes a feature of the acceleration that its series cannot show, such as the
+    bend of a saturated tanh, whose coefficients are below rounding far away from it.
 
-    It is noticed because the model's acceleration at the end of the step then differs from that of the series.
+    It is noticed because the model's acceleration at the end of the step then differs from that of
+    the series.
     """
-    q, v, a, w = motion.coordinate_series, motion.velocity_series, motion.acceleration_series, motion.recurrences
+    q = motion.coordinate_series
+    v = motion.velocity_series
+    a = motion.acceleration_series
+    w = motion.recurrences
     q_end, v_end, a_end, g_end, m_end = motion.step_end
     order = motion.order
     for i in range(motion.dof):
         q_end[i, 0], v_end[i, 0] = horner(q[i], order, h), horner(v[i], order, h)
-    motion.series(t + h, motion.origin, side, motion.env, motion.piece, q_end, v_end, a_end, g_end, m_end, w, 0)
+    motion.series(
+        t + h,
+        motion.origin,
+        side,
+        motion.env,
+        motion.piece,
+        q_end,
+        v_end,
+        a_end,
+        g_end,
+        m_end,
+        w,
+        0,
+    )
     defect = 0.0
     for i in range(motion.own - motion.first_order):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
@@ -139,22 +175,40 @@ def leaps(motion, t, side, h, size):
 
 @lean_jit
 def move(motion, tau):
-    """Take the state at `tau` from the series of a step; returns whether the model's own part of it is finite."""
-    q, v, order, finite = motion.coordinate_series, motion.velocity_series, motion.order, True
+    """Take the state at `tau` from the series of a step; returns whether the model's own part of it
+    is finite.
+    """
+    q = motion.coordinate_series
+    v = motion.velocity_series
+    order = motion.order
+    finite = True
     for i in range(motion.dof):
         motion.coordinates[i], motion.velocities[i] = both_sums(q[i], v[i], order, tau)
         if i < motion.own:
-            finite = finite and math.isfinite(motion.coordinates[i]) and math.isfinite(motion.velocities[i])
+            finite = (
+                finite
+                and math.isfinite(motion.coordinates[i])
+                and math.isfinite(motion.velocities[i])
+            )
     return finite
 
 
 @lean_jit
 def record_event(motion, kind, detail, t, before, after):
-    """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity after, shifts)."""
-    labels, values = motion.event_labels, motion.event_values
-    i, side = motion.recorded_events, 0 if kind == EventCode.REST else motion.side
-    labels[i, 0], labels[i, 1], labels[i, 2], labels[i, 3] = motion.period, kind, side, detail
-    values[i, 0], values[i, 1], values[i, 2] = t, before, after
+    """Append an event: (period, kind, side, detail) and (local time, velocity before, velocity
+    after, shifts).
+    """
+    labels = motion.event_labels
+    values = motion.event_values
+    i = motion.recorded_events
+    side = 0 if kind == EventCode.REST else motion.side
+    labels[i, 0] = motion.period
+    labels[i, 1] = kind
+    labels[i, 2] = side
+    labels[i, 3] = detail
+    values[i, 0] = t
+    values[i, 1] = before
+    values[i, 2] = after
     for j in range(motion.columns):
         values[i, 3 + j] = math.nan  # until `record_shift` sets it
     motion.recorded_events = i + 1
@@ -162,7 +216,9 @@ def record_event(motion, kind, detail, t, before, after):
 
 @lean_jit
 def record_shift(motion):
-    """Record with the last event its shift along each column, which `tangent` has put into the state."""
+    """Record with the last event its shift along each column, which `tangent` has put into the
+    state.
+    """
     for j in range(motion.columns):
         motion.event_values[motion.recorded_events - 1, 3 + j] = motion.shifts[j]
 
@@ -178,9 +234,16 @@ def forget(motion):
 
 @lean_jit
 def column_step(motion):
-    """The longest step that the series of the tangent's columns allow, each relative to its own size."""
-    q, v, a = motion.coordinate_series, motion.velocity_series, motion.acceleration_series
-    step, own, order, tol = np.inf, motion.own, motion.order, ROUGHER * motion.tolerance
+    """The longest step that the series of the tangent's columns allow, each relative to its own
+    size.
+    """
+    q = motion.coordinate_series
+    v = motion.velocity_series
+    a = motion.acceleration_series
+    step = np.inf
+    own = motion.own
+    order = motion.order
+    tol = ROUGHER * motion.tolerance
     for first in range(own, motion.dof, own):
         size = 0.0
         for i in range(first, first + own):
@@ -192,14 +255,19 @@ def column_step(motion):
 
 @lean_jit
 def record_step(motion, side, t, h):
-    """Append a step of the dense output: its start, its length, and the series of as many coordinates as the buffer has rows for:
-    the model's own, or those of the tangent's columns too."""
+    """Append a step of the dense output: its start, its length, and the series of as many
+    coordinates as the buffer has rows for: the model's own, or those of the tangent's columns
+    too."""
     if motion.dense == 0:
         return
-    labels, spans, coefficients = motion.step_labels, motion.step_spans, motion.step_series
+    labels = motion.step_labels
+    spans = motion.step_spans
+    coefficients = motion.step_series
     i = motion.recorded_steps
-    labels[i, 0], labels[i, 1] = motion.period, side
-    spans[i, 0], spans[i, 1] = t, h
+    labels[i, 0] = motion.period
+    labels[i, 1] = side
+    spans[i, 0] = t
+    spans[i, 1] = h
     for d in range(coefficients.shape[1]):
         for k in range(motion.order + 2):
             coefficients[i, d, k] = motion.coordinate_series[d, k]
@@ -208,8 +276,11 @@ def record_step(motion, side, t, h):
 
 @lean_jit
 def next_target(motion, t_end):
-    """The time up to which the next step may go: the end of the forcing period, or a breakpoint of the records before."""
-    breaks, before = motion.breaks, motion.piece
+    """The time up to which the next step may go: the end of the forcing period, or a breakpoint of
+    the records before.
+    """
+    breaks = motion.breaks
+    before = motion.piece
     while motion.piece < breaks.size and breaks[motion.piece] - motion.origin <= motion.time:
         motion.piece += 1
     motion.new_piece = 1 if motion.piece != before else 0
@@ -231,18 +302,27 @@ def motion_end(motion):
 
 @jit
 def mode_arrays(numbers, table):
-    """The series of eigenmodes, with two rows for what drives one of them, and those of their inputs."""
-    rows, inputs = 0, 0
+    """The series of eigenmodes, with two rows for what drives one of them, and those of their
+    inputs.
+    """
+    rows = 0
+    inputs = 0
     if table.size > 0:
-        rows, inputs = 2 * numbers.own + 2, int(table[0] * table[1])
+        rows = 2 * numbers.own + 2
+        inputs = int(table[0] * table[1])
     return ModeArrays(np.zeros((rows, numbers.order + 2)), np.zeros(inputs))
 
 
 @lean_jit
 def drive_mode(motion, factors, row, order):
-    """Put the series of what drives a row of the eigenmodes into a row; `factors` is the place of the first input's."""
-    table, driven, inputs = motion.eigenmodes, motion.mode_series[row], motion.input_series
-    channels, spacing = int(table[0]), int(table[1])
+    """Put the series of what drives a row of the eigenmodes into a row; `factors` is the place of
+    the first input's.
+    """
+    table = motion.eigenmodes
+    driven = motion.mode_series[row]
+    inputs = motion.input_series
+    channels = int(table[0])
+    spacing = int(table[1])
     for k in range(order + 2):
         driven[k] = 0.0
     for c in range(channels):
@@ -256,12 +336,16 @@ def drive_mode(motion, factors, row, order):
 
 @lean_jit
 def one_mode(motion, place, j, order, allowed):
-    """The series of a real eigenmode from its value, which begins it: the polynomial of `systems/eigenmodes.py` if it is on that
-    to within what is allowed. Its eigenvalue is at a place of the table."""
-    y, f, value = motion.mode_series[j], motion.mode_series[2 * motion.own], motion.eigenmodes[place]
+    """The series of a real eigenmode from its value, which begins it: the polynomial of
+    `systems/eigenmodes.py` if it is on that to within what is allowed. Its eigenvalue is at a place
+    of the table."""
+    y = motion.mode_series[j]
+    f = motion.mode_series[2 * motion.own]
+    value = motion.eigenmodes[place]
     start = y[0]
     if value < 0.0:
-        following, inverse = 0.0, 1.0 / value
+        following = 0.0
+        inverse = 1.0 / value
         for k in range(order + 1, -1, -1):
             following = inverse * ((k + 1) * following - f[k])
             y[k] = following
@@ -275,19 +359,34 @@ def one_mode(motion, place, j, order, allowed):
 @lean_jit
 def two_modes(motion, place, j, order, allowed):
     """The same of a complex eigenmode, whose imaginary part is in the next row."""
-    series, table, driven = motion.mode_series, motion.eigenmodes, 2 * motion.own
-    y, z, f, g, real, imaginary = series[j], series[j + 1], series[driven], series[driven + 1], table[place], table[place + 1]
-    start, other = y[0], z[0]
+    series = motion.mode_series
+    table = motion.eigenmodes
+    driven = 2 * motion.own
+    y = series[j]
+    z = series[j + 1]
+    f = series[driven]
+    g = series[driven + 1]
+    real = table[place]
+    imaginary = table[place + 1]
+    start = y[0]
+    other = z[0]
     if real < 0.0:
-        square, one, two = real * real + imaginary * imaginary, 0.0, 0.0
-        a, b = real / square, imaginary / square
+        square = real * real + imaginary * imaginary
+        one = 0.0
+        two = 0.0
+        a = real / square
+        b = imaginary / square
         for k in range(order + 1, -1, -1):
-            p, r = (k + 1) * one - f[k], (k + 1) * two - g[k]
-            one, two = a * p + b * r, a * r - b * p
-            y[k], z[k] = one, two
+            p = (k + 1) * one - f[k]
+            r = (k + 1) * two - g[k]
+            one = a * p + b * r
+            two = a * r - b * p
+            y[k] = one
+            z[k] = two
         if math.hypot(start - y[0], other - z[0]) <= allowed:
             return
-    y[0], z[0] = start, other
+    y[0] = start
+    z[0] = other
     for k in range(order + 1):
         inverse = table[2 + k]
         y[k + 1] = (real * y[k] - imaginary * z[k] + f[k]) * inverse
@@ -297,9 +396,12 @@ def two_modes(motion, place, j, order, allowed):
 @lean_jit
 def in_mode(motion, rows, states):
     """A row of the eigenvectors' inverse times the state, and the sum of the absolute values."""
-    total, absolute, table = 0.0, 0.0, motion.eigenmodes
+    total = 0.0
+    absolute = 0.0
+    table = motion.eigenmodes
     for i in range(states // 2):
-        one, two = table[rows + i] * motion.coordinates[i], table[rows + states // 2 + i] * motion.velocities[i]
+        one = table[rows + i] * motion.coordinates[i]
+        two = table[rows + states // 2 + i] * motion.velocities[i]
         total += one + two
         absolute += abs(one) + abs(two)
     return total, absolute
@@ -312,7 +414,8 @@ def add_modes(motion, factors, states, order, series):
     for k in range(order + 2):
         series[k] = 0.0
     for j in range(states):
-        factor, mode = table[factors + j], motion.mode_series[j]
+        factor = table[factors + j]
+        mode = motion.mode_series[j]
         if factor != 0.0:
             for k in range(order + 2):
                 series[k] += factor * mode[k]
@@ -320,9 +423,16 @@ def add_modes(motion, factors, states, order, series):
 
 @lean_jit
 def in_modes(motion, t, order):
-    """Fill the series of the coordinates, their rates and the reactions of closed contacts; returns the size of the state."""
-    table, own, count, size = motion.eigenmodes, motion.own, motion.contacts.shape[0], 0.0
-    states, given, bits = 2 * own, int(table[0]) + 1 + motion.local, 0
+    """Fill the series of the coordinates, their rates and the reactions of closed contacts; returns
+    the size of the state.
+    """
+    table = motion.eigenmodes
+    own = motion.own
+    count = motion.contacts.shape[0]
+    size = 0.0
+    states = 2 * own
+    given = int(table[0]) + 1 + motion.local
+    bits = 0
     for i in range(count):
         bits |= motion.contacts[i, ContactColumn.CLOSED] << i
     for k in range(motion.frictions.shape[0]):  # the rows of surfaces
@@ -337,14 +447,26 @@ def in_modes(motion, t, order):
     by_inputs = reactions + count * states
     for i in range(own):
         size = max(size, abs(motion.coordinates[i]), abs(motion.velocities[i]))
-    motion.load_series(t, motion.origin, 1.0, motion.env, motion.piece, motion.input_series, motion.recurrences, order + 1)
-    allowed, j = motion.tolerance * max(size, SMALLEST), 0
+    motion.load_series(
+        t,
+        motion.origin,
+        1.0,
+        motion.env,
+        motion.piece,
+        motion.input_series,
+        motion.recurrences,
+        order + 1,
+    )
+    allowed = motion.tolerance * max(size, SMALLEST)
+    j = 0
     while j < states:
         width = 1 if table[values + 2 * j + 1] == 0.0 else 2
         enough = allowed / (table[reach + j] + SMALLEST)
         for i in range(width):
             drive_mode(motion, inputs + (j + i) * given, states + i, order)
-            motion.mode_series[j + i, 0], terms = in_mode(motion, inverse + (j + i) * states, states)
+            motion.mode_series[j + i, 0], terms = in_mode(
+                motion, inverse + (j + i) * states, states
+            )
             enough = max(enough, NOISE * terms)
         if width == 1:
             one_mode(motion, values + 2 * j, j, order, enough)
@@ -352,13 +474,16 @@ def in_modes(motion, t, order):
             two_modes(motion, values + 2 * j, j, order, enough)
         j += width
     for i in range(own):
-        q, v, a = motion.coordinate_series[i], motion.velocity_series[i], motion.acceleration_series[i]
+        q = motion.coordinate_series[i]
+        v = motion.velocity_series[i]
+        a = motion.acceleration_series[i]
         add_modes(motion, vectors + i * states, states, order, q)
         for k in range(order + 1):
             v[k] = (k + 1) * q[k + 1]
         for k in range(order):
             a[k] = (k + 1) * v[k + 1]
-        q[0], v[0] = motion.coordinates[i], motion.velocities[i]
+        q[0] = motion.coordinates[i]
+        v[0] = motion.velocities[i]
     for i in range(count):
         if bits >> i & 1:
             add_modes(motion, reactions + i * states, states, order, motion.margin_series[i])

@@ -16,7 +16,13 @@ from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.kernel import layout as kernel_layout
 from saltus.flow.kernel import memory as kernel_memory
 from saltus.flow.kernel import roots, steps
-from saltus.flow.kernel.compiled import constants, contacts_module, kernel_module, motion_roots, one_free
+from saltus.flow.kernel.compiled import (
+    constants,
+    contacts_module,
+    kernel_module,
+    motion_roots,
+    one_free,
+)
 from saltus.flow.kernel.event_derivatives import saltation
 from saltus.flow.kernel.layout import SERIES_LENGTH
 from saltus.flow.lanes import (
@@ -75,12 +81,16 @@ from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit, pointed_jit
 # types and vectors of {_WRITTEN_BY}, for {WIDTH} lanes
 """
-_OF_CONTACTS = "shared, RUN_LANES, LANE_ROOT, SCALAR_MOTION, CONTACTS_IMPACT = function_types.CONTACTS\n"
+_OF_CONTACTS = (
+    "shared, RUN_LANES, LANE_ROOT, SCALAR_MOTION, CONTACTS_IMPACT = function_types.CONTACTS\n"
+)
 
 
 @cache
 def load_driver(several: bool = False) -> Callable[..., None]:
-    """The driver of all lanes, `run_lanes` of `driver.py`, for models with one or several contacts; it releases Python's lock."""
+    """The driver of all lanes, `run_lanes` of `driver.py`, for models with one or several contacts;
+    it releases Python's lock.
+    """
     return entry_point(load_module("lanes", _driver_text(several)).run_lanes)
 
 
@@ -98,14 +108,16 @@ def _text(several: bool, *modules: ModuleType) -> str:
 
 @cache
 def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
-    """A process that compiles the driver while this one compiles the rest; None if the driver is already on disk.
+    """A process that compiles the driver while this one compiles the rest; None if the driver is
+    already on disk.
 
     Further calls return the same process, which may have ended since.
     """
     if is_compiled(module_name("lanes", _driver_text(several))):
         return None
     try:
-        found = f"import sys; sys.path[:] = {sys.path!r}; "  # the other process finds packages where this one does
+        # the other process finds packages where this one does
+        found = f"import sys; sys.path[:] = {sys.path!r}; "
         call = f"{found}from {__name__} import load_driver; load_driver({several})"
         return subprocess.Popen([sys.executable, "-c", call])
     except OSError:
@@ -119,7 +131,14 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
     parts = [kernel_layout, memory, load_tables, roots]
     if several:
         names.append("contacts_impact")
-        parts += [steps, contact_layout, complementarity, contact_impacts, lane_impacts, lane_handoff]
+        parts += [
+            steps,
+            contact_layout,
+            complementarity,
+            contact_impacts,
+            lane_impacts,
+            lane_handoff,
+        ]
         parts += [handoff, scalar_impact]
     else:
         parts += [one_contact_handoff, handoff]
@@ -146,14 +165,18 @@ def load_advance(several: bool = False) -> Any:
 
 
 def compile_everything(several: bool = False) -> None:
-    """Compile the driver, its helpers and the scalar kernel, or load them from disk if they are there."""
+    """Compile the driver, its helpers and the scalar kernel, or load them from disk if they are
+    there.
+    """
     load_driver(several)
     load_helpers(several)
     load_advance(several)
 
 
 def compile_beside(driver: subprocess.Popen[bytes], several: bool) -> None:
-    """Compile the helpers and the scalar kernel while another process compiles the driver, and wait for that process."""
+    """Compile the helpers and the scalar kernel while another process compiles the driver, and wait
+    for that process.
+    """
     load_helpers(several)
     load_advance(several)
     driver.wait()
@@ -179,13 +202,22 @@ def memory_plan(trace: Trace) -> MemoryPlan:
 
 
 def lane_functions(trace: Trace) -> list[WrittenFunction]:
-    """`lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also of `lane_one_free`."""
-    plan, known = memory_plan(trace), constants(trace)
-    functions = [_series(trace, plan, known), _impact(trace, plan, known), _field(trace, plan, known)]
+    """`lane_series`, `lane_impact` and `lane_field`; for a model with several contacts also of
+    `lane_one_free`.
+    """
+    plan = memory_plan(trace)
+    known = constants(trace)
+    functions = [
+        _series(trace, plan, known),
+        _impact(trace, plan, known),
+        _field(trace, plan, known),
+    ]
     return [*functions, _one_free(trace, plan, known)] if trace.several else functions
 
 
-def _function(name: str, plan: MemoryPlan, leaves: dict[str, Slot], content: Any, *more: str) -> WrittenFunction:
+def _function(
+    name: str, plan: MemoryPlan, leaves: dict[str, Slot], content: Any, *more: str
+) -> WrittenFunction:
     """A function of the lanes; its signature has its name in `function_types.py`."""
     parts = plan.places._fields if plan.data else ()
     places = Places(("m", "places", *more), leaves, parts)
@@ -193,40 +225,77 @@ def _function(name: str, plan: MemoryPlan, leaves: dict[str, Slot], content: Any
 
 
 def _leaves(plan: MemoryPlan, time: int, position: str, velocity: str) -> dict[str, Slot]:
-    """The places of a trace's leaves in the lanes' memory, for one of the times and one of the states that it holds."""
-    parts = {"coordinate": position, "velocity": velocity, "parameter": "parameters", "free": "free"}
+    """The places of a trace's leaves in the lanes' memory, for one of the times and one of the
+    states that it holds.
+    """
+    parts = {
+        "coordinate": position,
+        "velocity": velocity,
+        "parameter": "parameters",
+        "free": "free",
+    }
     parts |= {"constant": "constants", "record": "records"}
     numbers = {"time": time, "record_time": SLOTS.now, "origin": SLOTS.origin, "side": SLOTS.side}
-    behind = {"slide": plan.slot("parameters", plan.parameters), "datum": plan.slot("constants", plan.constants)}
-    return {op: plan.slot(part) for op, part in parts.items()} | {op: ("m", slot) for op, slot in numbers.items()} | behind
+    behind = {
+        "slide": plan.slot("parameters", plan.parameters),
+        "datum": plan.slot("constants", plan.constants),
+    }
+    return (
+        {op: plan.slot(part) for op, part in parts.items()}
+        | {op: ("m", slot) for op, slot in numbers.items()}
+        | behind
+    )
 
 
 def _series(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_series(m, places, order)`: the series of positions and velocities from the state, of the accelerations and of the
-    margins.
+    """`lane_series(m, places, order)`: the series of positions and velocities from the state, of
+    the accelerations and of the margins.
 
-    Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even, and at least LOWEST_ORDER.
+    Positions and velocities have coefficients 0..order, the others 0..order - 1; the order is even,
+    and at least LOWEST_ORDER.
     """
 
     def row(part: str, number: int) -> Slot:
         return plan.slot(part, number * SERIES_LENGTH)
 
-    own, inputs, stops = trace.local_rows, trace.inputs_of_loops, [row("margins", i) for i in range(plan.stops)]
-    targets = [*(row("accelerations", i) if i < plan.own else None for i in own), *stops, *[None] * len(inputs)]
-    loops = trace.loop_rows([plan.slot(part) for part in ("positions", "velocities", "accelerations")], False)
+    own = trace.local_rows
+    inputs = trace.inputs_of_loops
+    stops = [row("margins", i) for i in range(plan.stops)]
+    targets = [
+        *(row("accelerations", i) if i < plan.own else None for i in own),
+        *stops,
+        *[None] * len(inputs),
+    ]
+    loops = trace.loop_rows(
+        [plan.slot(part) for part in ("positions", "velocities", "accelerations")], False
+    )
     margins = motion_roots(trace)[trace.gap is not None :]
     moving, rates = ([row(part, i) for i in own] for part in ("positions", "velocities"))
-    first_order, length = [i for i in trace.first_order_rows if i in own], SERIES_LENGTH
-    layout = Rows(moving, rates, targets, length, any_order=False, first_order=first_order, coordinates=own, loops=loops)
+    first_order = [i for i in trace.first_order_rows if i in own]
+    length = SERIES_LENGTH
+    layout = Rows(
+        moving,
+        rates,
+        targets,
+        length,
+        any_order=False,
+        first_order=first_order,
+        coordinates=own,
+        loops=loops,
+    )
     leaves = _leaves(plan, SLOTS.now, "position", "velocity")
     expanded = [*(trace.acceleration[i] for i in own), *margins, *inputs]
-    return _function("lane_series", plan, leaves, SeriesOf(layout, tape(expanded, known, series=True)), "order")
+    return _function(
+        "lane_series", plan, leaves, SeriesOf(layout, tape(expanded, known, series=True)), "order"
+    )
 
 
 def _one_free(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_one_free(m, places, order)`: the same series if one coordinate is free, which is in row 0.
+    """`lane_one_free(m, places, order)`: the same series if one coordinate is free, which is in row
+    0.
 
-    The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the rows of margins.
+    The series of `OneFree.curved` are in the rows of the other coordinates, and the guards in the
+    rows of margins.
     """
     leaves = _leaves(plan, SLOTS.now, "position", "velocity")
     leaves |= {"coordinate": ("m", SLOTS.free_position), "velocity": ("m", SLOTS.free_velocity)}
@@ -239,24 +308,35 @@ def _one_free(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> Written
     targets = [plan.slot("accelerations"), *curved, *guards]
     state = [plan.slot("positions")], [plan.slot("velocities")]
     rows = Rows(*state, targets, SERIES_LENGTH, any_order=False, numbers=numbers)
-    return _function("lane_one_free", plan, leaves, SeriesOf(rows, tape(equations.roots, known, series=True)), "order")
+    return _function(
+        "lane_one_free",
+        plan,
+        leaves,
+        SeriesOf(rows, tape(equations.roots, known, series=True)),
+        "order",
+    )
 
 
 def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_impact(m, places)`: the side, positions and velocities after an impact at the new state, the tangent's columns
-    included.
+    """`lane_impact(m, places)`: the side, positions and velocities after an impact at the new
+    state, the tangent's columns included.
 
     For a model with several contacts it fills only the mass matrix and E at the new state.
     """
     if trace.several:
         entries = {"mass": trace.mass, "restitution": trace.restitution}
-        filled = {plan.slot(part, i): root for part, roots in entries.items() for i, root in enumerate(roots)}
+        filled = {
+            plan.slot(part, i): root
+            for part, roots in entries.items()
+            for i, root in enumerate(roots)
+        }
         if trace.modes is not None:  # the lanes' memory is made of zeros
             filled = {place: root for place, root in filled.items() if root is not number(0.0)}
         return _at_new_state("lane_impact", plan, filled, known)
     if trace.contact is None or trace.next_side is None or trace.velocity_after is None:
         return _at_new_state("lane_impact", plan, {}, known)
-    positions, velocities = [trace.contact], [trace.velocity_after]
+    positions = [trace.contact]
+    velocities = [trace.velocity_after]
     if trace.columns:
         jump = saltation(trace)
         positions, velocities = positions + jump.coordinate, velocities + jump.velocity
@@ -267,7 +347,8 @@ def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
 
 
 def _field(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFunction:
-    """`lane_field(m, places)`: the model's own accelerations at the new state, in the place of the velocities after an impact.
+    """`lane_field(m, places)`: the model's own accelerations at the new state, in the place of the
+    velocities after an impact.
 
     They are needed for derivatives and where steps are checked; otherwise nothing is written.
     """
@@ -276,6 +357,8 @@ def _field(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFun
     return _at_new_state("lane_field", plan, fields, known)
 
 
-def _at_new_state(name: str, plan: MemoryPlan, results: dict[Slot, Expr], known: dict[Expr, int]) -> WrittenFunction:
+def _at_new_state(
+    name: str, plan: MemoryPlan, results: dict[Slot, Expr], known: dict[Expr, int]
+) -> WrittenFunction:
     leaves = _leaves(plan, SLOTS.new_time, "new_position", "new_velocity")
     return _function(name, plan, leaves, [Case(tape(list(results.values()), known), list(results))])

@@ -1,20 +1,22 @@
-"""A group of lanes that moves many trajectories at once. Each lane has its own time, step, side and parameters, and takes the
-next trajectory when its own has ended.
+"""A group of lanes that moves many trajectories at once. Each lane has its own time, step, side and
+parameters, and takes the next trajectory when its own has ended.
 
 The compiled parts of `kernel/layout.py`, `memory.py`, `lane_steps.py`, `sampling.py`,
-`one_contact/lane_step.py`, `forcing_periods.py` and this file are one module, compiled once for all models, for the width of
-this machine's registers. The functions of a structure, `code`, come through pointers. For models with several contacts there is
-a second module with `contacts/lane_step.py` in the place of `one_contact/lane_step.py`.
+`one_contact/lane_step.py`, `forcing_periods.py` and this file are one module, compiled once for all
+models, for the width of this machine's registers. The functions of a structure, `code`, come
+through pointers. For models with several contacts there is a second module with
+`contacts/lane_step.py` in the place of `one_contact/lane_step.py`.
 
-A step of all lanes computes the Taylor series; the length of the step in each lane; the end of the step and bounds of the gap, by
-one sweep of Horner's rule; the root in the lanes whose gap certainly has one; and the impacts. If anything else may happen in the
-step of a lane -- rest, slow impacts that may accumulate, a gap that cannot be decided, a limit, a number out of range -- the
-scalar kernel moves this lane from the start of the step on (`handoff.py`). Lanes do not affect one another, so that
-results depend neither on the width nor on the order.
+A step of all lanes computes the Taylor series; the length of the step in each lane; the end of the
+step and bounds of the gap, by one sweep of Horner's rule; the root in the lanes whose gap certainly
+has one; and the impacts. If anything else may happen in the step of a lane -- rest, slow impacts
+that may accumulate, a gap that cannot be decided, a limit, a number out of range -- the scalar
+kernel moves this lane from the start of the step on (`handoff.py`). Lanes do not affect one
+another, so that results depend neither on the width nor on the order.
 
-A step may go past the end of a forcing period. The state there is then evaluated from the step's series (`sampling.pass_ends`),
-and the next period begins: for all lanes at once (`begin_together`), or lane by lane where the end of the period has further
-consequences (`forcing_periods.arrive`).
+A step may go past the end of a forcing period. The state there is then evaluated from the step's
+series (`sampling.pass_ends`), and the next period begins: for all lanes at once (`begin_together`),
+or lane by lane where the end of the period has further consequences (`forcing_periods.arrive`).
 
 `lanes` is the group with all of its memory, and `lane` one of its lanes (`memory.py`).
 """
@@ -31,7 +33,7 @@ from saltus.taylor.lane_vectors import ALL, bits, first_lane, lane_count, mask, 
 from saltus.taylor.load_tables import anchor, expand_record
 from saltus.taylor.vectors import WIDTH
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -42,7 +44,8 @@ def expand_records(lanes):
         if (lanes.busy >> i) & 1:
             lane = one(lanes, i)
             breaks, table = records_of(lane, lane.trajectory)
-            piece, t = lane.piece, lane.now + lane.origin
+            piece = lane.piece
+            t = lane.now + lane.origin
             for r in range(lane.sizes.records):
                 expand_record(table[r, piece], anchor(breaks, piece), t, row)
                 for k in range(table.shape[2]):
@@ -51,10 +54,12 @@ def expand_records(lanes):
 
 @inline_jit
 def begin_together(lanes, free):
-    """Begin the next forcing period in lanes whose step went past the end of one, if the next one is as long (compare
-    `forcing_periods.arrive`)."""
+    """Begin the next forcing period in lanes whose step went past the end of one, if the next one
+    is as long (compare `forcing_periods.arrive`)."""
     going = mask(free)
-    begin, end, period = lanes.period_start, lanes.period_end, lanes.period + 1.0
+    begin = lanes.period_start
+    end = lanes.period_end
+    period = lanes.period + 1.0
     lanes.now = select(going, begin + (lanes.now - end), lanes.now)
     lanes.last_check = select(going, lanes.last_check + (begin - end), lanes.last_check)
     lanes.periods_done = select(going, lanes.periods_done + 1.0, lanes.periods_done)
@@ -64,7 +69,9 @@ def begin_together(lanes, free):
 
 @lean_jit
 def fill_all(lanes, following):
-    """Put trajectories into all lanes that are free, from number `following` on; returns the number of the next one."""
+    """Put trajectories into all lanes that are free, from number `following` on; returns the number
+    of the next one.
+    """
     while lanes.busy != ALL and following < lanes.work.jobs.size:
         lane = one(lanes, first_lane(~lanes.busy))
         fill(lane, following)
@@ -76,9 +83,12 @@ def fill_all(lanes, following):
 
 @inline_jit
 def go_on(lane, away, captured, checked, past):
-    """Go on in one lane after a step of all lanes; the arguments say whether the scalar kernel moves it, whether it is captured,
-    whether its number of impacts is checked, and whether the step went past the end of its forcing period."""
-    status, detail, control = Status.PAUSED, 0, lane.work.control
+    """Go on in one lane after a step of all lanes; the arguments say whether the scalar kernel
+    moves it, whether it is captured, whether its number of impacts is checked, and whether the step
+    went past the end of its forcing period."""
+    status = Status.PAUSED
+    detail = 0
+    control = lane.work.control
     # This check comes first, as lanes with slow impacts need the scalar kernel in every step.
     if checked and unresolved(lane):
         status = Status.UNRESOLVED
@@ -98,12 +108,16 @@ def go_on(lane, away, captured, checked, past):
 @lean_jit
 def run_all(lanes):
     """Run all jobs of a group."""
-    following, control = 0, lanes.work.control
+    following = 0
+    control = lanes.work.control
     while True:
         following = fill_all(lanes, following)
         if lanes.busy == 0 or control[0] != 0:
             return
-        away, captured, checked, past = 0, 0, 0, 0
+        away = 0
+        captured = 0
+        checked = 0
+        past = 0
         arrived = bits(lanes.now >= lanes.period_end) & lanes.busy
         if arrived == 0:
             if lanes.sizes.records > 0:

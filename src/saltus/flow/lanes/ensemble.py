@@ -1,4 +1,6 @@
-"""Ensembles: many exact trajectories of one system, from many states and with many parameters, in lanes on all cores."""
+"""Ensembles: many exact trajectories of one system, from many states and with many parameters, in
+lanes on all cores.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,25 @@ from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.capture_speeds import capture_speeds
-from saltus.flow.lanes.compiled_lanes import compile_beside, compile_driver_aside, compile_everything, load_lane_functions
+from saltus.flow.lanes.compiled_lanes import (
+    compile_beside,
+    compile_driver_aside,
+    compile_everything,
+    load_lane_functions,
+)
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.memory import JOB
-from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_last, read_names, read_side, read_threads
+from saltus.flow.lanes.options import (
+    EnsembleOptions,
+    Sample,
+    Until,
+    read_last,
+    read_names,
+    read_side,
+    read_threads,
+)
 from saltus.flow.lanes.threads import Jobs, Lanes
 from saltus.flow.motion.simulate import Clock, clock
 from saltus.progress import Progress, silent
@@ -29,7 +44,9 @@ from saltus.taylor import record_tables
 if TYPE_CHECKING:
     import xarray
 
-SLIVER = 1e-9  # A duration that ends nearer than this share of a forcing period to the period's end is meant to end there.
+# A duration that ends nearer than this share of a forcing period to the period's end is meant to
+# end there.
+SLIVER = 1e-9
 
 
 def simulate_many(
@@ -51,11 +68,13 @@ def simulate_many(
     progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
-    """Exact trajectories from many states and with many parameters: each as `simulate` would follow it, but many times faster.
+    """Exact trajectories from many states and with many parameters: each as `simulate` would follow
+    it, but many times faster.
 
-    Initial coordinates, velocities, times and parameters are numbers or arrays, which broadcast together as in NumPy.
-    `xarray.DataArray`s broadcast by the names of their dimensions, which the result then has. To the last bit, the result of a
-    trajectory depends neither on the number of threads nor on the other trajectories. The memory needed is that of the result.
+    Initial coordinates, velocities, times and parameters are numbers or arrays, which broadcast
+    together as in NumPy. `xarray.DataArray`s broadcast by the names of their dimensions, which the
+    result then has. To the last bit, the result of a trajectory depends neither on the number of
+    threads nor on the other trajectories. The memory needed is that of the result.
 
     Parameters
     ----------
@@ -64,16 +83,18 @@ def simulate_many(
     parameters
         Arrays by dotted path, such as {"load.horizontal.amplitude": np.linspace(0, 1, 101)}.
     sample
-        The quantities that are kept for each of the `last` forcing periods, see `Sample`. Periods are counted from the start; the
-        period in which the trajectory ends is kept, however short it is. "extrema" and "speed" are also returned for the whole
-        motion.
+        The quantities that are kept for each of the `last` forcing periods, see `Sample`. Periods
+        are counted from the start; the period in which the trajectory ends is kept, however short
+        it is. "extrema" and "speed" are also returned for the whole motion.
     last
-        For how many forcing periods samples are kept, counted back from the end; "all" keeps every one.
+        For how many forcing periods samples are kept, counted back from the end; "all" keeps every
+        one.
     until
         Ends a trajectory early, see `Until`.
     sensitivities
-        Dotted paths of parameters. Adds the derivatives of the end state to the initial state and to these parameters, at
-        a fixed time; but the end after n periods moves with "load.frequency", and an end at a margin with the margin.
+        Dotted paths of parameters. Adds the derivatives of the end state to the initial state and
+        to these parameters, at a fixed time; but the end after n periods moves with
+        "load.frequency", and an end at a margin with the margin.
     threads
         How many cores to use; by default all.
     velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
@@ -83,8 +104,9 @@ def simulate_many(
     Returns
     -------
     xarray.Dataset
-        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`, `grazings`, `periods` done
-        (2.5 for two and a half), and what `sample` asks for, all over the dimensions of the arguments; see `ensemble_dataset.py`.
+        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`,
+        `grazings`, `periods` done (2.5 for two and a half), and what `sample` asks for, all over
+        the dimensions of the arguments; see `ensemble_dataset.py`.
 
     Raises
     ------
@@ -108,14 +130,19 @@ def simulate_many(
         paths=None if sensitivities is None else read_names("sensitivities", sensitivities),
     )
     side, threads = read_side(side), read_threads(threads)
-    inputs, inner = read_inputs(system, velocity, time, parameters, coordinates), system.in_gap_coordinates
+    inputs = read_inputs(system, velocity, time, parameters, coordinates)
+    inner = system.in_gap_coordinates
     if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
         raise ParameterError(
             "extrema of many motions, and their derivatives to parameters, are those of coordinates that contacts hold one by "
             f"one: give system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
             "sample",
         )
-    return to_dataset(run_ensemble(system, inputs, options, threads, progress, duration=duration, side=side, last=last))
+    return to_dataset(
+        run_ensemble(
+            system, inputs, options, threads, progress, duration=duration, side=side, last=last
+        )
+    )
 
 
 def run_ensemble(
@@ -130,21 +157,33 @@ def run_ensemble(
     last: int | str = 1,
     captured: np.ndarray | None = None,
 ) -> EnsembleResult:
-    """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of capture that are known."""
-    own, given = system, inputs
+    """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of
+    capture that are known.
+    """
+    own = system
+    given = inputs
     system, inputs = system.in_gap_coordinates, inputs.in_gaps(system)
     driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
     if run.structure.several and any(path.startswith("model.") for path in inputs.parameters):
-        run = replace(run, model=run.model._replace(eigenmodes=np.zeros(0)))  # the table of eigenmodes has the model's numbers
+        # the table of eigenmodes has the model's numbers
+        run = replace(run, model=run.model._replace(eigenmodes=np.zeros(0)))
     jobs = _jobs(system, run, inputs, options.periods, duration, side)
     if Until.REST in options.until:
-        jobs.rows["capture_speed"] = capture_speeds(system, inputs.parameters, options.limits, known=captured)
+        jobs.rows["capture_speed"] = capture_speeds(
+            system, inputs.parameters, options.limits, known=captured
+        )
     spans = jobs.rows["last_period"] - jobs.rows["first_period"]
     begun = jobs.rows["end_time"] > jobs.rows["start_time"]
-    check_work("periods" if duration is None else "duration", inputs.size, float(np.max(spans, initial=0)))
+    check_work(
+        "periods" if duration is None else "duration", inputs.size, float(np.max(spans, initial=0))
+    )
     kept = read_last(last, int(np.max(spans + begun, initial=1)))
-    check_memory("last", 16.0 * len(options.sample) * kept * inputs.size, f"samples of {kept} periods of {inputs.size} motions")
+    check_memory(
+        "last",
+        16.0 * len(options.sample) * kept * inputs.size,
+        f"samples of {kept} periods of {inputs.size} motions",
+    )
     lanes = compiled_lanes(system, run, options, kept)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
@@ -153,8 +192,11 @@ def run_ensemble(
 
 
 def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:
-    """The compiled lanes of a system, with the settings for the samples that they keep of each trajectory."""
-    key = run.structure.functions, run.structure.sizes  # their addresses, which structures of different sizes may share
+    """The compiled lanes of a system, with the settings for the samples that they keep of each
+    trajectory.
+    """
+    # their addresses, which structures of different sizes may share
+    key = run.structure.functions, run.structure.sizes
     if key not in _functions:
         _functions[key] = load_lane_functions(run.trace)
     plan, functions = _functions[key]
@@ -163,10 +205,14 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
         program=run,
         plan=plan,
         functions=functions,
-        parameters=run.env[0] if run.trace.several else np.array([value for _, value in numbers(system)] or [0.0]),
+        parameters=run.env[0]
+        if run.trace.several
+        else np.array([value for _, value in numbers(system)] or [0.0]),
         tol=options.tol,
         kept=kept if options.sample else 1,
-        sampled=[column for kind in Sample if kind in options.sample for column in kind.columns(own)],
+        sampled=[
+            column for kind in Sample if kind in options.sample for column in kind.columns(own)
+        ],
         extrema=Sample.EXTREMA in options.sample,
         from_start=options.from_start,
         settle=Until.SETTLED in options.until,
@@ -176,36 +222,55 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
 _functions: dict[tuple[Any, ...], Any] = {}
 
 
-def _jobs(system: System, run: Program, inputs: Inputs, periods: float | None, duration: float | None, side: int) -> Jobs:
+def _jobs(
+    system: System,
+    run: Program,
+    inputs: Inputs,
+    periods: float | None,
+    duration: float | None,
+    side: int,
+) -> Jobs:
     """The trajectories in the arrays that the driver takes."""
     known = [path for path, _ in numbers(system)]
-    columns = {known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
+    columns = {
+        known.index(path): np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()
+    }
     states = _first_states(inputs, len(system.model.coordinates), run.structure.sizes.columns)
     rows = np.zeros(inputs.size, dtype=JOB)
-    time, frequency = inputs.values["time"], inputs.values.get("load.frequency", system.load.frequency)
+    time = inputs.values["time"]
+    frequency = inputs.values.get("load.frequency", system.load.frequency)
     length = None if frequency is None else 2.0 * math.pi / np.asarray(frequency, dtype=float)
     at = clock(time, length, periods, duration)
     last, end = _from_the_start(at)
-    rows["start_time"], rows["period_length"], rows["end_time"] = at.local, at.length, end
-    rows["first_period"], rows["last_period"], rows["leave_by"] = at.first, last, side
+    rows["start_time"] = at.local
+    rows["period_length"] = at.length
+    rows["end_time"] = end
+    rows["first_period"] = at.first
+    rows["last_period"] = last
+    rows["leave_by"] = side
     records = record_tables(system, run.trace.records, inputs.parameters)
     rows["piece"] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
     return Jobs(states, rows, columns, records)
 
 
 def _from_the_start(at: Clock) -> tuple[Any, Any]:
-    """The last forcing period and the local time at the end, where periods are counted from the start of the motion, at its
-    phase.
+    """The last forcing period and the local time at the end, where periods are counted from the
+    start of the motion, at its phase.
 
-    A motion that is longer than a whole number of periods by rounding only ends with the last of these.
+    A motion that is longer than a whole number of periods by rounding only ends with the last of
+    these.
     """
-    part = np.divide(at.end - at.local, at.length, out=np.zeros(np.shape(at.end)), where=np.greater(at.length, 0))
+    part = np.divide(
+        at.end - at.local, at.length, out=np.zeros(np.shape(at.end)), where=np.greater(at.length, 0)
+    )
     back = np.where(part == 0.0, 0, np.minimum(1 - np.ceil(part - SLIVER), at.last - at.first))
     return at.last - back, at.end + back * at.length
 
 
 def _first_states(inputs: Inputs, own: int, columns: int) -> np.ndarray:
-    """Coordinates with the tangent's columns, then velocities with theirs: (n, 2 (own + own columns))."""
+    """Coordinates with the tangent's columns, then velocities with theirs: (n, 2 (own + own
+    columns)).
+    """
     rows = own * (1 + columns)
     states = np.zeros((inputs.size, 2 * rows))
     for i, values in enumerate(list(inputs.values.values())[: 2 * own]):
@@ -219,29 +284,43 @@ class Advanced(NamedTuple):
     """Motions at the end of a span."""
 
     states: np.ndarray  # (n, 6), as `TangentEnsemble.advance` takes them
-    sound: np.ndarray  # (n,): whether the motion came to the end with a known phase, and all numbers are finite
+    # (n,): whether the motion came to the end with a known phase, and all numbers are finite
+    sound: np.ndarray
 
 
 class TangentEnsemble:
-    """Motions of a system with one coordinate, each with parameters and a forcing period of its own."""
+    """Motions of a system with one coordinate, each with parameters and a forcing period of its
+    own.
+    """
 
-    def __init__(self, system: System, parameters: Mapping[str, np.ndarray], lengths: np.ndarray, tol: float) -> None:
-        limits, places = limits_of(system, ()), list(system.parameters)
-        options = EnsembleOptions(tol=tol, periods=None, limits=limits, sample=(), until=(), paths=())
+    def __init__(
+        self, system: System, parameters: Mapping[str, np.ndarray], lengths: np.ndarray, tol: float
+    ) -> None:
+        limits = limits_of(system, ())
+        places = list(system.parameters)
+        options = EnsembleOptions(
+            tol=tol, periods=None, limits=limits, sample=(), until=(), paths=()
+        )
         run = program(system, limits, ())
         self._lanes = compiled_lanes(system, run, options, 1)
         self._columns = {places.index(path): values for path, values in parameters.items()}
         self._lengths, self.holds_coordinates = lengths, system.model.holds_coordinates
         self._records = record_tables(system, run.trace.records, {})
-        compile_everything(self.holds_coordinates)  # here, not in each thread that advances some of the motions
+        # here, not in each thread that advances some of the motions
+        compile_everything(self.holds_coordinates)
 
-    def advance(self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Advanced:
-        """Advance the motions of these numbers between two local times of a forcing period, (n,) each, on this thread.
+    def advance(
+        self, rows: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> Advanced:
+        """Advance the motions of these numbers between two local times of a forcing period, (n,)
+        each, on this thread.
 
         A state holds coordinate, its two derivatives, velocity, its two: (n, 6).
         """
         jobs = np.zeros(rows.size, dtype=JOB)
-        jobs["start_time"], jobs["end_time"], jobs["period_length"] = begin, end, self._lengths[rows]
+        jobs["start_time"] = begin
+        jobs["end_time"] = end
+        jobs["period_length"] = self._lengths[rows]
         columns = {c: values[rows] for c, values in self._columns.items()}
         ends = self._lanes.run(Jobs(states, jobs, columns, self._records), 1)
         done = (ends.rows["status"] == Status.DONE) & (ends.rows["mode"] != Mode.CHATTER)

@@ -13,21 +13,31 @@ from saltus.flow.lanes.sampling import recurrence_period
 from saltus.flow.one_contact.lane_step import begin_contact, side_at_end
 from saltus.taylor import inline_jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
 def fill(lane, trajectory):
     """Put a trajectory into a lane."""
-    work, i, agreements = lane.work, lane.index, lane.agreements
-    job, parameters, state = work.jobs[trajectory], work.parameters[trajectory], work.states[trajectory]
-    lane.trajectory, lane.last_period, lane.leave_by, lane.piece = trajectory, job.last_period, job.leave_by, job.piece
+    work = lane.work
+    i = lane.index
+    agreements = lane.agreements
+    job = work.jobs[trajectory]
+    parameters = work.parameters[trajectory]
+    state = work.states[trajectory]
+    lane.trajectory, lane.last_period, lane.leave_by, lane.piece = (
+        trajectory,
+        job.last_period,
+        job.leave_by,
+        job.piece,
+    )
     lane.held = lane.skip = lane.grazings = 0
     lane.end_time, lane.chatter_speed = job.end_time, 0.0
     for k in range(agreements.shape[1]):
         agreements[i, k] = 0
     breaks, table = records_of(lane, trajectory)
-    constants, half = lane.constants_of[i], state.size // 2
+    constants = lane.constants_of[i]
+    half = state.size // 2
     constants_of = lane.code.constants
     constants_of(parameters, constants)
     put_all(lane.position, state[:half])
@@ -38,7 +48,9 @@ def fill(lane, trajectory):
     begin_overall(lane)
     begin_records(lane)
     mode, side = begin_contact(lane, (parameters, constants, breaks, table), state)
-    lane.mode, lane.side, bit = mode, float(side), 1 << i
+    lane.mode = mode
+    lane.side = float(side)
+    bit = 1 << i
     lane.busy |= bit
     lane.at_contact &= ~bit
     lane.scalar = lane.scalar & ~bit if mode == Mode.ARC else lane.scalar | bit
@@ -71,17 +83,20 @@ def begin_time(lane, job):
     """Set the forcing period and the time at which a trajectory starts, and its first step."""
     lane.now = lane.period_start = lane.last_check = job.start_time
     lane.period_length, lane.capture_speed = job.period_length, job.capture_speed
-    lane.period, lane.periods_done, lane.step_share = float(job.first_period), 0.0, 1.0
+    lane.period = float(job.first_period)
+    lane.periods_done = 0.0
+    lane.step_share = 1.0
     lane.next_check = impacts_between_checks(lane)
     lane.recorded_from = first_recorded(lane)
 
 
 @inline_jit
 def first_recorded(lane):
-    """The first forcing period in which extrema are recorded, if the motion goes on up to its last one.
+    """The first forcing period in which extrema are recorded, if the motion goes on up to its last
+    one.
 
-    It is one before those that are kept, because a step that goes past its end already belongs to the next one; and one more, as
-    the last period may have no length.
+    It is one before those that are kept, because a step that goes past its end already belongs to
+    the next one; and one more, as the last period may have no length.
     """
     return -np.inf if lane.sizes.from_start > 0 else lane.last_period - lane.sizes.kept - 1.0
 
@@ -89,8 +104,10 @@ def first_recorded(lane):
 @inline_jit
 def begin_overall(lane):
     """Begin the records of the whole trajectory."""
-    lane.overall_highest, lane.overall_lowest = -np.inf, np.inf
-    lane.overall_least_speed, lane.overall_impacts = np.inf, 0.0
+    lane.overall_highest = -np.inf
+    lane.overall_lowest = np.inf
+    lane.overall_least_speed = np.inf
+    lane.overall_impacts = 0.0
 
 
 @inline_jit
@@ -100,13 +117,20 @@ def begin_records(lane):
     for row in range(1, lane.sizes.own):
         x = lane.position[row]
         high, low = max(high, x), min(low, x)
-    lane.highest, lane.lowest, lane.least_speed, lane.impacts = high, low, np.inf, 0.0
+    lane.highest = high
+    lane.lowest = low
+    lane.least_speed = np.inf
+    lane.impacts = 0.0
 
 
 @lean_jit
 def unresolved(lane):
-    """Whether there were more than MOST_IMPACTS in a unit of time, or in a shorter forcing period, since the last check."""
-    many, now, length = impacts_between_checks(lane), lane.now, lane.period_length
+    """Whether there were more than MOST_IMPACTS in a unit of time, or in a shorter forcing period,
+    since the last check.
+    """
+    many = impacts_between_checks(lane)
+    now = lane.now
+    length = lane.period_length
     since = lane.last_check
     lane.last_check = now
     lane.next_check += many
@@ -115,7 +139,9 @@ def unresolved(lane):
 
 @inline_jit
 def end_of_period(lane):
-    """The local time at which a forcing period of a trajectory ends: one period after it began, or with the motion."""
+    """The local time at which a forcing period of a trajectory ends: one period after it began, or
+    with the motion.
+    """
     if int(lane.period) == lane.last_period:
         return lane.end_time
     return lane.period_start + lane.period_length
@@ -125,15 +151,19 @@ def end_of_period(lane):
 def begin_period(lane):
     """Set the end of a lane's forcing period, and the time beyond which no step goes.
 
-    This time is one period after the end, so that a step may go past the end; it is the end itself if the motion ends in this
-    period or the next. Both are at most the next breakpoint of the load's records.
+    This time is one period after the end, so that a step may go past the end; it is the end itself
+    if the motion ends in this period or the next. Both are at most the next breakpoint of the
+    load's records.
     """
     breaks = lane.work.tables[
         0
     ]  # indexed with `own`: a row as an array of its own would need a locked instruction to count references
     own = min(lane.trajectory, breaks.shape[0] - 1)
-    period, last, length = int(lane.period), lane.last_period, lane.period_length
-    origin, end = period * length, end_of_period(lane)
+    period = int(lane.period)
+    last = lane.last_period
+    length = lane.period_length
+    origin = period * length
+    end = end_of_period(lane)
     limit = end + length if period + 1 < last else end
     piece = lane.piece
     while piece < breaks.shape[1] and breaks[own, piece] - origin <= lane.now:
@@ -174,24 +204,33 @@ def go_back(lane, t):
 
 @inline_jit
 def keep_sample(lane):
-    """Keep the state at the end of the last forcing period and what happened in it, in place of the oldest sample."""
-    own, done = lane.sizes.own, int(lane.periods_done)
+    """Keep the state at the end of the last forcing period and what happened in it, in place of the
+    oldest sample.
+    """
+    own = lane.sizes.own
+    done = int(lane.periods_done)
     row = lane.work.samples[lane.trajectory, (done - 1) % lane.sizes.kept]
     for d in range(own):
         row[d], row[own + d] = lane.ended_position[d], lane.ended_velocity[d]
-    row[2 * own], row[2 * own + 1] = lane.ended_highest, lane.ended_lowest
-    row[2 * own + 2], row[2 * own + 3] = lane.ended_least_speed, lane.ended_impacts
+    row[2 * own] = lane.ended_highest
+    row[2 * own + 1] = lane.ended_lowest
+    row[2 * own + 2] = lane.ended_least_speed
+    row[2 * own + 3] = lane.ended_impacts
 
 
 @inline_jit
 def end_period(lane):
-    """Keep the state at the end of a forcing period; returns the period after which the trajectory repeats itself, or 0."""
-    states, agreements = lane.stroboscopic[lane.index], lane.agreements[lane.index]
+    """Keep the state at the end of a forcing period; returns the period after which the trajectory
+    repeats itself, or 0.
+    """
+    states = lane.stroboscopic[lane.index]
+    agreements = lane.agreements[lane.index]
     if lane.sizes.every_end > 0:
         keep_sample(lane)
     if lane.sizes.settle == 0:
         return 0
-    done, own = int(lane.periods_done), lane.sizes.own
+    done = int(lane.periods_done)
+    own = lane.sizes.own
     state = states[done % (2 * LONGEST_RECURRENCE)]
     for d in range(own):
         state[d] = lane.ended_position[d]
@@ -214,15 +253,20 @@ def total_up(lane):
 
 @inline_jit
 def arrive(lane, past):
-    """Go on from the end of a forcing period (which the step may have gone `past`), or from a breakpoint of the records.
+    """Go on from the end of a forcing period (which the step may have gone `past`), or from a
+    breakpoint of the records.
 
     Returns DONE, SETTLED, or PAUSED, and the period after which the trajectory repeats itself.
     """
-    period, now, start = int(lane.period), lane.now, lane.period_start
-    last, t_end = period == lane.last_period, end_of_period(lane)
+    period = int(lane.period)
+    now = lane.now
+    start = lane.period_start
+    last = period == lane.last_period
+    t_end = end_of_period(lane)
     if now >= t_end:
         done = lane.periods_done
-        if last and t_end <= start and done > 0.0:  # the last period has no length, so there is nothing to record
+        # the last period has no length, so there is nothing to record
+        if last and t_end <= start and done > 0.0:
             return Status.DONE, 0
         if past:
             lane.periods_done = done + 1.0
@@ -244,10 +288,14 @@ def arrive(lane, past):
 @lean_jit
 def finish(lane, status, detail):
     """Write the end of a lane's trajectory into the results, and free the lane."""
-    last, end, bit = lane.work.last[lane.trajectory], lane.work.ends[lane.trajectory], 1 << lane.index
-    none, half = lane.periods_done == 0.0, last.size // 2
+    last = lane.work.last[lane.trajectory]
+    end = lane.work.ends[lane.trajectory]
+    bit = 1 << lane.index
+    none = lane.periods_done == 0.0
+    half = last.size // 2
     part = lane.now > lane.period_start or lane.impacts > 0.0 or none
-    if part and status != Status.DONE and status != Status.SETTLED and status != Status.OUTSIDE:  # within a forcing period
+    # within a forcing period
+    if part and status != Status.DONE and status != Status.SETTLED and status != Status.OUTSIDE:
         end_here(lane)
     else:
         total_up(lane)
@@ -256,7 +304,9 @@ def finish(lane, status, detail):
     for row in range(half):
         last[row], last[half + row] = lane.position[row], lane.velocity[row]
     end.time, end.chatter_speed = lane.now, lane.chatter_speed
-    end.highest, end.lowest, end.least_speed = lane.overall_highest, lane.overall_lowest, lane.overall_least_speed
+    end.highest = lane.overall_highest
+    end.lowest = lane.overall_lowest
+    end.least_speed = lane.overall_least_speed
     if lane.sizes.columns > 0 and lane.mode == Mode.ARC:
         write_rates(lane)
     end.status, end.detail, end.mode, end.grazings = status, detail, lane.mode, lane.grazings
@@ -269,7 +319,10 @@ def finish(lane, status, detail):
 @lean_jit
 def write_rates(lane):
     """Write the accelerations at the end, and the shift of the last event along each column."""
-    own, rates, lanes, field = lane.sizes.own, lane.work.rates[lane.trajectory], lane.lanes, lane.code.field
+    own = lane.sizes.own
+    rates = lane.work.rates[lane.trajectory]
+    lanes = lane.lanes
+    field = lane.code.field
     lanes.new_time = lanes.now
     for row in range(2 * lane.sizes.rows):
         lanes.new_position[row] = lanes.position[row]

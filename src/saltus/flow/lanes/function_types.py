@@ -1,7 +1,8 @@
-"""The numba types of a group of lanes and of its functions that are called through pointers (see `kernel/memory.py`).
+"""The numba types of a group of lanes and of its functions that are called through pointers (see
+`kernel/memory.py`).
 
-Models with one contact or none, and models with several, have a type of group each; `shared`, `RUN_LANES` and the others below
-are those of the former, and `of_contacts` those of the latter.
+Models with one contact or none, and models with several, have a type of group each; `shared`,
+`RUN_LANES` and the others below are those of the former, and `of_contacts` those of the latter.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ from saltus.flow.lanes.memory import (
 from saltus.taylor import function_type, written_type
 from saltus.taylor.lane_memory import LanesType, LaneType, named_tuple, shared_as
 
-_f, _i = types.float64, types.int64
+_f = types.float64
+_i = types.int64
 _f1, _f2, _f3, _f4 = (types.Array(_f, n, "C") for n in (1, 2, 3, 4))
 _i1, _i2, _i3 = (types.Array(_i, n, "C") for n in (1, 2, 3))
 
@@ -49,7 +51,8 @@ def _records(dtype: np.dtype[Any]) -> Any:
     return types.Array(from_dtype(dtype), 1, "C")
 
 
-LANE_SERIES = LANE_ONE_FREE = types.void(_f1, _i1, _i)  # memory of the lanes, the first slots of its parts, order
+# memory of the lanes, the first slots of its parts, order
+LANE_SERIES = LANE_ONE_FREE = types.void(_f1, _i1, _i)
 LANE_IMPACT = LANE_FIELD = types.void(_f1, _i1)
 TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 TABLES = types.Tuple((_f2, _f4))
@@ -73,18 +76,31 @@ class LaneTypes(NamedTuple):
 def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
     """The types for models with one contact or none, or with several.
 
-    A lane is an argument of functions to which its group has pointers, so the type of the group's tuple comes last.
+    A lane is an argument of functions to which its group has pointers, so the type of the group's
+    tuple comes last.
     """
     space = types.Tuple((NUMBERS, _f1, _i2, _SOLVER)) if several else types.none
     lanes = LanesType(name, Slots._fields, Parts._fields, SERIES, rows="rows", flags="flags")
     lane = LaneType(lanes)
-    root, motion = _f(lane, _i, _f, _f, _f, _i), types.UniTuple(_i, 2)(lane)
+    root = _f(lane, _i, _f, _f, _f, _i)
+    motion = types.UniTuple(_i, 2)(lane)
     impact = _i(lane, _i)
-    helpers: list[Any] = [function_type(signature) for signature in (root, TURNING_RANGE, motion, impact)[: 4 if several else 3]]
+    helpers: list[Any] = [
+        function_type(signature)
+        for signature in (root, TURNING_RANGE, motion, impact)[: 4 if several else 3]
+    ]
     helpers += [] if several else [types.none]
     group = named_tuple(
         LaneGroup,
-        *(_f1, _i1, _SIZES, _SETTINGS, named_tuple(Code, *code), named_tuple(Helpers, *helpers), kernel),
+        *(
+            _f1,
+            _i1,
+            _SIZES,
+            _SETTINGS,
+            named_tuple(Code, *code),
+            named_tuple(Helpers, *helpers),
+            kernel,
+        ),
         *(_records(FLAGS), _records(ROW), _f2, _f2, _f3, _i2, _i3, _f1, _f1, space, _WORK),
     )
     LanesType.tuples[name] = group
@@ -92,10 +108,16 @@ def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
 
 
 _code = [written_type(signature) for signature in (LANE_SERIES, LANE_IMPACT, LANE_FIELD, CONSTANTS)]
-_geometry, _matrices, _one_free = (written_type(signature) for signature in (GEOMETRY, MATRICES, LANE_ONE_FREE))
+_geometry, _matrices, _one_free = (
+    written_type(signature) for signature in (GEOMETRY, MATRICES, LANE_ONE_FREE)
+)
 _functions = types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))
 _kernel = types.Tuple((function_type(ADVANCE), _functions))
-ONE_CONTACT = _lane_types("lanes of one contact", (*_code, _geometry, types.none), _kernel, several=False)
+ONE_CONTACT = _lane_types(
+    "lanes of one contact", (*_code, _geometry, types.none), _kernel, several=False
+)
 _contacts_kernel = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))
-CONTACTS = _lane_types("lanes of several contacts", (*_code, _matrices, _one_free), _contacts_kernel, several=True)
+CONTACTS = _lane_types(
+    "lanes of several contacts", (*_code, _matrices, _one_free), _contacts_kernel, several=True
+)
 shared, RUN_LANES, LANE_ROOT, SCALAR_MOTION, CONTACTS_IMPACT = ONE_CONTACT

@@ -1,8 +1,10 @@
-"""The scalar kernel's part in a group of lanes, one lane at a time, through pointers: roots and extrema where the bounds for all
-lanes leave them open, and rare events (rest, slow impacts that may accumulate, touches, limits), through which it moves a lane.
+"""The scalar kernel's part in a group of lanes, one lane at a time, through pointers: roots and
+extrema where the bounds for all lanes leave them open, and rare events (rest, slow impacts that may
+accumulate, touches, limits), through which it moves a lane.
 
-Its compiled part goes into one module with that of `one_contact/lane_handoff.py`, or of `contacts/lane_handoff.py`. If it were
-linked into its callers, it would be compiled again with each of them.
+Its compiled part goes into one module with that of `one_contact/lane_handoff.py`, or of
+`contacts/lane_handoff.py`. If it were linked into its callers, it would be compiled again with each
+of them.
 """
 
 from __future__ import annotations
@@ -14,27 +16,38 @@ from saltus.flow.kernel.memory import MOTION, EventBuffers, StepBuffers
 from saltus.flow.kernel.roots import SIMPLE, first_root, horner, scale_gap
 from saltus.flow.lanes.function_types import LANE_ROOT, SCALAR_MOTION, TURNING_RANGE
 from saltus.flow.lanes.memory import NO_ROOT, TOUCH
-from saltus.flow.one_contact.lane_handoff import begin_scalar, end_scalar, event_numbers, functions_of, is_captured, record_events
+from saltus.flow.one_contact.lane_handoff import (
+    begin_scalar,
+    end_scalar,
+    event_numbers,
+    functions_of,
+    is_captured,
+    record_events,
+)
 from saltus.taylor import cached_jit, jit, lean_jit
 from saltus.taylor.load_tables import own_records
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 MOST_TURNS = 16  # the most turning points that are looked for within one step
 BUFFER_LENGTH = 64  # steps, and events, of one call
 
 
-# --- roots and extrema -----------------------------------------------------------------------------------------------------
+# --- roots and extrema -------------------------------------------------------
 
 
 @cached_jit(LANE_ROOT)
 def first_root_of(lane, row, start, sign, h, skip):
-    """The first root of one lane's gap by `roots.first_root`: its time, NO_ROOT, or TOUCH where it touches zero before.
+    """The first root of one lane's gap by `roots.first_root`: its time, NO_ROOT, or TOUCH where it
+    touches zero before.
 
-    The gap is `sign` times coordinate `row`, measured from the contact: `start` at the start of the step. If `skip` is 1, the
-    step starts at the contact.
+    The gap is `sign` times coordinate `row`, measured from the contact: `start` at the start of the
+    step. If `skip` is 1, the step starts at the contact.
     """
-    series, order, gap, poly = lane.positions[row], lane.sizes.order, lane.gap, lane.polynomial
+    series = lane.positions[row]
+    order = lane.sizes.order
+    gap = lane.gap
+    poly = lane.polynomial
     for k in range(1, order + 1):
         gap[k] = sign * series[k]
     gap[0] = sign * start
@@ -59,13 +72,17 @@ def shift_start(p, n, u):
 
 @cached_jit(TURNING_RANGE)
 def turning_range(q, order, begin, h, p):
-    """The largest and the smallest value of a series on (begin, h], at its end or where its derivative vanishes before."""
+    """The largest and the smallest value of a series on (begin, h], at its end or where its
+    derivative vanishes before.
+    """
     high = low = horner(q, order, h)
-    n, power = order - 1, 1.0
+    n = order - 1
+    power = 1.0
     for k in range(order):
         p[k] = (k + 1) * q[k + 1] * power
         power *= h
-    start, left = begin / h, 1.0 - begin / h
+    start = begin / h
+    left = 1.0 - begin / h
     if begin > 0.0:
         shift_start(p, n, start)
     for _ in range(MOST_TURNS):
@@ -87,22 +104,42 @@ def turning_range(q, order, begin, h, p):
     return high, low
 
 
-# --- rare events -----------------------------------------------------------------------------------------------------------
+# --- rare events -------------------------------------------------------------
 
 
 @jit
 def scalar_state(lane):
-    """The scalar kernel's memory for a lane: an array of one record MOTION, and the state (see `kernel/memory.py`)."""
-    numbers, sizes = np.zeros(1, dtype=MOTION), lane.sizes
-    motion, state = numbers[0], np.zeros(2 * sizes.rows + sizes.columns)
-    period, length, last = int(lane.period), lane.period_length, lane.last_period
+    """The scalar kernel's memory for a lane: an array of one record MOTION, and the state (see
+    `kernel/memory.py`).
+    """
+    numbers = np.zeros(1, dtype=MOTION)
+    sizes = lane.sizes
+    motion = numbers[0]
+    state = np.zeros(2 * sizes.rows + sizes.columns)
+    period = int(lane.period)
+    length = lane.period_length
+    last = lane.last_period
     motion.period = motion.last_period = period
-    motion.mode, motion.rested, motion.side, motion.piece = lane.mode, lane.held, int(lane.side), lane.piece
+    motion.mode, motion.rested, motion.side, motion.piece = (
+        lane.mode,
+        lane.held,
+        int(lane.side),
+        lane.piece,
+    )
     motion.leave_by = lane.leave_by
     motion.skip = (lane.at_contact >> lane.index) & 1 if lane.mode == Mode.ARC else lane.skip
-    motion.order, motion.dense, motion.until_smooth = sizes.scalar_order, sizes.extrema, 1
-    motion.dof, motion.margin_count, motion.workspace_rows = sizes.rows, sizes.margins, sizes.workspace
-    motion.sides, motion.checked, motion.own, motion.columns = sizes.sides, sizes.checked, sizes.own, sizes.columns
+    motion.order = sizes.scalar_order
+    motion.dense = sizes.extrema
+    motion.until_smooth = 1
+    motion.dof = sizes.rows
+    motion.margin_count = sizes.margins
+    motion.workspace_rows = sizes.workspace
+    motion.sides, motion.checked, motion.own, motion.columns = (
+        sizes.sides,
+        sizes.checked,
+        sizes.own,
+        sizes.columns,
+    )
     motion.first_order, motion.local = sizes.first_order, sizes.local
     motion.time, motion.chatter_speed = lane.now, lane.chatter_speed
     for row in range(2 * sizes.rows):  # in both memories velocities follow the positions
@@ -129,7 +166,9 @@ def buffers(motion, numbers):
         np.empty((BUFFER_LENGTH, 2)),
         np.empty((BUFFER_LENGTH, motion.own, motion.order + 2)),
     )
-    return steps, EventBuffers(np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, numbers + motion.columns)))
+    return steps, EventBuffers(
+        np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, numbers + motion.columns))
+    )
 
 
 @lean_jit
@@ -137,12 +176,15 @@ def record_extrema(lane, motion, steps):
     """Record the extrema of the scalar kernel's last call, and forget its steps and events."""
     for i in range(motion.recorded_steps):
         for row in range(motion.own):
-            series, h = steps.step_series[i, row], steps.step_spans[i, 1]
-            moved, power = 0.0, h
+            series = steps.step_series[i, row]
+            h = steps.step_spans[i, 1]
+            moved = 0.0
+            power = h
             for k in range(1, motion.order + 1):
                 moved += abs(series[k]) * power
                 power *= h
-            if series[0] + moved > lane.highest or series[0] - moved < lane.lowest:  # else it certainly stays between them
+            # else it certainly stays between them
+            if series[0] + moved > lane.highest or series[0] - moved < lane.lowest:
                 above, below = turning_range(series, motion.order, 0.0, h, lane.polynomial)
                 lane.highest, lane.lowest = max(lane.highest, above), min(lane.lowest, below)
     motion.recorded_steps = motion.recorded_events = 0
@@ -151,8 +193,14 @@ def record_extrema(lane, motion, steps):
 @lean_jit
 def put_state(lane, motion, state):
     """Put the scalar kernel's state into the lane."""
-    rows, bit = lane.sizes.rows, 1 << lane.index
-    lane.mode, lane.held, lane.skip, lane.piece = motion.mode, motion.rested, motion.skip, motion.piece
+    rows = lane.sizes.rows
+    bit = 1 << lane.index
+    lane.mode, lane.held, lane.skip, lane.piece = (
+        motion.mode,
+        motion.rested,
+        motion.skip,
+        motion.piece,
+    )
     lane.now, lane.side = motion.time, float(motion.side)
     for row in range(2 * rows):
         lane.position[row] = state[row]
@@ -166,13 +214,17 @@ def put_state(lane, motion, state):
 
 @cached_jit(SCALAR_MOTION)
 def scalar_motion(lane):
-    """Move a lane by the scalar kernel until it moves smoothly again, or its forcing period or its motion ends.
+    """Move a lane by the scalar kernel until it moves smoothly again, or its forcing period or its
+    motion ends.
 
     Returns (PAUSED, 0), or why the motion ends and which margin reached zero.
     """
     advance, _ = lane.kernel
     numbers, state = scalar_state(lane)
-    motion, rows, env, functions = numbers[0], lane.contact_rows[lane.index], own_env(lane), functions_of(lane)
+    motion = numbers[0]
+    rows = lane.contact_rows[lane.index]
+    env = own_env(lane)
+    functions = functions_of(lane)
     begin_scalar(lane)
     steps, events = buffers(motion, event_numbers(lane))
     while True:

@@ -1,4 +1,6 @@
-"""The arguments of an ensemble: states, times and parameters, broadcast together and checked before anything runs."""
+"""The arguments of an ensemble: states, times and parameters, broadcast together and checked before
+anything runs.
+"""
 
 from __future__ import annotations
 
@@ -25,19 +27,35 @@ from saltus.systems import (
 )
 
 ARGUMENTS = (  # of `simulate_many`: a misspelt one arrives among the coordinates
-    *("velocity", "parameters", "periods", "duration", "tol", "time", "side", "stop_at", "sample", "last", "until"),
+    *(
+        "velocity",
+        "parameters",
+        "periods",
+        "duration",
+        "tol",
+        "time",
+        "side",
+        "stop_at",
+        "sample",
+        "last",
+        "until",
+    ),
     *("sensitivities", "threads", "progress"),
 )
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """The starts and parameters of the trajectories: each a flat array, or one number for all of them."""
+    """The starts and parameters of the trajectories: each a flat array, or one number for all of
+    them.
+    """
 
     dims: tuple[str, ...]
     shape: tuple[int, ...]
-    coords: dict[str, Any]  # of the result: DataArrays or, along a dimension of the same name, arrays
-    values: dict[str, np.ndarray]  # coordinates, velocities and the time by their names, parameters by their paths
+    # of the result: DataArrays or, along a dimension of the same name, arrays
+    coords: dict[str, Any]
+    # coordinates, velocities and the time by their names, parameters by their paths
+    values: dict[str, np.ndarray]
     paths: tuple[str, ...]  # those of the parameters
 
     @property
@@ -51,40 +69,55 @@ class Inputs:
         return {path: self.values[path] for path in self.paths}
 
     def with_numbers(self, system: System) -> Any:
-        """A copy of a system in which the numbers of the parameters are arrays, for what is no simulation."""
+        """A copy of a system in which the numbers of the parameters are arrays, for what is no
+        simulation.
+        """
         return substitute(system, lambda path, value: self.parameters.get(path, value))
 
     def in_gaps(self, system: System) -> Inputs:
         """Those for `system.in_gap_coordinates`; the same object where that is the system itself."""
         if (inner := system.in_gap_coordinates) is system:
             return self
-        twin, own = self.with_numbers(inner), len(system.model.coordinates)
-        starts, rest = list(self.values.values())[: 2 * own], list(self.values.items())[2 * own :]
+        twin = self.with_numbers(inner)
+        own = len(system.model.coordinates)
+        starts = list(self.values.values())[: 2 * own]
+        rest = list(self.values.items())[2 * own :]
         sums = twin.model.gap_states(self.values["time"], starts[:own], starts[own:], twin.load)
         called = state_names(twin.model.coordinates)
-        return replace(self, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest))
+        return replace(
+            self, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest)
+        )
 
 
-def read_inputs(system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]) -> Inputs:
+def read_inputs(
+    system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]
+) -> Inputs:
     """Broadcast and check the arguments of an ensemble.
 
     Raises
     ------
     ParameterError
-        Names are unknown to the system; values are no finite numbers, or refused by the system; shapes do not fit together; or a
-        dimension or coordinate has the name of a result.
+        Names are unknown to the system; values are no finite numbers, or refused by the system;
+        shapes do not fit together; or a dimension or coordinate has the name of a result.
     """
     given = parameter_table(system, parameters)
-    arrays = {name: finite_array(name, value) for name, value in (_starts(system, velocity, time, coordinates) | given).items()}
+    arrays = {
+        name: finite_array(name, value)
+        for name, value in (_starts(system, velocity, time, coordinates) | given).items()
+    }
     dims, shape, coords, together = broadcast_arrays(arrays)
     check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)
     size = math.prod(shape)
-    check_memory(dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once")
+    check_memory(
+        dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once"
+    )
     return Inputs(dims, shape, coords, together, tuple(given))
 
 
-def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]) -> dict[str, Any]:
+def _starts(
+    system: System, velocity: Any, time: Any, coordinates: Mapping[str, Any]
+) -> dict[str, Any]:
     """The state and the time at the start, by name."""
     names = system.model.coordinates
     positions, speeds = read_starts(system, velocity, coordinates, ARGUMENTS)
@@ -94,24 +127,38 @@ def _starts(system: System, velocity: Any, time: Any, coordinates: Mapping[str, 
 
 
 def _check_names(
-    system: System, dims: tuple[str, ...], coords: dict[str, Any], arrays: dict[str, Any], given: Iterable[str]
+    system: System,
+    dims: tuple[str, ...],
+    coords: dict[str, Any],
+    arrays: dict[str, Any],
+    given: Iterable[str],
 ) -> None:
-    """Refuse dimensions and coordinates with the name of a result, and coordinates that contradict the parameters."""
+    """Refuse dimensions and coordinates with the name of a result, and coordinates that contradict
+    the parameters.
+    """
     results = result_names(system.model.coordinates)
     for name in (*dims, *coords):
         if name in results:
             what = "dimension" if name in dims else "coordinate"
             free = name.removeprefix("start_")
             raise ParameterError(
-                f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or as you like"
+                (
+                    f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or "
+                    "as you like"
+                )
                 + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
             )
     own = dict(numbers(system))
     for path in (path for path in own if path in coords):
         if not same(coords[path], arrays.get(path, own[path])):
-            use = "other values than parameters give" if path in given else f"other values than the system's {own[path]:g}"
+            use = (
+                "other values than parameters give"
+                if path in given
+                else f"other values than the system's {own[path]:g}"
+            )
             raise ParameterError(
-                f"the coordinate {path!r} has {use}; give them in parameters={{{path!r}: ...}}, or call the coordinate otherwise"
+                f"the coordinate {path!r} has {use}; give them in parameters={{{path!r}: ...}}, "
+                "or call the coordinate otherwise"
             )
 
 

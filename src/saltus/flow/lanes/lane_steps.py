@@ -33,26 +33,40 @@ from saltus.taylor.lane_vectors import (
 from saltus.taylor.vectors import WIDTH
 
 
-def step_limits(order: int, tol: float) -> tuple[float, float, float, tuple[float, float, float, float]]:
-    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last terms may exceed the one from the
-    upper half of a series, and this factor; and one over the orders of the last terms."""
+def step_limits(
+    order: int, tol: float
+) -> tuple[float, float, float, tuple[float, float, float, float]]:
+    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last
+    terms may exceed the one from the upper half of a series, and this factor; and one over the
+    orders of the last terms."""
     log_tol = math.log2(tol)
     rarely = -log_tol / order - LOG_GAP
-    return log_tol, rarely, 2.0**rarely, (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order)
+    return (
+        log_tol,
+        rarely,
+        2.0**rarely,
+        (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order),
+    )
 
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 ZERO_TERM = 1e-300
-LAST_TERMS = 4  # the largest of so many last terms of a series limits the step: two of them may nearly vanish together
-LOG_GAP = 0.35 * math.log2(math.e)  # like `kernel_layout.GAP`, but for the last four terms: if these vanish, so do others
-NEARLY = 1e-5  # of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is rounding
+# the largest of so many last terms of a series limits the step: two of them may nearly vanish
+# together
+LAST_TERMS = 4
+# like `kernel_layout.GAP`, but for the last four terms: if these vanish, so do others
+LOG_GAP = 0.35 * math.log2(math.e)
+# of the time, and of the slope: after a shorter move the root is exact to rounding, as its cube is
+# rounding
+NEARLY = 1e-5
 
 
 @inline_jit
 def state_size(lanes):
     """The largest coordinate or velocity, without the velocities of coordinates of first order."""
-    size, second_order = splat(SMALLEST), lanes.sizes.own - lanes.sizes.first_order
+    size = splat(SMALLEST)
+    second_order = lanes.sizes.own - lanes.sizes.first_order
     for row in range(second_order):
         size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
     for row in range(second_order, lanes.sizes.own):
@@ -62,8 +76,11 @@ def state_size(lanes):
 
 @inline_jit
 def natural_step(lanes, size):
-    """The step that the series of all rows allow, including those of the tangent's columns, relative to the size of the state."""
-    rows, limits = lanes.sizes.own, lanes.settings.limits
+    """The step that the series of all rows allow, including those of the tangent's columns,
+    relative to the size of the state.
+    """
+    rows = lanes.sizes.own
+    limits = lanes.settings.limits
     step = row_step(lanes.velocities[0], lanes.sizes.order, size, limits)
     for row in range(1, rows):
         step = minimum(step, row_step(lanes.velocities[row], lanes.sizes.order, size, limits))
@@ -74,13 +91,19 @@ def natural_step(lanes, size):
 
 @lean_jit
 def column_step(lanes, first):
-    """The step that the series of a column of the tangent allows, relative to its own size (`steps.column_step`)."""
-    size, step = splat(ZERO_TERM), splat(np.inf)
+    """The step that the series of a column of the tangent allows, relative to its own size
+    (`steps.column_step`).
+    """
+    size = splat(ZERO_TERM)
+    step = splat(np.inf)
     for row in range(first, first + lanes.sizes.own):
         size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
         size = maximum(size, absolute(lanes.velocities[row][1]))
     for row in range(first, first + lanes.sizes.own):
-        step = minimum(step, row_step(lanes.velocities[row], lanes.sizes.order, size, lanes.settings.column_limits))
+        step = minimum(
+            step,
+            row_step(lanes.velocities[row], lanes.sizes.order, size, lanes.settings.column_limits),
+        )
     return step
 
 
@@ -88,7 +111,8 @@ def column_step(lanes, first):
 def row_step(series, order, size, limits):
     """The step at which the largest of a series' last terms is tol, relative to `size`.
 
-    If the last terms vanish, the growth of the series is taken from all terms of its upper half, as in `steps.step_size`.
+    If the last terms vanish, the growth of the series is taken from all terms of its upper half, as
+    in `steps.step_size`.
     """
     log_tol, rarely, factor, inverses = limits
     wanted = log_tol + rough_log2(size)
@@ -97,8 +121,10 @@ def row_step(series, order, size, limits):
         term = absolute(series[order - LAST_TERMS + 1 + j])
         step = minimum(step, (wanted - rough_log2(maximum(splat(ZERO_TERM), term))) * inverses[j])
     step = maximum(step, splat(-500.0))
-    natural, half = rough_exp2(step), order // 2
-    reach, upper = natural * factor, absolute(series[order - LAST_TERMS])
+    natural = rough_exp2(step)
+    half = order // 2
+    reach = natural * factor
+    upper = absolute(series[order - LAST_TERMS])
     for k in range(order - LAST_TERMS - 1, half - 1, -1):
         upper = fma(upper, reach, absolute(series[k]))
     vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
@@ -120,15 +146,21 @@ def upper_half(series, order, log_size, log_tol):
 
 @inline_jit
 def sweep(lanes, row, h):
-    """The mean velocity of a coordinate over [0, h], its velocity and acceleration at h, and B = h^2 sum_{j>=2} abs(a_j) h^j.
+    """The mean velocity of a coordinate over [0, h], its velocity and acceleration at h, and B =
+    h^2 sum_{j>=2} abs(a_j) h^j.
 
-    From the mean velocity follow both the coordinate at h and its distance from a contact, each with all of its digits: one from
-    the other would lose them where the contact is far away, or near. B bounds the difference between the second derivative in
-    u = t/h and that of the cubic q_0 + ... + q_3 h^3 u^3.
+    From the mean velocity follow both the coordinate at h and its distance from a contact, each
+    with all of its digits: one from the other would lose them where the contact is far away, or
+    near. B bounds the difference between the second derivative in u = t/h and that of the cubic q_0
+    + ... + q_3 h^3 u^3.
     """
-    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
+    order = lanes.sizes.order
+    positions = lanes.positions[row]
+    velocities = lanes.velocities[row]
     accelerations = lanes.accelerations[row]
-    x, v, a = positions[order], velocities[order], accelerations[order - 1]
+    x = positions[order]
+    v = velocities[order]
+    a = accelerations[order - 1]
     bend = absolute(a)
     x, v = fma(x, h, positions[order - 1]), fma(v, h, velocities[order - 1])
     for k in range(order - 2, 1, -1):
@@ -142,9 +174,16 @@ def sweep(lanes, row, h):
 
 @inline_jit
 def motion_at(lanes, row, start, h):
-    """Position (with `start` as its value at 0), velocity, acceleration, and half the acceleration's rate of change, at h."""
-    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
-    x, v, a, jerk = positions[order], velocities[order], splat(0.0), splat(0.0)
+    """Position (with `start` as its value at 0), velocity, acceleration, and half the
+    acceleration's rate of change, at h.
+    """
+    order = lanes.sizes.order
+    positions = lanes.positions[row]
+    velocities = lanes.velocities[row]
+    x = positions[order]
+    v = velocities[order]
+    a = splat(0.0)
+    jerk = splat(0.0)
     for k in range(order - 1, 0, -1):
         jerk, a = fma(jerk, h, a), fma(a, h, v)
         v, x = fma(v, h, velocities[k]), fma(x, h, positions[k])
@@ -154,14 +193,22 @@ def motion_at(lanes, row, start, h):
 
 @inline_jit
 def both_at(lanes, row, h):
-    """Position and velocity at h. Even and odd powers are summed apart, so that the processor works on four sums at once."""
-    order, positions, velocities = lanes.sizes.order, lanes.positions[row], lanes.velocities[row]
+    """Position and velocity at h.
+
+    Even and odd powers are summed apart, so that the processor works on four sums at once.
+    """
+    order = lanes.sizes.order
+    positions = lanes.positions[row]
+    velocities = lanes.velocities[row]
     square = h * h
     top = order - (order & 1)
-    x, v = positions[top], velocities[top]
-    y, w = splat(0.0), splat(0.0)
+    x = positions[top]
+    v = velocities[top]
+    y = splat(0.0)
+    w = splat(0.0)
     if order & 1:
-        y, w = positions[order], velocities[order]
+        y = positions[order]
+        w = velocities[order]
     for k in range(top - 2, 0, -2):
         x, v = fma(x, square, positions[k]), fma(v, square, velocities[k])
         y, w = fma(y, square, positions[k + 1]), fma(w, square, velocities[k + 1])
@@ -172,44 +219,64 @@ def both_at(lanes, row, h):
 
 @inline_jit
 def shape(cubic, bend, skip):
-    """Properties that a gap p0 + p1 u + p2 u^2 + p3 u^3 + ... certainly has for u in [0, 1], from its cubic and the bound B of
-    the other terms (see `sweep`).
+    """Properties that a gap p0 + p1 u + p2 u^2 + p3 u^3 + ... certainly has for u in [0, 1], from
+    its cubic and the bound B of the other terms (see `sweep`).
 
-    Returns bits of the lanes in which it has no root (apart from the one at 0 where `skip` is set), in which it falls, in which
-    it is concave, and in which it is convex; by the Bernstein coefficients of the cubic, of its derivatives, or of the gap over
-    u.
+    Returns bits of the lanes in which it has no root (apart from the one at 0 where `skip` is set),
+    in which it falls, in which it is concave, and in which it is convex; by the Bernstein
+    coefficients of the cubic, of its derivatives, or of the gap over u.
     """
     g0, g1, g2, g3 = cubic
     rest = bend * (1.0 / 12.0)
     end = g0 + g1 + g2 + g3
-    low = minimum(minimum(g0, g0 + g1 * (1.0 / 3.0)), minimum(g0 + (2.0 * g1 + g2) * (1.0 / 3.0), end))
+    low = minimum(
+        minimum(g0, g0 + g1 * (1.0 / 3.0)), minimum(g0 + (2.0 * g1 + g2) * (1.0 / 3.0), end)
+    )
     low = select(mask(skip), minimum(minimum(g1, g1 + 0.5 * g2), g1 + g2 + g3), low)
     steepest = maximum(maximum(g1, g1 + g2), g1 + 2.0 * g2 + 3.0 * g3)
     falls = bits(steepest < bend * (-1.0 / 3.0))
-    first, last = 2.0 * g2, 2.0 * g2 + 6.0 * g3
-    return bits(low > rest), falls, bits(maximum(first, last) < -bend), bits(minimum(first, last) > bend)
+    first = 2.0 * g2
+    last = 2.0 * g2 + 6.0 * g3
+    return (
+        bits(low > rest),
+        falls,
+        bits(maximum(first, last) < -bend),
+        bits(minimum(first, last) > bend),
+    )
 
 
 @inline_jit
 def root_move(value, inverse, second, third):
-    """The distance of a root from an argument, from the Taylor coefficients there and the inverse of the slope, to O(move^4)."""
-    n, a, b = value * inverse, second * inverse, third * inverse
+    """The distance of a root from an argument, from the Taylor coefficients there and the inverse
+    of the slope, to O(move^4).
+    """
+    n = value * inverse
+    a = second * inverse
+    b = third * inverse
     return -n * fma(n, fma(n, fma(2.0 * a, a, -b), a), splat(1.0))
 
 
 @inline_jit
 def guess_from_end(cubic, end, sign, h):
-    """The root in [0, h] of the sextic that has the gap's values and derivatives at both ends of a step.
+    """The root in [0, h] of the sextic that has the gap's values and derivatives at both ends of a
+    step.
 
-    Scaled to a step of 1, the gap is g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; at the end it is f, with its slope and half
-    its curvature, `pull`. The root is one move (`root_move`) from the root of the parabola at the end; d is its distance from the
-    end.
+    Scaled to a step of 1, the gap is g0 + g1 u + g2 u^2 + g3 u^3 + ... at the start; at the end it
+    is f, with its slope and half its curvature, `pull`. The root is one move (`root_move`) from the
+    root of the parabola at the end; d is its distance from the end.
     """
-    f, slope, pull = sign * end[0], sign * end[1] * h, 0.5 * sign * end[2] * (h * h)
+    f = sign * end[0]
+    slope = sign * end[1] * h
+    pull = 0.5 * sign * end[2] * (h * h)
     g0, g1, g2, g3 = cubic
-    a, b, c = g0 - f + slope - pull, g1 - slope + 2.0 * pull, g2 - pull  # the difference from the parabola at the start
-    c3, c4 = 20.0 * a + 10.0 * b + 4.0 * c + g3, -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
-    c5, c6 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3, -10.0 * a - 6.0 * b - 3.0 * c - g3
+    # the difference from the parabola at the start
+    a = g0 - f + slope - pull
+    b = g1 - slope + 2.0 * pull
+    c = g2 - pull
+    c3 = 20.0 * a + 10.0 * b + 4.0 * c + g3
+    c4 = -45.0 * a - 25.0 * b - 11.0 * c - 3.0 * g3
+    c5 = 36.0 * a + 21.0 * b + 10.0 * c + 3.0 * g3
+    c6 = -10.0 * a - 6.0 * b - 3.0 * c - g3
     square = maximum(fma(slope, slope, -4.0 * f * pull), splat(0.0))
     d = minimum(2.0 * f * rough_inverse(slope - rough_root(square)), splat(1.0))
     p1 = fma(c6, d, c5)  # Horner's rule, repeated for the derivatives
@@ -231,13 +298,18 @@ def guess_from_end(cubic, end, sign, h):
 
 @inline_jit
 def only_root(lanes, gap, guess, high, chosen):
-    """The root in (0, high] of gaps that have exactly one there: not negative at 0 (if zero, then growing), negative at `high`.
+    """The root in (0, high] of gaps that have exactly one there: not negative at 0 (if zero, then
+    growing), negative at `high`.
 
-    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket. A lane that has converged is not
-    changed any more, whatever the others do. Returns the root and the velocity there.
+    The search repeats `root_move` from a guess, with bisection if a move leaves the bracket. A lane
+    that has converged is not changed any more, whatever the others do. Returns the root and the
+    velocity there.
     """
-    low, speed, active = splat(0.0), splat(0.0), chosen
-    tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)  # the guess may have gone astray
+    low = splat(0.0)
+    speed = splat(0.0)
+    active = chosen
+    # the guess may have gone astray
+    tau = select(mask(bits(guess > 0.0) & bits(guess <= high)), guess, 0.5 * high)
     for _ in range(60):
         x, v, a, jerk = motion_at(lanes, gap.row, gap.start, tau)
         inverse = rough_inverse(v)
@@ -247,10 +319,13 @@ def only_root(lanes, gap, guess, high, chosen):
         following = tau + root_move(x, inverse, 0.5 * a, (1.0 / 3.0) * jerk)
         inside = mask(bits(following >= low) & bits(following <= high))
         following = select(inside, following, 0.5 * (low + high))
-        move, going = following - tau, mask(active)
+        move = following - tau
+        going = mask(active)
         speed = select(going, fma(move, fma(move, jerk, a), v), speed)
         tau = select(going, following, tau)
-        active &= bits(absolute(move) > NEARLY * tau) | bits(absolute(move * a) > NEARLY * absolute(v))
+        active &= bits(absolute(move) > NEARLY * tau) | bits(
+            absolute(move * a) > NEARLY * absolute(v)
+        )
         if active == 0:
             break
     return tau, speed
@@ -280,8 +355,8 @@ def margins_certain(lanes, h):
 
 @lean_jit
 def series_true(lanes, h, size):
-    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model has there, of a coordinate of
-    first order its velocity.
+    """Bits of the lanes whose series give, at the end of the step, the acceleration that the model
+    has there, of a coordinate of first order its velocity.
 
     The new state must be in place. See `steps.leaps`.
     """
@@ -289,7 +364,8 @@ def series_true(lanes, h, size):
     defect = splat(0.0)
     for row in range(lanes.sizes.own):
         first_order = row >= lanes.sizes.own - lanes.sizes.first_order
-        series, slope = lanes.velocities[row] if first_order else lanes.accelerations[row], splat(0.0)
+        series = lanes.velocities[row] if first_order else lanes.accelerations[row]
+        slope = splat(0.0)
         for k in range(lanes.sizes.order - 1, -1, -1):
             slope = fma(slope, h, series[k])
         defect = maximum(defect, absolute(lanes.after_velocity[row] - slope))
@@ -298,11 +374,13 @@ def series_true(lanes, h, size):
 
 @inline_jit
 def commit(lanes, moved, hit, speed):
-    """Make the new state the state of the lanes in `moved`, and the state after the impact that of the lanes in `hit`.
+    """Make the new state the state of the lanes in `moved`, and the state after the impact that of
+    the lanes in `hit`.
 
     `speed` is the speed of the impacts.
     """
-    going, impact = mask(moved), mask(hit)
+    going = mask(moved)
+    impact = mask(hit)
     lanes.now = select(going, lanes.new_time, lanes.now)
     lanes.side = select(impact, lanes.new_side, lanes.side)
     lanes.least_speed = select(impact, minimum(lanes.least_speed, speed), lanes.least_speed)
@@ -314,14 +392,20 @@ def commit(lanes, moved, hit, speed):
 
 @inline_jit
 def find_contact(lanes, gap, h, end, alive, patient):
-    """The lanes in `alive` that meet a contact within the step of length h, those in doubt, and those that wait for a shorter
-    step; the times, and the velocities at these times.
+    """The lanes in `alive` that meet a contact within the step of length h, those in doubt, and
+    those that wait for a shorter step; the times, and the velocities at these times.
 
-    `end` are the coordinate at the end of the step, measured from the contact, its velocity and acceleration there, and the bound
-    of `sweep`. `patient` are the lanes that may wait for a shorter step if nothing is certain.
+    `end` are the coordinate at the end of the step, measured from the contact, its velocity and
+    acceleration there, and the bound of `sweep`. `patient` are the lanes that may wait for a
+    shorter step if nothing is certain.
     """
-    (x, v, _, bend), sign, skip, series = end, gap.sign, gap.skip, lanes.positions[gap.row]
-    g0, g1, g2 = sign * gap.start, sign * series[1] * h, sign * series[2] * (h * h)
+    (x, v, _, bend) = end
+    sign = gap.sign
+    skip = gap.skip
+    series = lanes.positions[gap.row]
+    g0 = sign * gap.start
+    g1 = sign * series[1] * h
+    g2 = sign * series[2] * (h * h)
     cubic = (g0, g1, g2, sign * series[3] * (h * h * h))
     doubtful = ((bits(g0 <= 0.0) & ~skip) | (bits(g1 <= 0.0) & skip)) & alive
     clear, falls, concave, convex = shape(cubic, bend, skip)
@@ -330,9 +414,11 @@ def find_contact(lanes, gap, h, end, alive, patient):
     short &= skip & alive & ~doubtful
     single = concave | (falls & ~skip) | (convex & over) | short
     hit = (alive & ~doubtful & ~clear & single & over) | short
-    tau, at_root = h, v
+    tau = h
+    at_root = v
     if hit:
-        guess, high = flight, h
+        guess = flight
+        high = h
         if hit & ~short:
             guess = guess_from_end(cubic, end, sign, h)
         if short:
@@ -340,7 +426,8 @@ def find_contact(lanes, gap, h, end, alive, patient):
             guess = select(mask(short), guess_from_start(cubic, higher, flight) * h, guess)
             high = select(mask(short), 2.0 * flight * h, h)
         root, speed = only_root(lanes, gap, guess, high, hit)
-        tau, at_root = select(mask(hit), root, h), select(mask(hit), speed, v)
+        tau = select(mask(hit), root, h)
+        at_root = select(mask(hit), speed, v)
     unclear = alive & ~doubtful & ~clear & ~single
     waits, unclear = unclear & patient, unclear & ~patient
     for i in range(WIDTH if unclear else 0):
@@ -352,23 +439,26 @@ def find_contact(lanes, gap, h, end, alive, patient):
             elif root >= 0.0:
                 hit |= 1 << i
                 tau = with_lane(tau, i, root)
-                at_root = with_lane(at_root, i, series_value(lane.velocities[gap.row], lanes.sizes.order, root))
+                at_root = with_lane(
+                    at_root, i, series_value(lane.velocities[gap.row], lanes.sizes.order, root)
+                )
     return hit, doubtful, waits, tau, at_root
 
 
 @inline_jit
 def short_flight(cubic, bend):
-    """The lanes in which a flight from the contact certainly ends within twice the time that it would take if the acceleration
-    stayed as at its start.
+    """The lanes in which a flight from the contact certainly ends within twice the time that it
+    would take if the acceleration stayed as at its start.
 
-    Only this part of the step is considered, by the cubic and the bound of `shape`: later in the step the acceleration may change
-    its sign. Returns bits of the lanes in which the gap is concave up to this time and negative then, and half of the time as a
-    share of the step.
+    Only this part of the step is considered, by the cubic and the bound of `shape`: later in the
+    step the acceleration may change its sign. Returns bits of the lanes in which the gap is concave
+    up to this time and negative then, and half of the time as a share of the step.
     """
     _, g1, g2, g3 = cubic
     flight = -g1 * rough_inverse(g2)
     end = 2.0 * flight
-    rest, last = bend * (end * end), fma(6.0 * g3, end, 2.0 * g2)
+    rest = bend * (end * end)
+    last = fma(6.0 * g3, end, 2.0 * g2)
     concave = bits(maximum(2.0 * g2, last) < -rest)
     over = bits(fma(fma(g3, end, g2), end, g1) + rest * end * (1.0 / 12.0) < 0.0)
     return concave & over & bits(end <= 1.0), flight
@@ -376,7 +466,8 @@ def short_flight(cubic, bend):
 
 @inline_jit
 def guess_from_start(cubic, higher, flight):
-    """The end of a short flight, as a share of the step: one `root_move` from its end under the acceleration at its start.
+    """The end of a short flight, as a share of the step: one `root_move` from its end under the
+    acceleration at its start.
 
     `higher` are the terms of fourth and fifth order of the gap; higher ones are neglected.
     """
@@ -384,13 +475,18 @@ def guess_from_start(cubic, higher, flight):
     g4, g5 = higher
     value = fma(fma(fma(fma(g5, flight, g4), flight, g3), flight, g2), flight, g1)
     slope = fma(fma(fma(4.0 * g5, flight, 3.0 * g4), flight, 2.0 * g3), flight, g2)
-    second, third = fma(fma(6.0 * g5, flight, 3.0 * g4), flight, g3), fma(4.0 * g5, flight, g4)
+    second = fma(fma(6.0 * g5, flight, 3.0 * g4), flight, g3)
+    third = fma(4.0 * g5, flight, g4)
     return flight + root_move(value, rough_inverse(slope), second, third)
 
 
 @inline_jit
 def lane_root(lane, gap, h):
-    """The first root of one lane's gap, NO_ROOT or TOUCH, by the scalar kernel's search (`handoff.first_root_of`)."""
-    i, search = lane.index, lane.helpers.first_root
-    start, sign = vector_lane(gap.start, i), vector_lane(gap.sign, i)
+    """The first root of one lane's gap, NO_ROOT or TOUCH, by the scalar kernel's search
+    (`handoff.first_root_of`).
+    """
+    i = lane.index
+    search = lane.helpers.first_root
+    start = vector_lane(gap.start, i)
+    sign = vector_lane(gap.sign, i)
     return search(lane, gap.row, start, sign, vector_lane(h, i), (gap.skip >> i) & 1)

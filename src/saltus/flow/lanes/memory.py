@@ -1,8 +1,10 @@
-"""The memory of a group of lanes in words: the named tuples and records that the driver and its callers share.
+"""The memory of a group of lanes in words: the named tuples and records that the driver and its
+callers share.
 
-A `LaneGroup` is all that the driver needs: its `memory` consists of slots of one vector, with a number for each lane. The first
-slots are those of `Slots`; the parts of `Parts` follow, each with as many slots as the structure needs. Compiled code reads and
-writes all of them by their names (see `taylor/lane_memory.py`): `lanes.now`, `lanes.position[row]`, `lane.impacts`.
+A `LaneGroup` is all that the driver needs: its `memory` consists of slots of one vector, with a
+number for each lane. The first slots are those of `Slots`; the parts of `Parts` follow, each with
+as many slots as the structure needs. Compiled code reads and writes all of them by their names (see
+`taylor/lane_memory.py`): `lanes.now`, `lanes.position[row]`, `lane.impacts`.
 """
 
 from __future__ import annotations
@@ -28,30 +30,40 @@ class Slots(NamedTuple):
     new_time: int = 3  # at the end of the step
     new_side: int = 4  # after an impact
     period_end: int = 5  # the time at which the forcing period, or the motion, ends
-    contact: int = 6  # the coordinate at the contact; the gap's rate of change with it on side +1 and on side -1 follow
+    # the coordinate at the contact; the gap's rate of change with it on side +1 and on side -1
+    # follow
+    contact: int = 6
     rate_up: int = 7
     rate_down: int = 8
-    capture_speed: int = 9  # motions whose gap has a lower speed after an impact are proved to be captured
-    highest: int = 10  # the largest coordinate since the forcing period began; the next three slots are of the same time
+    # motions whose gap has a lower speed after an impact are proved to be captured
+    capture_speed: int = 9
+    # the largest coordinate since the forcing period began; the next three slots are of the same
+    # time
+    highest: int = 10
     lowest: int = 11
     least_speed: int = 12  # before an impact
     impacts: int = 13
-    ended_highest: int = 14  # the same four for the last forcing period that has ended, then the side at its end
+    # the same four for the last forcing period that has ended, then the side at its end
+    ended_highest: int = 14
     ended_lowest: int = 15
     ended_least_speed: int = 16
     ended_impacts: int = 17
     ended_side: int = 18
-    overall_highest: int = 19  # the same four from the start to the end of the last forcing period that has ended
+    # the same four from the start to the end of the last forcing period that has ended
+    overall_highest: int = 19
     overall_lowest: int = 20
     overall_least_speed: int = 21
     overall_impacts: int = 22
     step_limit: int = 23  # the time that no step goes beyond; it may lie beyond `period_end`
     period: int = 24  # number of the forcing period
-    period_start: int = 25  # time at which the trajectory began within its first forcing period: all of its periods begin there
+    # time at which the trajectory began within its first forcing period: all of its periods begin
+    # there
+    period_start: int = 25
     period_length: int = 26
     periods_done: int = 27
     passed_together: int = 28  # forcing periods below this number are ended for all lanes at once
-    next_check: int = 29  # the number of impacts at which it is checked next that they do not accumulate without end
+    # the number of impacts at which it is checked next that they do not accumulate without end
+    next_check: int = 29
     last_check: int = 30  # the time at which that was last checked
     new_speed: int = 31  # for a model with several contacts: the speed before an impact
     free_position: int = 32  # where only one coordinate is free: this coordinate
@@ -114,16 +126,26 @@ class MemoryPlan:
     @cached_property
     def places(self) -> Parts:
         """The first slot of each part."""
-        several, contacts = self.local if self.contacts or self.frictions else 0, self.contacts
-        behind = self.frictions + (2 if several else 0)  # slidings, and an instant, of which lanes know without it
-        sizes = [self.rows] * 8 + [self.parameters + behind, several, contacts, several**2, contacts**2]
+        several = self.local if self.contacts or self.frictions else 0
+        contacts = self.contacts
+        # slidings, and an instant, of which lanes know without it
+        behind = self.frictions + (2 if several else 0)
+        sizes = [self.rows] * 8 + [
+            self.parameters + behind,
+            several,
+            contacts,
+            several**2,
+            contacts**2,
+        ]
         sizes += [several, several, several**2, contacts, contacts]
         sizes += [self.constant_guards, self.constants + self.data, self.records * RECORD_WIDTH]
         sizes += [rows * SERIES_LENGTH for rows in (self.rows, self.rows, self.own, self.stops)]
         return Parts(*(len(SLOTS) + sum(sizes[:part]) for part in range(len(sizes))))
 
     def slot(self, part: str, number: int = 0) -> Slot:
-        """A slot of a part, for the functions of a structure: the number of modes moves the parts, and is no part of the code."""
+        """A slot of a part, for the functions of a structure: the number of modes moves the parts,
+        and is no part of the code.
+        """
         return (part, number) if self.data else ("m", getattr(self.places, part) + number)
 
     @property
@@ -154,8 +176,10 @@ class LaneSizes(NamedTuple):
     from_start: int  # whether from the start, not only in the forcing periods that are kept
     settle: int  # whether a trajectory ends when it repeats itself
     ends_asked: int  # whether the ends of forcing periods are asked for at all
-    every_end: int  # whether every end of a forcing period needs work, as for samples or recurrences
-    one_free: int  # whether there is a series for lanes in which one coordinate is free (see `one_free.py`)
+    # whether every end of a forcing period needs work, as for samples or recurrences
+    every_end: int
+    # whether there is a series for lanes in which one coordinate is free (see `one_free.py`)
+    one_free: int
     guards: int  # of that series
     constant_guards: int
     contacts: int  # the number of contacts of a model with several
@@ -169,7 +193,8 @@ class LaneSettings(NamedTuple):
 
     tolerance: float
     shortest_step: float
-    slowest_impact: float  # after an impact with a lower speed of the gap, the end of an accumulation may be near
+    # after an impact with a lower speed of the gap, the end of an accumulation may be near
+    slowest_impact: float
     limits: tuple[Any, ...]  # `step_limits` of the coordinates
     column_limits: tuple[Any, ...]  # of the tangent's columns
 
@@ -234,7 +259,8 @@ class Code(NamedTuple):
     field: Any
     constants: Any
     geometry: Any  # or `matrices`
-    one_free: Any  # of a model with several contacts: the series where one coordinate is free; else None
+    # of a model with several contacts: the series where one coordinate is free; else None
+    one_free: Any
 
 
 class Helpers(NamedTuple):
@@ -252,10 +278,12 @@ class Work(NamedTuple):
     states: np.ndarray  # first states (n, 2 coordinates): coordinates, then velocities
     jobs: np.ndarray  # (n,), see `JOB`
     parameters: np.ndarray
-    tables: tuple[np.ndarray, np.ndarray]  # record breakpoints and pieces, a row for each trajectory, or one
+    # record breakpoints and pieces, a row for each trajectory, or one
+    tables: tuple[np.ndarray, np.ndarray]
     last: np.ndarray  # last states
     ends: np.ndarray  # (n,), see `END`
-    rates: np.ndarray  # accelerations at the end, then the shifts of the last event along each column
+    # accelerations at the end, then the shifts of the last event along each column
+    rates: np.ndarray
     samples: np.ndarray
     control: np.ndarray  # whether to stop, forcing periods done so far
 
@@ -275,7 +303,8 @@ class LaneGroup(NamedTuple):
     constants_of: np.ndarray  # a row for each lane, as in the following
     geometry: np.ndarray  # of its contact; with several contacts the numbers that `matrices` gives
     stroboscopic: np.ndarray  # the last states, of which the oldest is overwritten
-    agreements: np.ndarray  # for each q, how many states in a row agreed with those q forcing periods before
+    # for each q, how many states in a row agreed with those q forcing periods before
+    agreements: np.ndarray
     contact_rows: np.ndarray  # the scalar kernel's rows of contacts and frictions
     polynomial: np.ndarray  # room for two polynomials of one lane
     gap: np.ndarray
@@ -298,7 +327,8 @@ class Step(NamedTuple):
     h: Any  # its length
     taken: Any  # the part of it that is taken, up to an impact
     bend: Any  # the bound of `sweep` for the first coordinate, or for the one that is free
-    contact: Any  # with several contacts, the number of the one that closes, or whose coordinate is free
+    # with several contacts, the number of the one that closes, or whose coordinate is free
+    contact: Any
 
 
 class Stretch(NamedTuple):
@@ -322,11 +352,18 @@ class Closing(NamedTuple):
     together: Any  # whether impulses act at all closed contacts too, or at this one alone
 
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
-MOST_IMPACTS = 1e6  # in a unit of time, or in a shorter forcing period: more are an accumulation that is not resolved
-BURST = 2e4  # impacts between two checks of their rate with several contacts, where each takes a pass of the scalar kernel
-SMALLEST_SHARE = 0.25  # at this share of the usual step, the scalar search for roots decides what a shorter step could not
-NO_ROOT, TOUCH = -1.0, -2.0  # instead of the time of a lane's root
+# in a unit of time, or in a shorter forcing period: more are an accumulation that is not resolved
+MOST_IMPACTS = 1e6
+# impacts between two checks of their rate with several contacts, where each takes a pass of the
+# scalar kernel
+BURST = 2e4
+# at this share of the usual step, the scalar search for roots decides what a shorter step could not
+SMALLEST_SHARE = 0.25
+# instead of the time of a lane's root
+NO_ROOT = -1.0
+TOUCH = -2.0
 FAST = 1e300  # A state beyond this has left the range of numbers.
-LONGEST_RECURRENCE = 16  # the longest period for which a recurrence is looked for, in forcing periods
+# the longest period for which a recurrence is looked for, in forcing periods
+LONGEST_RECURRENCE = 16

@@ -14,7 +14,9 @@ from saltus.errors import ParameterError, near, shown
 
 
 class Sample(StrEnum):
-    """The samples that may be kept for each of the last forcing periods; their order is that of the variables in the result."""
+    """The samples that may be kept for each of the last forcing periods; their order is that of the
+    variables in the result.
+    """
 
     STATE = "state"  # at the end of the period, stroboscopically
     EXTREMA = "extrema"  # of the coordinate; with several coordinates, of any of them
@@ -48,8 +50,11 @@ class EnsembleOptions:
     limits: tuple[str, ...]  # margins to stop at
     sample: tuple[str, ...] = ()  # of `Sample`
     until: tuple[str, ...] = ()  # of `Until`
-    from_start: bool = True  # whether extrema are recorded from the start, not only in the periods that are kept: that takes time
-    paths: tuple[str, ...] | None = None  # of the parameters to differentiate to; None without derivatives
+    # whether extrema are recorded from the start, not only in the periods that are kept: that takes
+    # time
+    from_start: bool = True
+    # of the parameters to differentiate to; None without derivatives
+    paths: tuple[str, ...] | None = None
 
 
 def read_names(argument: str, given: Any, known: Iterable[str] | None = None) -> tuple[str, ...]:
@@ -69,7 +74,9 @@ def read_names(argument: str, given: Any, known: Iterable[str] | None = None) ->
         if not isinstance(name, str):
             raise ParameterError(f"{argument} must be names, got {shown(given)}", argument)
         if known is not None and name not in known:
-            raise ParameterError(f"{argument} knows no {shown(name)}; {near(str(name), known)}", argument)
+            raise ParameterError(
+                f"{argument} knows no {shown(name)}; {near(str(name), known)}", argument
+            )
     return names
 
 
@@ -84,7 +91,10 @@ def read_last(last: Any, periods: int) -> int:
     if isinstance(last, str) and last == "all":
         return periods
     if isinstance(last, bool) or not isinstance(last, (int, np.integer)) or last < 1:
-        raise ParameterError(f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}', "last")
+        raise ParameterError(
+            f'last must be a whole number of forcing periods from 1 on, or "all", got {last!r}',
+            "last",
+        )
     return max(1, min(int(last), periods))
 
 
@@ -109,7 +119,8 @@ def read_threads(threads: Any) -> int:
     ParameterError
         `threads` is no whole number from 1 on.
     """
-    from saltus.flow.lanes.threads import available_cores  # here, as reading a dataset needs no compiled code
+    # here, as reading a dataset needs no compiled code
+    from saltus.flow.lanes.threads import available_cores
 
     threads = available_cores() if threads is None else threads
     check_count("threads", threads, 1)

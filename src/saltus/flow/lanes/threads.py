@@ -17,7 +17,12 @@ from saltus.flow.contacts.layout import FrictionColumn, solver_arrays
 from saltus.flow.kernel.compiled import Program, taylor_order
 from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SERIES_LENGTH, SHORTEST, SLOW
 from saltus.flow.kernel.memory import MOTION
-from saltus.flow.lanes.compiled_lanes import compile_everything, load_advance, load_driver, load_helpers
+from saltus.flow.lanes.compiled_lanes import (
+    compile_everything,
+    load_advance,
+    load_driver,
+    load_helpers,
+)
 from saltus.flow.lanes.lane_steps import step_limits
 from saltus.flow.lanes.memory import (
     END,
@@ -42,15 +47,15 @@ WHAT = "following the motions"  # for the progress
 class ThreadSettings:
     """How trajectories are shared between threads, and how often threads are checked."""
 
-    # The largest number of trajectories in one call of the driver, and of samples that it keeps in all: 25 MB for one coordinate.
-    # Chunks are large because lanes stand empty at the end of each one; for long, if a few motions have a thousand times the
-    # impacts of the others.
+    # The largest number of trajectories in one call of the driver, and of samples that it keeps in
+    # all: 25 MB for one coordinate. Chunks are large because lanes stand empty at the end of each
+    # one; for long, if a few motions have a thousand times the impacts of the others.
     largest_chunk: int = 8192
     most_samples: int = 1 << 19
     # The smallest number of trajectories in a chunk, if there are as many for each thread.
     smallest_chunk: int = 8 * WIDTH
-    # When a chunk is taken, at least so many chunks of its size remain for each thread: the last ones are small, so that all
-    # threads end at about the same time.
+    # When a chunk is taken, at least so many chunks of its size remain for each thread: the last
+    # ones are small, so that all threads end at about the same time.
     chunks_ahead: int = 2
     most_threads: int = 256  # The most threads of all ensembles that run at the same time.
 
@@ -59,11 +64,13 @@ SETTINGS = ThreadSettings()
 
 
 def chunks(count: int, threads: int, kept: int = 1) -> Iterator[slice]:
-    """The chunks of `count` trajectories: large ones first, then smaller ones, so that all threads end at about the same time.
+    """The chunks of `count` trajectories: large ones first, then smaller ones, so that all threads
+    end at about the same time.
 
     `kept` is the number of forcing periods for which samples of each trajectory are kept.
     """
-    first, least = 0, min(SETTINGS.smallest_chunk, math.ceil(count / threads))
+    first = 0
+    least = min(SETTINGS.smallest_chunk, math.ceil(count / threads))
     largest = min(SETTINGS.largest_chunk, max(least, SETTINGS.most_samples // kept))
     while first < count:
         share = (count - first) / (SETTINGS.chunks_ahead * threads) if threads > 1 else count
@@ -79,7 +86,8 @@ class Jobs:
     states: np.ndarray  # (n, 2 coordinates): coordinates, then velocities
     rows: np.ndarray  # (n,), see `JOB`
     columns: dict[int, np.ndarray]  # by the parameter's place, (n,)
-    records: tuple[np.ndarray, np.ndarray]  # breakpoints (n or 1, m) and pieces, see `record_tables`
+    # breakpoints (n or 1, m) and pieces, see `record_tables`
+    records: tuple[np.ndarray, np.ndarray]
 
     def __len__(self) -> int:
         return len(self.states)
@@ -91,7 +99,9 @@ class Ends:
 
     states: np.ndarray  # (n, 2 coordinates)
     rows: np.ndarray  # (n,), see `END`
-    rates: np.ndarray  # (n, own coordinates + columns of the tangent): accelerations, then the shifts of the last event
+    # (n, own coordinates + columns of the tangent): accelerations, then the shifts of the last
+    # event
+    rates: np.ndarray
     samples: np.ndarray  # (n, kept, columns asked for)
 
 
@@ -99,14 +109,17 @@ _sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the 
 
 
 def share_cores(processes: Callable[[], int]) -> None:
-    """Let this process use only its share of the cores, as other processes compute at the same time.
+    """Let this process use only its share of the cores, as other processes compute at the same
+    time.
 
-    More threads than cores would only split small ensembles further, and more lanes would stand empty at the end.
+    More threads than cores would only split small ensembles further, and more lanes would stand
+    empty at the end.
 
     Parameters
     ----------
     processes
-        Counts the processes that compute at the same time, this one included, whenever it is called.
+        Counts the processes that compute at the same time, this one included, whenever it is
+        called.
 
     Examples
     --------
@@ -123,35 +136,45 @@ def available_cores() -> int:
     >>> saltus.flow.available_cores() >= 1
     True
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     return max(1, cores // max(1, _sharing[0]()))
 
 
 @cache
 def _pool(process: int) -> ThreadPoolExecutor:
-    """The threads of a process, kept because starting one takes as long as a short ensemble; a forked process needs its own.
+    """The threads of a process, kept because starting one takes as long as a short ensemble; a
+    forked process needs its own.
 
-    A thread is started where none is idle, so that ensembles that run at the same time do not wait for one another.
+    A thread is started where none is idle, so that ensembles that run at the same time do not wait
+    for one another.
     """
     return ThreadPoolExecutor(SETTINGS.most_threads, thread_name_prefix="saltus")
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """A structure ready to run in lanes, with the settings that are the same for all of its trajectories."""
+    """A structure ready to run in lanes, with the settings that are the same for all of its
+    trajectories.
+    """
 
     program: Program
     plan: MemoryPlan
-    functions: tuple[Any, ...]  # lane_series, lane_impact, lane_field, and of a model with several contacts lane_one_free
+    # lane_series, lane_impact, lane_field, and of a model with several contacts lane_one_free
+    functions: tuple[Any, ...]
     parameters: np.ndarray  # of the system; `Jobs.columns` replaces some
     tol: float
     kept: int  # how many of the last forcing periods are kept
     sampled: list[int]  # which columns of a sample are kept
     extrema: bool  # whether extrema are recorded
-    from_start: bool  # whether from the start of a motion, not only in the forcing periods that are kept
+    # whether from the start of a motion, not only in the forcing periods that are kept
+    from_start: bool
     settle: bool  # whether a trajectory ends when it repeats itself
 
-    def run(self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0) -> Ends:
+    def run(
+        self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0
+    ) -> Ends:
         """Run all jobs; `total` is the number of their forcing periods, for the progress.
 
         Raises
@@ -159,8 +182,10 @@ class Lanes:
         KeyboardInterrupt
             After Ctrl-C, within a step of every lane.
         """
-        n, own = len(jobs), self.own
-        threads = max(1, min(threads, math.ceil(n / WIDTH)))  # starting a thread costs time even if it has no lanes
+        n = len(jobs)
+        own = self.own
+        # starting a thread costs time even if it has no lanes
+        threads = max(1, min(threads, math.ceil(n / WIDTH)))
         ends = Ends(
             np.empty((n, jobs.states.shape[1])),
             np.zeros(n, dtype=END),
@@ -168,10 +193,12 @@ class Lanes:
             np.empty((n, self.kept, len(self.sampled))),
         )
         controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
-        waiting, lock = chunks(n, threads, self.kept), threading.Lock()
+        waiting = chunks(n, threads, self.kept)
+        lock = threading.Lock()
         compile_everything(self.several)  # here, not in each thread
         progress(0.0, WHAT)
-        pool, workers = _pool(os.getpid()), list[Future[None]]()
+        pool = _pool(os.getpid())
+        workers = list[Future[None]]()
         try:  # an interrupt while they are begun must stop them, too
             for control in controls:
                 workers.append(pool.submit(self._work, jobs, ends, waiting, lock, control))
@@ -198,7 +225,14 @@ class Lanes:
         """The model's coordinates."""
         return self.program.structure.sizes.own
 
-    def _work(self, jobs: Jobs, ends: Ends, waiting: Iterator[slice], lock: threading.Lock, control: np.ndarray) -> None:
+    def _work(
+        self,
+        jobs: Jobs,
+        ends: Ends,
+        waiting: Iterator[slice],
+        lock: threading.Lock,
+        control: np.ndarray,
+    ) -> None:
         """Run chunk after chunk until there are none."""
         group = self._group(control)
         while True:
@@ -230,8 +264,12 @@ class Lanes:
         ends.samples[rows] = samples[:, :, self.sampled]
 
     def _group(self, control: np.ndarray) -> LaneGroup:
-        """A group of lanes for one thread, still without work; `control` = [whether to stop, forcing periods done so far]."""
-        trace, own, plan = self.program.trace, self.own, self.plan
+        """A group of lanes for one thread, still without work; `control` = [whether to stop,
+        forcing periods done so far].
+        """
+        trace = self.program.trace
+        own = self.own
+        plan = self.plan
         numbers = len(trace.contact_numbers) if self.several else 3
         nothing = np.zeros((0, 0))
         return LaneGroup(
@@ -241,10 +279,15 @@ class Lanes:
             settings=self._settings(),
             code=self._code(),
             helpers=Helpers(*load_helpers(self.several), *([] if self.several else [None])),
-            kernel=(load_advance(self.several), self.program.model if self.several else self.program.structure.functions),
+            kernel=(
+                load_advance(self.several),
+                self.program.model if self.several else self.program.structure.functions,
+            ),
             flags=np.zeros(1, dtype=FLAGS),
             rows=np.zeros(WIDTH, dtype=ROW),
-            constants_of=np.tile(np.append(np.zeros(plan.constants), self.program.data), (WIDTH, 1)),
+            constants_of=np.tile(
+                np.append(np.zeros(plan.constants), self.program.data), (WIDTH, 1)
+            ),
             geometry=np.zeros((WIDTH, numbers)),
             stroboscopic=np.zeros((WIDTH, 2 * LONGEST_RECURRENCE, 2 * own)),
             agreements=np.zeros((WIDTH, LONGEST_RECURRENCE + 1), dtype=np.int64),
@@ -252,26 +295,45 @@ class Lanes:
             polynomial=np.zeros(SERIES_LENGTH + 2),
             gap=np.zeros(SERIES_LENGTH + 2),
             impact_space=self._impact_space() if self.several else None,
-            work=Work(nothing, np.zeros(0), nothing, (nothing, nothing), nothing, np.zeros(0), nothing, nothing, control),
+            work=Work(
+                nothing,
+                np.zeros(0),
+                nothing,
+                (nothing, nothing),
+                nothing,
+                np.zeros(0),
+                nothing,
+                nothing,
+                control,
+            ),
         )
 
     def _impact_space(self) -> tuple[Any, ...]:
         """Room for an impact in a model with several contacts."""
-        own, count, rows = self.own, len(self.program.trace.signs), self._contact_rows()
-        solver = solver_arrays(self.plan.local, count, 0, rows[count:], self.program.trace.first_order)
+        own = self.own
+        count = len(self.program.trace.signs)
+        rows = self._contact_rows()
+        solver = solver_arrays(
+            self.plan.local, count, 0, rows[count:], self.program.trace.first_order
+        )
         return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows[:count], solver
 
     def _contact_rows(self) -> np.ndarray:
         """The scalar kernel's rows of contacts and frictions, before a motion has begun."""
         trace = self.program.trace
-        contacts, frictions = len(trace.signs), len(trace.friction_coordinates)
+        contacts = len(trace.signs)
+        frictions = len(trace.friction_coordinates)
         rows = np.zeros((contacts + frictions, len(FrictionColumn)), dtype=np.int64)
-        rows[contacts:, FrictionColumn.PRESSED] = np.add(trace.friction_contacts or [-1] * frictions, 1)
+        rows[contacts:, FrictionColumn.PRESSED] = np.add(
+            trace.friction_contacts or [-1] * frictions, 1
+        )
         return rows
 
     def _sizes(self) -> LaneSizes:
         """The numbers of the structure, and of what is asked for."""
-        sizes, trace, plan = self.program.structure.sizes, self.program.trace, self.plan
+        sizes = self.program.structure.sizes
+        trace = self.program.trace
+        plan = self.plan
         return LaneSizes(
             own=sizes.own,
             local=sizes.local,
@@ -298,7 +360,9 @@ class Lanes:
             constant_guards=plan.constant_guards,
             contacts=len(trace.signs),
             frictions=len(trace.friction_coordinates),
-            coordinates=np.array([*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64),
+            coordinates=np.array(
+                [*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64
+            ),
             signs=np.array(trace.signs, dtype=np.int64),
         )
 
@@ -315,17 +379,22 @@ class Lanes:
         return Code(series, impact, field, constants, geometry, one_free[0] if one_free else None)
 
     def _memory(self) -> np.ndarray:
-        """The lanes' memory, aligned such that each vector lies within one cache line; otherwise every load would touch two."""
-        size, line = self.plan.end * WIDTH, CACHE_LINE // 8
+        """The lanes' memory, aligned such that each vector lies within one cache line; otherwise
+        every load would touch two.
+        """
+        size = self.plan.end * WIDTH
+        line = CACHE_LINE // 8
         buffer = np.zeros(size + line)
         start = -(buffer.ctypes.data // 8) % line
         return buffer[start : start + size]
 
 
 def lane_order(tol: float) -> int:
-    """The order of series in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see `kernel/layout.py`).
+    """The order of series in lanes: 14 at 1e-6, 18 at 1e-10, 22 at 1e-14; always even (see
+    `kernel/layout.py`).
 
-    An order higher by two takes up to 5 % less time. But if the last coefficients nearly vanish, a step is too long by some
-    factor, and the error too large by this factor to the power of the order.
+    An order higher by two takes up to 5 % less time. But if the last coefficients nearly vanish, a
+    step is too long by some factor, and the error too large by this factor to the power of the
+    order.
     """
     return 2 * math.ceil((7 - math.log10(tol)) / 2 - 1e-9)

@@ -1,1 +1,3 @@
-"""Where motions lead: recurrence, the orbit that a motion approaches, and releases from rest by the load."""
+"""Where motions lead: recurrence, the orbit that a motion approaches, and releases from rest by the
+load.
+"""

@@ -1,4 +1,6 @@
-"""The instants at which a periodic load pulls a resting system off its contact; they alone determine the motion after rest."""
+"""The instants at which a periodic load pulls a resting system off its contact; they alone
+determine the motion after rest.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from saltus.checks import answered
 from saltus.errors import ParameterError
 from saltus.systems import ContactModel, Load, System, check_system, mass_and_force
 
-RELEASE_SAMPLES = 64  # per forcing period and order of the highest harmonic: the contact acceleration has no narrower peak
+# per forcing period and order of the highest harmonic: the contact acceleration has no narrower
+# peak
+RELEASE_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,8 @@ class Release:
     time
         Its instant in the forcing period, in [0, T).
     side
-        The side on which the gap then opens; with several contacts the number of the contact, from 1 on.
+        The side on which the gap then opens; with several contacts the number of the contact, from
+        1 on.
     peak
         The largest pull before the acceleration presses again; where it is 0 the release is lost.
 
@@ -41,7 +46,8 @@ class Release:
     peak: float
 
     def peak_near(self, system: System, phase: float) -> float:
-        """The first peak of the contact acceleration on its side after a phase of the load, even if it does not pull there.
+        """The first peak of the contact acceleration on its side after a phase of the load, even if
+        it does not pull there.
 
         Parameters
         ----------
@@ -52,25 +58,39 @@ class Release:
         """
         period = system.load.period
         assert period is not None
-        after = [((2.0 * np.pi * t / period - phase) % (2.0 * np.pi), value) for t, value in _peaks(system, self.side)]
+        after = [
+            ((2.0 * np.pi * t / period - phase) % (2.0 * np.pi), value)
+            for t, value in _peaks(system, self.side)
+        ]
         return min(after)[1] if after else float("-inf")
 
 
 def contact_pull(system: System, side: int) -> Callable[[Any], Any]:
-    """The second derivative of the gap of a system at rest at the contact, on a side, as a function of time.
+    """The second derivative of the gap of a system at rest at the contact, on a side, as a function
+    of time.
 
-    The system stays at rest while it is negative on all sides. With several contacts `side` is the number of a contact, from 1
-    on, and the function is the force along the contact's sign with all contacts closed.
+    The system stays at rest while it is negative on all sides. With several contacts `side` is the
+    number of a contact, from 1 on, and the function is the force along the contact's sign with all
+    contacts closed.
     """
-    model, load = system.model, system.load
+    model = system.model
+    load = system.load
     if model.contacts:
-        held, names = model.contacts[side - 1], model.coordinates
+        held = model.contacts[side - 1]
+        names = model.coordinates
         place = {contact.coordinate: float(contact.position) for contact in model.contacts}
-        position, i = [place.get(name, 0.0) for name in names], names.index(held.coordinate)
-        return lambda t: held.sign * np.asarray(_force_at_rest(system.contact_model, t, position, load)[i], dtype=float)
-    contact, one = float(model.contact), system.one_contact
+        position = [place.get(name, 0.0) for name in names]
+        i = names.index(held.coordinate)
+        return lambda t: (
+            held.sign
+            * np.asarray(_force_at_rest(system.contact_model, t, position, load)[i], dtype=float)
+        )
+    contact = float(model.contact)
+    one = system.one_contact
     rate = float(one.gap(contact + 1.0, side)) - float(one.gap(contact, side))
-    return lambda t: rate * np.asarray(model.acceleration(t, contact, 0.0, float(side), load), dtype=float)
+    return lambda t: (
+        rate * np.asarray(model.acceleration(t, contact, 0.0, float(side), load), dtype=float)
+    )
 
 
 def _force_at_rest(model: ContactModel, t: Any, position: list[float], load: Load) -> list[Any]:
@@ -82,11 +102,11 @@ def _force_at_rest(model: ContactModel, t: Any, position: list[float], load: Loa
 
 @answered
 def load_releases(system: System) -> tuple[Release, ...]:
-    """The releases of one forcing period, in the order of time; none for a load that always presses, always pulls or has no
-    period.
+    """The releases of one forcing period, in the order of time; none for a load that always
+    presses, always pulls or has no period.
 
-    For load (i) of the metainterface with equal layers, the releases to side +1 are at sin(Omega t) = Hcr / Hhat, with
-    Hcr = abs(V / tan(beta0)), and those to side -1 half a period later.
+    For load (i) of the metainterface with equal layers, the releases to side +1 are at sin(Omega t)
+    = Hcr / Hhat, with Hcr = abs(V / tan(beta0)), and those to side -1 half a period later.
 
     Parameters
     ----------
@@ -102,7 +122,11 @@ def load_releases(system: System) -> tuple[Release, ...]:
     check_system(system, "load_releases", several_contacts=True)
     if system.dependent:
         raise ParameterError(
-            "load_releases is for systems whose contacts can all be closed, and here gaps depend on others", "system"
+            (
+                "load_releases is for systems whose contacts can all be closed, and here gaps depend "
+                "on others"
+            ),
+            "system",
         )
     system = system.in_gap_coordinates
     if system.load.period is None:
@@ -115,7 +139,11 @@ def load_releases(system: System) -> tuple[Release, ...]:
 def _grid(system: System) -> np.ndarray:
     period = system.load.period
     assert period is not None
-    orders = [getattr(term, "order", 1) for s in system.load.channels.values() for term in getattr(s, "terms", (s,))]
+    orders = [
+        getattr(term, "order", 1)
+        for s in system.load.channels.values()
+        for term in getattr(s, "terms", (s,))
+    ]
     count = RELEASE_SAMPLES * max(orders, default=1)
     return np.arange(count) * (period / count)
 
@@ -124,9 +152,11 @@ def _peaks(system: System, side: int) -> list[tuple[float, float]]:
     """The maxima of the contact acceleration on a side: their times and values."""
     from scipy.optimize import minimize_scalar
 
-    pull, times = contact_pull(system, side), _grid(system)
+    pull = contact_pull(system, side)
+    times = _grid(system)
     values = np.broadcast_to(pull(times), times.shape)
-    step, peaks = times[1], []
+    step = times[1]
+    peaks = []
     for i in np.flatnonzero((values >= np.roll(values, 1)) & (values > np.roll(values, -1))):
         best = minimize_scalar(lambda t: -float(pull(t)), bounds=(times[i] - step, times[i] + step), method="bounded",
                                options={"xatol": 1e-10 * step})  # fmt: skip
@@ -136,19 +166,34 @@ def _peaks(system: System, side: int) -> list[tuple[float, float]]:
 
 
 def _of_side(system: System, side: int) -> list[Release]:
-    """The releases to a side: the rising roots before peaks that pull, each once, with the largest of its peaks."""
+    """The releases to a side: the rising roots before peaks that pull, each once, with the largest
+    of its peaks.
+    """
     from scipy.optimize import brentq
 
-    pull, period, times = contact_pull(system, side), system.load.period, _grid(system)
+    pull = contact_pull(system, side)
+    period = system.load.period
+    times = _grid(system)
     assert period is not None
-    step, roots = times[1], dict[float, float]()
+    step = times[1]
+    roots = dict[float, float]()
     for time, peak in _peaks(system, side):
         if peak <= 0.0:
             continue
         low = next((t for t in time - step * np.arange(1, times.size) if pull(t) < 0.0), None)
         if low is None:
             continue
-        root = float(brentq(lambda t: float(pull(t)), low, time, xtol=1e-15 * period, rtol=1e-15)) % period
-        known = next((t for t in roots if abs((t - root + 0.5 * period) % period - 0.5 * period) < 1e-9 * period), root)
+        root = (
+            float(brentq(lambda t: float(pull(t)), low, time, xtol=1e-15 * period, rtol=1e-15))
+            % period
+        )
+        known = next(
+            (
+                t
+                for t in roots
+                if abs((t - root + 0.5 * period) % period - 0.5 * period) < 1e-9 * period
+            ),
+            root,
+        )
         roots[known] = max(peak, roots.get(known, 0.0))
     return [Release(time, side, peak) for time, peak in roots.items()]

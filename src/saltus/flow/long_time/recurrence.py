@@ -1,8 +1,9 @@
 """Recurrence: many motions are followed until each rests, repeats itself or the time is up.
 
-Orbits, attractors, charts and diagrams all use this one engine to find where motions end. A motion recurs with the period q if
-its stroboscopic states, those at phase 0 of the load, come back to themselves after q forcing periods. The orbit that a motion
-approaches is extrapolated from them (`approached`).
+Orbits, attractors, charts and diagrams all use this one engine to find where motions end. A motion
+recurs with the period q if its stroboscopic states, those at phase 0 of the load, come back to
+themselves after q forcing periods. The orbit that a motion approaches is extrapolated from them
+(`approached`).
 """
 
 from __future__ import annotations
@@ -33,17 +34,22 @@ if TYPE_CHECKING:
 class ApproachSettings:
     """When the states of a motion are taken to approach an orbit."""
 
-    # The largest error with which the map may predict the last step between two states, relative to that step. The extrapolated
-    # orbit has an error of about this share of the way to it; the next extrapolation begins nearer, with the square of this.
+    # The largest error with which the map may predict the last step between two states, relative to
+    # that step. The extrapolated orbit has an error of about this share of the way to it; the next
+    # extrapolation begins nearer, with the square of this.
     linear: float = 0.02
-    # The largest multiplier of the map. It excludes extrapolation to orbits that are not stable: with an error of 2 % the map
-    # cannot show 0.95 where a multiplier is 1, and no state is moved along an unstable direction.
+    # The largest multiplier of the map. It excludes extrapolation to orbits that are not stable:
+    # with an error of 2 % the map cannot show 0.95 where a multiplier is 1, and no state is moved
+    # along an unstable direction.
     multiplier: float = 0.95
-    # The longest way to the orbit, as a share of the size of the states: a longer one may lead into another basin.
+    # The longest way to the orbit, as a share of the size of the states: a longer one may lead into
+    # another basin.
     reach: float = 0.2
-    # Steps below this share of the size of the states consist mostly of rounding and of the errors of the motions.
+    # Steps below this share of the size of the states consist mostly of rounding and of the errors
+    # of the motions.
     least: float = 1e-9
-    # Two steps are parallel if the sine of the angle between them is smaller than this: they then give one multiplier, not two.
+    # Two steps are parallel if the sine of the angle between them is smaller than this: they then
+    # give one multiplier, not two.
     parallel: float = 1e-3
 
 
@@ -51,25 +57,30 @@ SETTINGS = ApproachSettings()
 
 
 def approached(states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray]:
-    """The states on the orbits that motions approach, and the periods of these orbits; 0 for a motion that approaches none.
+    """The states on the orbits that motions approach, and the periods of these orbits; 0 for a
+    motion that approaches none.
 
-    Let s_k be states q forcing periods apart, d_k = s_k - s_(k-1), and M the linear map that takes d_1 to d_2 and d_2 to d_3. If
-    M also predicts the last step, d_4 = M d_3, and is a contraction, the orbit is at s_4 + M (1 - M)^-1 d_4. The shortest period
-    q up to `longest` is taken for which this holds; it needs 4 q + 1 states.
+    Let s_k be states q forcing periods apart, d_k = s_k - s_(k-1), and M the linear map that takes
+    d_1 to d_2 and d_2 to d_3. If M also predicts the last step, d_4 = M d_3, and is a contraction,
+    the orbit is at s_4 + M (1 - M)^-1 d_4. The shortest period q up to `longest` is taken for which
+    this holds; it needs 4 q + 1 states.
 
     Parameters
     ----------
     states
-        Coordinate and velocity at the ends of the last forcing periods, in the order of time, (n, kept, 2).
+        Coordinate and velocity at the ends of the last forcing periods, in the order of time, (n,
+        kept, 2).
     longest
         The longest period that is looked for.
 
     Returns
     -------
     tuple[np.ndarray, np.ndarray]
-        The states on the orbits, or the last states of motions that approach none, (n, 2); and the periods, (n,).
+        The states on the orbits, or the last states of motions that approach none, (n, 2); and the
+        periods, (n,).
     """
-    limit, period = states[:, -1].copy(), np.zeros(len(states), dtype=int)
+    limit = states[:, -1].copy()
+    period = np.zeros(len(states), dtype=int)
     size = np.nanmax(np.abs(states), axis=1, initial=0.0).max(axis=1)
     for q in range(1, min(longest, (states.shape[1] - 1) // 4) + 1):
         left = np.flatnonzero(period == 0)
@@ -79,26 +90,37 @@ def approached(states: np.ndarray, longest: int) -> tuple[np.ndarray, np.ndarray
 
 
 def _limits(states: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The states that sequences of five states, (n, 5, 2), approach, and whether they do approach them."""
+    """The states that sequences of five states, (n, 5, 2), approach, and whether they do approach
+    them.
+    """
     steps = np.diff(states, axis=1)
     length = np.linalg.norm(steps, axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
         m = _maps(steps, length)
         error = np.linalg.norm(np.einsum("nij,nj->ni", m, steps[:, 2]) - steps[:, 3], axis=1)
-        inverse, moved = np.eye(2) - m, np.einsum("nij,nj->ni", m, steps[:, 3])
+        inverse = np.eye(2) - m
+        moved = np.einsum("nij,nj->ni", m, steps[:, 3])
         way = np.stack([_det(moved, inverse[:, :, 1]), _det(inverse[:, :, 0], moved)], axis=1)
         way /= _det(inverse[:, :, 0], inverse[:, :, 1])[:, None]
         good = (error <= SETTINGS.linear * length[:, 3]) & (_radius(m) <= SETTINGS.multiplier)
-        good &= (np.linalg.norm(way, axis=1) <= SETTINGS.reach * size) & (length[:, 3] > SETTINGS.least * size)
+        good &= (np.linalg.norm(way, axis=1) <= SETTINGS.reach * size) & (
+            length[:, 3] > SETTINGS.least * size
+        )
     return states[:, -1] + way, good
 
 
 def _maps(steps: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """The linear maps (n, 2, 2) that take the first of the steps (n, 4, 2) to the second, and the second to the third. If the
-    first two are parallel, the map takes the second step to the third, and directions orthogonal to the second to 0."""
-    one, two, three = steps[:, 0], steps[:, 1], steps[:, 2]
+    """The linear maps (n, 2, 2) that take the first of the steps (n, 4, 2) to the second, and the
+    second to the third. If the first two are parallel, the map takes the second step to the third,
+    and directions orthogonal to the second to 0."""
+    one = steps[:, 0]
+    two = steps[:, 1]
+    three = steps[:, 2]
     area = _det(one, two)
-    inverse = np.stack([np.stack([two[:, 1], -two[:, 0]], axis=1), np.stack([-one[:, 1], one[:, 0]], axis=1)], axis=1)
+    inverse = np.stack(
+        [np.stack([two[:, 1], -two[:, 0]], axis=1), np.stack([-one[:, 1], one[:, 0]], axis=1)],
+        axis=1,
+    )
     both = np.einsum("nij,njk->nik", np.stack([two, three], axis=2), inverse) / area[:, None, None]
     single = np.einsum("ni,nj->nij", three, two) / (length[:, 1] ** 2)[:, None, None]
     parallel = np.abs(area) <= SETTINGS.parallel * length[:, 0] * length[:, 1]
@@ -112,26 +134,36 @@ def _det(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def _radius(m: np.ndarray) -> np.ndarray:
     """The largest absolute values of the eigenvalues of matrices (n, 2, 2)."""
-    half, det = 0.5 * (m[:, 0, 0] + m[:, 1, 1]), _det(m[:, :, 0], m[:, :, 1])
+    half = 0.5 * (m[:, 0, 0] + m[:, 1, 1])
+    det = _det(m[:, :, 0], m[:, :, 1])
     spread = half**2 - det
-    return np.asarray(np.where(spread >= 0.0, np.abs(half) + np.sqrt(np.maximum(spread, 0.0)), np.sqrt(np.maximum(det, 0.0))))
+    return np.asarray(
+        np.where(
+            spread >= 0.0,
+            np.abs(half) + np.sqrt(np.maximum(spread, 0.0)),
+            np.sqrt(np.maximum(det, 0.0)),
+        )
+    )
 
 
 @dataclass(frozen=True)
 class RecurrenceSettings:
     """When a motion counts as periodic, in orbits, attractors, charts and diagrams."""
 
-    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in flow/lanes/memory.py). A motion has settled
-    # with the period q if 2 q + 2 successive states agree with those q forcing periods before to within `RECURRENT` (same file):
-    # 1e-10 of their size, or of 1 where they are smaller.
+    # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in
+    # flow/lanes/memory.py). A motion has settled with the period q if 2 q + 2 successive states
+    # agree with those q forcing periods before to within `RECURRENT` (same file): 1e-10 of their
+    # size, or of 1 where they are smaller.
     compiled_max_period: int = 16
-    # Longer periods are looked for in the last states of a motion that was followed to the end: the states of one period must
-    # agree with those of the period before to within this. It is larger because only two periods are compared.
+    # Longer periods are looked for in the last states of a motion that was followed to the end: the
+    # states of one period must agree with those of the period before to within this. It is larger
+    # because only two periods are compared.
     long_agreement: float = 1e-9
-    # A motion that was followed to the end counts as periodic if its last state is this near to the one a period before: Newton's
-    # method then solves for the orbit, and fails if there is none.
+    # A motion that was followed to the end counts as periodic if its last state is this near to the
+    # one a period before: Newton's method then solves for the orbit, and fails if there is none.
     near_return: float = 1e-6
-    # The error of one step, relative to the state: a tenth of the tolerance with which the compiled lanes compare states.
+    # The error of one step, relative to the state: a tenth of the tolerance with which the compiled
+    # lanes compare states.
     tol: float = 1e-11
 
 
@@ -139,7 +171,8 @@ RECURRENCE = RecurrenceSettings()
 
 
 class Ending(NumberedSentence):
-    """What a motion ends on, as far as it is known: the answer of simulations, verdicts, charts and diagrams alike.
+    """What a motion ends on, as far as it is known: the answer of simulations, verdicts, charts and
+    diagrams alike.
 
     `str` gives the word, `sentence` the meaning.
 
@@ -154,7 +187,10 @@ class Ending(NumberedSentence):
     REST = 2, "it is at rest at the contact for all later loads"
     PERIODIC = 3, "it repeats itself"
     ENDED = 4, "it is ended by a margin of the model, or cannot go on"
-    QUASI_PERIODIC = 5, "it is on a torus: it does not repeat itself, and motions beside it stay there"
+    QUASI_PERIODIC = (
+        5,
+        "it is on a torus: it does not repeat itself, and motions beside it stay there",
+    )
     CHAOTIC = 6, "motions beside it part from it for good, and none of them settles"
     TRANSIENT = 7, "it looks like chaos for a while, but motions beside it settle"
 
@@ -164,17 +200,23 @@ class Ending(NumberedSentence):
 
 @dataclass(frozen=True, eq=False)
 class Recurrence:
-    """The outcomes of many motions, one row for each; a state has the coordinates, then their velocities, d numbers in all."""
+    """The outcomes of many motions, one row for each; a state has the coordinates, then their
+    velocities, d numbers in all.
+    """
 
     outcome: np.ndarray  # (n,): an `Ending` for each
-    period: np.ndarray  # (n,): forcing periods after which the motion repeats itself; 0 if it does not
+    # (n,): forcing periods after which the motion repeats itself; 0 if it does not
+    period: np.ndarray
     periods: np.ndarray  # (n,): forcing periods for which it was followed
     last: np.ndarray  # (n, d): the state at the end
-    states: np.ndarray  # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
-    # (n, kept, 2): largest and smallest of all coordinates in each of these periods; nan where they were not recorded
+    # (n, kept, d): the stroboscopic states, the last one last, nan where there were fewer
+    states: np.ndarray
+    # (n, kept, 2): largest and smallest of all coordinates in each of these periods; nan where they
+    # were not recorded
     extrema: np.ndarray | None = None
     impact_counts: np.ndarray | None = None  # (n, kept): impacts in each of these periods
-    speeds: np.ndarray | None = None  # (n, kept): the least speed before an impact in each of these periods, inf without
+    # (n, kept): the least speed before an impact in each of these periods, inf without
+    speeds: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.outcome)
@@ -201,32 +243,54 @@ class Recurrence:
 
     @property
     def within_period(self) -> np.ndarray:
-        """Whether each kept forcing period is one of the motion's last `period` ones, (n, kept); all are if it has no period."""
-        kept = max(a.shape[1] for a in (self.states, self.extrema, self.impact_counts, self.speeds) if a is not None)
+        """Whether each kept forcing period is one of the motion's last `period` ones, (n, kept);
+        all are if it has no period.
+        """
+        kept = max(
+            a.shape[1]
+            for a in (self.states, self.extrema, self.impact_counts, self.speeds)
+            if a is not None
+        )
         length = np.where(self.period > 0, self.period, kept)
         return np.asarray(np.arange(kept)[::-1] < length[:, None])
 
     @property
     def highest(self) -> np.ndarray:
-        """The largest of all coordinates over the motion's period, (n,); -inf where none was recorded."""
+        """The largest of all coordinates over the motion's period, (n,); -inf where none was
+        recorded.
+        """
         assert self.extrema is not None
-        return np.asarray(np.nanmax(np.where(self.within_period, self.extrema[:, :, 0], np.nan), axis=1, initial=-np.inf))
+        return np.asarray(
+            np.nanmax(
+                np.where(self.within_period, self.extrema[:, :, 0], np.nan), axis=1, initial=-np.inf
+            )
+        )
 
     @property
     def lowest(self) -> np.ndarray:
-        """The smallest of all coordinates over the motion's period, (n,); inf where none was recorded."""
+        """The smallest of all coordinates over the motion's period, (n,); inf where none was
+        recorded.
+        """
         assert self.extrema is not None
-        return np.asarray(np.nanmin(np.where(self.within_period, self.extrema[:, :, 1], np.nan), axis=1, initial=np.inf))
+        return np.asarray(
+            np.nanmin(
+                np.where(self.within_period, self.extrema[:, :, 1], np.nan), axis=1, initial=np.inf
+            )
+        )
 
     @property
     def impact_count(self) -> np.ndarray:
         """The impacts over the motion's period, (n,)."""
         assert self.impact_counts is not None
-        return np.asarray(np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int))
+        return np.asarray(
+            np.nansum(np.where(self.within_period, self.impact_counts, 0.0), axis=1).astype(int)
+        )
 
     @property
     def slowest(self) -> np.ndarray:
-        """The least speed before an impact over the motion's period, (n,); 0 without impacts, and where it was not sampled."""
+        """The least speed before an impact over the motion's period, (n,); 0 without impacts, and
+        where it was not sampled.
+        """
         if self.speeds is None:
             return np.zeros(len(self))
         least = np.nanmin(np.where(self.within_period, self.speeds, np.nan), axis=1, initial=np.inf)
@@ -235,11 +299,19 @@ class Recurrence:
     def only(self, rows: Any) -> Recurrence:
         """The results of some of the motions."""
         columns = {part.name: getattr(self, part.name) for part in fields(self)}
-        return replace(self, **{name: values[rows] for name, values in columns.items() if values is not None})
+        return replace(
+            self, **{name: values[rows] for name, values in columns.items() if values is not None}
+        )
 
     def after(self, periods: int, states: np.ndarray) -> Recurrence:
-        """These results as those of longer motions, which were followed for `periods` before and then had these states."""
-        return replace(self, periods=self.periods + periods, states=np.concatenate([states, self.states], axis=1))
+        """These results as those of longer motions, which were followed for `periods` before and
+        then had these states.
+        """
+        return replace(
+            self,
+            periods=self.periods + periods,
+            states=np.concatenate([states, self.states], axis=1),
+        )
 
 
 def find_recurrence(
@@ -261,10 +333,11 @@ def find_recurrence(
     progress: Progress = silent,
     settings: RecurrenceSettings = RECURRENCE,
 ) -> Recurrence:
-    """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time is up.
+    """Follow motions from states at phase 0 until they rest for good, repeat themselves or the time
+    is up.
 
-    A motion at the contact is at rest for good if it is proved to be captured, or if the load never pulls there. If motions have
-    parameters of their own, only the proof counts.
+    A motion at the contact is at rest for good if it is proved to be captured, or if the load never
+    pulls there. If motions have parameters of their own, only the proof counts.
 
     Parameters
     ----------
@@ -277,19 +350,22 @@ def find_recurrence(
     parameters
         Numbers by dotted path, (n,) each, in place of the system's.
     captured
-        The speeds below which the motions are proved to be captured, (n,), if they are known (`captured_between`); else nan.
+        The speeds below which the motions are proved to be captured, (n,), if they are known
+        (`captured_between`); else nan.
     max_period
-        The longest period that is looked for. Periods above 16 are found only if `kept` is more than twice as large.
+        The longest period that is looked for. Periods above 16 are found only if `kept` is more
+        than twice as large.
     kept
         How many of the last stroboscopic states are kept, by default all; 0 for none.
     extrema, impact_count, speed
         Whether these are recorded, over max(kept, max_period) of the last forcing periods.
     from_start
-        Whether extrema are recorded from the start; they always are if a limit of the model may end a motion. Otherwise recording
-        begins when a motion begins to repeat itself or its time is nearly up, and extrema are nan for motions that come to rest
-        for good or cannot go on.
+        Whether extrema are recorded from the start; they always are if a limit of the model may end
+        a motion. Otherwise recording begins when a motion begins to repeat itself or its time is
+        nearly up, and extrema are nan for motions that come to rest for good or cannot go on.
     stop_early
-        With False every motion is followed for all periods, and its period is read from the last states (`near_return`).
+        With False every motion is followed for all periods, and its period is read from the last
+        states (`near_return`).
     tol
         The error that one step may make.
     threads
@@ -297,8 +373,13 @@ def find_recurrence(
     progress
         Called with the fraction done.
     """
-    limits, beside = limits_of(system, ()), extrema and system.in_gap_coordinates is not system
-    sampled = {Sample.STATE: kept != 0, Sample.EXTREMA: extrema and not beside, Sample.IMPACT_COUNT: impact_count}
+    limits = limits_of(system, ())
+    beside = extrema and system.in_gap_coordinates is not system
+    sampled = {
+        Sample.STATE: kept != 0,
+        Sample.EXTREMA: extrema and not beside,
+        Sample.IMPACT_COUNT: impact_count,
+    }
     sampled[Sample.SPEED] = speed and system.model.names_its_contacts
     size = periods if kept is None else kept
     options = EnsembleOptions(
@@ -312,15 +393,24 @@ def find_recurrence(
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
-    result = run_ensemble(system, inputs, options, read_threads(threads), progress, last=last, captured=captured)
+    result = run_ensemble(
+        system, inputs, options, read_threads(threads), progress, last=last, captured=captured
+    )
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
     if found.extrema is not None and not options.from_start:
         found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
-    found = _with_periods(found, result.recurrence_period if stop_early else None, max_period, settings)
+    found = _with_periods(
+        found, result.recurrence_period if stop_early else None, max_period, settings
+    )
     if not beside:
         return found
     gone = found.ended if options.from_start else found.ended | found.rest
-    return replace(found, extrema=result.extrema_later(np.where(gone, 0, np.where(found.period, found.period, last)), last))
+    return replace(
+        found,
+        extrema=result.extrema_later(
+            np.where(gone, 0, np.where(found.period, found.period, last)), last
+        ),
+    )
 
 
 def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
@@ -339,12 +429,15 @@ def ensemble_from(
     until: tuple[str, ...] = (),
     derivatives: bool = False,
 ) -> EnsembleResult:
-    """The ends of motions from states (n, d) at phase 0 as arrays: making a dataset takes longer than following a few motions.
+    """The ends of motions from states (n, d) at phase 0 as arrays: making a dataset takes longer
+    than following a few motions.
 
     With `derivatives` those to the initial states are computed, too.
     """
     paths = () if derivatives else None
-    options = EnsembleOptions(tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths)
+    options = EnsembleOptions(
+        tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths
+    )
     coordinates, velocity = _as_arguments(system, states)
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
     return run_ensemble(system, inputs, options, read_threads(None), silent)
@@ -352,26 +445,35 @@ def ensemble_from(
 
 def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:
     """States (n, d) as `simulate_many` takes them: coordinates by name, and the velocity."""
-    names, moving = system.model.coordinates, system.model.moving
+    names = system.model.coordinates
+    moving = system.model.moving
     velocities = tuple(states[:, len(names) + i] for i in range(len(moving)))
-    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(moving) == 1 else velocities
+    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(
+        moving
+    ) == 1 else velocities
 
 
 def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
     """The states at the end of an ensemble's motions, (..., d)."""
-    return np.stack([result[name].values for name in state_names(system.model.coordinates)], axis=-1)
+    return np.stack(
+        [result[name].values for name in state_names(system.model.coordinates)], axis=-1
+    )
 
 
 def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
-    """The distance of the last of the states (..., kept, d) from those q = 1, 2, ... periods before, (..., max_period or
-    fewer)."""
+    """The distance of the last of the states (..., kept, d) from those q = 1, 2, ... periods
+    before, (..., max_period or fewer)."""
     count = min(max_period, states.shape[-2] - 1)
     apart = np.abs(states[..., -1:, :] - states[..., -1 - count : -1, :]).max(axis=-1)
     return np.asarray(apart[..., ::-1])
 
 
-def return_period(states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return) -> np.ndarray:
-    """The shortest period after which the last of the states (..., kept, d) has come back to within a distance; 0 if none has."""
+def return_period(
+    states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return
+) -> np.ndarray:
+    """The shortest period after which the last of the states (..., kept, d) has come back to within
+    a distance; 0 if none has.
+    """
     near = return_distances(states, max_period) < within
     if not near.shape[-1]:  # one state alone
         return np.zeros(near.shape[:-1], dtype=int)
@@ -385,9 +487,13 @@ def nearest_return(states: np.ndarray, max_period: int) -> int:
 
 def _read(result: EnsembleResult) -> Recurrence:
     """The records of the motions; their outcomes are filled in later."""
-    last, samples = result.last, result.samples
+    last = result.last
+    samples = result.samples
     assert result.periods is not None
-    columns = {kind: samples[kind][:, :, 0] if kind in samples else None for kind in (Sample.IMPACT_COUNT, Sample.SPEED)}
+    columns = {
+        kind: samples[kind][:, :, 0] if kind in samples else None
+        for kind in (Sample.IMPACT_COUNT, Sample.SPEED)
+    }
     return Recurrence(
         outcome=np.full(len(last), Ending.UNDECIDED, dtype=np.int8),
         period=np.zeros(len(last), dtype=int),
@@ -412,18 +518,24 @@ def _outcome(result: EnsembleResult, varied: bool) -> np.ndarray:
 
 
 def _rest_lasts(system: System) -> bool:
-    """Whether it is known that the load never pulls a system off its rest; with several contacts, each must hold one
-    coordinate."""
+    """Whether it is known that the load never pulls a system off its rest; with several contacts,
+    each must hold one coordinate."""
     system = system.in_gap_coordinates
-    contacts, names = system.model.contacts, system.model.coordinates
+    contacts = system.model.contacts
+    names = system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
     known &= not (system.model.frictions or system.model.surfaces or system.dependent)
     return known and not load_releases(system)
 
 
-def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings) -> Recurrence:
-    """The results with the periods that the compiled lanes have found, or that the kept states show."""
-    outcome, period = found.outcome.copy(), found.period.copy()
+def _with_periods(
+    found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings
+) -> Recurrence:
+    """The results with the periods that the compiled lanes have found, or that the kept states
+    show.
+    """
+    outcome = found.outcome.copy()
+    period = found.period.copy()
     if compiled is None:
         period[:] = return_period(found.states, max_period, settings.near_return)
     else:
@@ -437,7 +549,9 @@ def _with_periods(found: Recurrence, compiled: Any, max_period: int, settings: R
 
 
 def _long_period(states: np.ndarray, max_period: int, settings: RecurrenceSettings) -> int:
-    """The period, longer than those that compiled lanes look for, with which the last states (kept, d) repeat; 0 without one."""
+    """The period, longer than those that compiled lanes look for, with which the last states (kept,
+    d) repeat; 0 without one.
+    """
     for q in range(settings.compiled_max_period + 1, min(max_period, len(states) // 2 - 1) + 1):
         if np.abs(states[-q:] - states[-2 * q : -q]).max() < settings.long_agreement:
             return q

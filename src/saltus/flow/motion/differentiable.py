@@ -1,5 +1,5 @@
-"""Motions as functions of JAX and of PyTorch, with exact derivatives in both modes. These are imported when such a function is
-first called."""
+"""Motions as functions of JAX and of PyTorch, with exact derivatives in both modes. These are
+imported when such a function is first called."""
 
 from __future__ import annotations
 
@@ -34,27 +34,32 @@ def to_jax(
     side: int | None = None,
     stop_at: Iterable[str] = (),
 ) -> Callable[[Mapping[str, Any], Any], Any]:
-    """The state at the end of a motion, or its states at given times, as a function of JAX of parameters and of the start.
+    """The state at the end of a motion, or its states at given times, as a function of JAX of
+    parameters and of the start.
 
-    The function takes numbers of the system by their dotted paths and the state at the start, coordinates and then velocities,
+    The function takes numbers of the system by their dotted paths and the state at the start,
+    coordinates and then velocities,
 
         x = function({"model.damping": 0.1, "impact.e": 0.9}, [0.3, 0.0]),
 
-    and gives the state at the end, (2 n,), or those at m `times`, (m, 2 n). Its derivatives are those of `sensitivities`,
-    through all impacts: dx = (dx/dx_0) dx_0 + (dx/dc) dc, and the transpose of this. It may stand in `jax.jit`, `grad`, `jvp`,
-    `jacfwd` and `jacrev`. In `vmap` the motions are followed together by `simulate_many`, but one after the other for states at
-    `times`, and for derivatives of systems whose contacts keep sums of coordinates. Second derivatives are refused. Where a
-    motion has no derivative, it is nan.
+    and gives the state at the end, (2 n,), or those at m `times`, (m, 2 n). Its derivatives are
+    those of `sensitivities`, through all impacts: dx = (dx/dx_0) dx_0 + (dx/dc) dc, and the
+    transpose of this. It may stand in `jax.jit`, `grad`, `jvp`, `jacfwd` and `jacrev`. In `vmap`
+    the motions are followed together by `simulate_many`, but one after the other for states at
+    `times`, and for derivatives of systems whose contacts keep sums of coordinates. Second
+    derivatives are refused. Where a motion has no derivative, it is nan.
 
-    JAX must compute with 64 bits, `jax.config.update("jax_enable_x64", True)`. A motion that is refused, or that ends before one
-    of the `times`, raises JAX's `JaxRuntimeError` with the sentence of ours in its text.
+    JAX must compute with 64 bits, `jax.config.update("jax_enable_x64", True)`. A motion that is
+    refused, or that ends before one of the `times`, raises JAX's `JaxRuntimeError` with the
+    sentence of ours in its text.
 
     Parameters
     ----------
     system
         What moves; numbers that the function is not given are those of this system.
     periods, duration
-        The length of the motion, for its state at the end; after a number of `periods` the end moves with the load's frequency.
+        The length of the motion, for its state at the end; after a number of `periods` the end
+        moves with the load's frequency.
     times
         In place of a length, the dimensionless times of the states; these are fixed.
     tol, time, side, stop_at
@@ -68,8 +73,8 @@ def to_jax(
     Raises
     ------
     ParameterError
-        An argument has no meaning. The function raises it where JAX is not installed or computes with 32 bits, where a path
-        leads to no number, and where the start is of another shape.
+        An argument has no meaning. The function raises it where JAX is not installed or computes
+        with 32 bits, where a path leads to no number, and where the start is of another shape.
 
     Examples
     --------
@@ -91,26 +96,31 @@ def to_torch(
     side: int | None = None,
     stop_at: Iterable[str] = (),
 ) -> Callable[[Mapping[str, Any], Any], Any]:
-    """The state at the end of a motion, or its states at given times, as a function of PyTorch of parameters and of the start.
+    """The state at the end of a motion, or its states at given times, as a function of PyTorch of
+    parameters and of the start.
 
-    The function takes numbers of the system by their dotted paths and the state at the start, coordinates and then velocities,
+    The function takes numbers of the system by their dotted paths and the state at the start,
+    coordinates and then velocities,
 
         x = function({"model.damping": damping, "impact.e": 0.9}, torch.tensor([0.3, 0.0])),
 
-    and gives the state at the end, (2 n,), or those at m `times`, (m, 2 n), in 64 bits and in the processor's memory. Numbers and
-    start may have axes of many motions before their own, which are broadcast; these are followed together by `simulate_many`, as
-    in `torch.vmap`, but one after the other for states at `times`, and for derivatives of systems whose contacts keep sums of
+    and gives the state at the end, (2 n,), or those at m `times`, (m, 2 n), in 64 bits and in the
+    processor's memory. Numbers and start may have axes of many motions before their own, which are
+    broadcast; these are followed together by `simulate_many`, as in `torch.vmap`, but one after the
+    other for states at `times`, and for derivatives of systems whose contacts keep sums of
     coordinates.
 
-    Its derivatives are those of `sensitivities`, through all impacts, in both modes of PyTorch; for them the motion is followed
-    once more. Second derivatives are refused. Where a motion has no derivative, it is nan.
+    Its derivatives are those of `sensitivities`, through all impacts, in both modes of PyTorch; for
+    them the motion is followed once more. Second derivatives are refused. Where a motion has no
+    derivative, it is nan.
 
     Parameters
     ----------
     system
         What moves; numbers that the function is not given are those of this system.
     periods, duration
-        The length of the motion, for its state at the end; after a number of `periods` the end moves with the load's frequency.
+        The length of the motion, for its state at the end; after a number of `periods` the end
+        moves with the load's frequency.
     times
         In place of a length, the dimensionless times of the states; these are fixed.
     tol, time, side, stop_at
@@ -124,8 +134,9 @@ def to_torch(
     Raises
     ------
     ParameterError
-        An argument has no meaning. The function raises it where PyTorch is not installed, where a path leads to no number, where
-        the start is of another shape, and where a motion is refused or ends before one of the `times`.
+        An argument has no meaning. The function raises it where PyTorch is not installed, where a
+        path leads to no number, where the start is of another shape, and where a motion is refused
+        or ends before one of the `times`.
 
     Examples
     --------
@@ -146,20 +157,29 @@ class _StatesFunction:
     request: dict[str, Any]
 
     @classmethod
-    def of(cls, name: str, system: System, times: Any, request: dict[str, Any], stop_at: Any) -> _StatesFunction:
+    def of(
+        cls, name: str, system: System, times: Any, request: dict[str, Any], stop_at: Any
+    ) -> _StatesFunction:
         """The arguments of the public function of this name, checked."""
         check_system(system, name, several_contacts=True)
         check_number("time", time := request["time"])
         if times is not None:
             if request["periods"] is not None or request["duration"] is not None:
-                raise ParameterError("times say how long the motion is; give no periods or duration beside them", "times")
+                raise ParameterError(
+                    "times say how long the motion is; give no periods or duration beside them",
+                    "times",
+                )
             asked = instants(times)
             if not np.isfinite(asked).all() or not (asked >= time).all():
-                raise ParameterError(f"times must be finite and not before the start, {time:g}", "times")
+                raise ParameterError(
+                    f"times must be finite and not before the start, {time:g}", "times"
+                )
             request["duration"] = float(np.max(asked, initial=time)) - time
         request["stop_at"] = check_names("stop_at", stop_at, "margins")
         somewhere = dict.fromkeys(system.model.coordinates, 0.0)
-        MotionRequest(system=system, coordinates=somewhere, velocity=0.0, dense=times is not None, **request)
+        MotionRequest(
+            system=system, coordinates=somewhere, velocity=0.0, dense=times is not None, **request
+        )
         return cls(system, times, request)
 
     @property
@@ -171,7 +191,11 @@ class _StatesFunction:
         """The paths of the values, in a fixed order, checked."""
         if not isinstance(values, Mapping):
             raise ParameterError(
-                f"values must be numbers by dotted paths, {{'model.damping': 0.1}}, got {shown(values)}", "values"
+                (
+                    f"values must be numbers by dotted paths, {{'model.damping': 0.1}}, got "
+                    f"{shown(values)}"
+                ),
+                "values",
             )
         for path in values:
             check_path(self.system, path, "values")
@@ -180,31 +204,50 @@ class _StatesFunction:
     def _check_start(self, shape: tuple[int, ...]) -> None:
         """Refuse a start of another shape, that of one motion."""
         if shape != (size := 2 * len(self.system.model.coordinates),):
-            raise ParameterError(f"start must be {size} numbers, coordinates and then velocities, got {shape}", "start")
+            raise ParameterError(
+                f"start must be {size} numbers, coordinates and then velocities, got {shape}",
+                "start",
+            )
 
-    # --- in JAX --------------------------------------------------------------------------------------------------------------
+    # --- in JAX --------------------------------------------------------------
 
     def in_jax(self, values: Mapping[str, Any], start: Any) -> Any:
-        """The states of the motion from `start`, (2 n,), of the system with `values` by their dotted paths."""
+        """The states of the motion from `start`, (2 n,), of the system with `values` by their
+        dotted paths.
+        """
         jnp = _jax().numpy
         if jnp.result_type(float) != np.float64:
-            raise ParameterError('JAX computes with 32 bits here; first say jax.config.update("jax_enable_x64", True)')
-        paths, state = self._paths(values), jnp.asarray(start, dtype=float)
+            raise ParameterError(
+                'JAX computes with 32 bits here; first say jax.config.update("jax_enable_x64", '
+                "True)"
+            )
+        paths = self._paths(values)
+        state = jnp.asarray(start, dtype=float)
         self._check_start(state.shape)
         return self._of_jax(paths, jnp.array([values[path] for path in paths], dtype=float), state)
 
     @cached_property
     def _of_jax(self) -> Any:
-        """The states as a function of paths, numbers and start, with its rule for derivatives, which JAX transposes."""
+        """The states as a function of paths, numbers and start, with its rule for derivatives,
+        which JAX transposes.
+        """
         jax: Any = _jax()
 
         def outside(function: Any, shapes: Any) -> Callable[..., Any]:
             """A function of this class as JAX calls it, with the shapes of what it gives."""
 
             def call(paths: tuple[str, ...], numbers: Any, start: Any) -> Any:
-                given = jax.tree.map(lambda shape: jax.ShapeDtypeStruct(shape, float), shapes(numbers, start), is_leaf=_is_shape)
+                given = jax.tree.map(
+                    lambda shape: jax.ShapeDtypeStruct(shape, float),
+                    shapes(numbers, start),
+                    is_leaf=_is_shape,
+                )
                 return jax.pure_callback(
-                    lambda *x: function(paths, *map(np.asarray, x)), given, numbers, start, vmap_method="broadcast_all"
+                    lambda *x: function(paths, *map(np.asarray, x)),
+                    given,
+                    numbers,
+                    start,
+                    vmap_method="broadcast_all",
                 )
 
             return call
@@ -212,42 +255,61 @@ class _StatesFunction:
         def rule(paths: tuple[str, ...], given: Any, moved: Any) -> tuple[Any, Any]:
             states, columns = with_columns(paths, *given)
             parts = (columns[..., given[1].size :], columns[..., : given[1].size])
-            moves = [part @ by for part, by in zip(parts, moved, strict=True) if not isinstance(by, Unmoved)]
+            moves = [
+                part @ by
+                for part, by in zip(parts, moved, strict=True)
+                if not isinstance(by, Unmoved)
+            ]
             return states, sum(moves, jax.numpy.zeros_like(states))
 
         def refuse(*_: Any) -> None:
             raise ParameterError(NO_SECOND)
 
-        many, Unmoved = self.many, jax.custom_derivatives.SymbolicZero
-        plain = jax.custom_jvp(outside(self._states, lambda _, x: (*many, x.size)), nondiff_argnums=(0,))
-        both = outside(self._with_columns, lambda c, x: ((*many, x.size), (*many, x.size, x.size + c.size)))
+        many = self.many
+        Unmoved = jax.custom_derivatives.SymbolicZero
+        plain = jax.custom_jvp(
+            outside(self._states, lambda _, x: (*many, x.size)), nondiff_argnums=(0,)
+        )
+        both = outside(
+            self._with_columns, lambda c, x: ((*many, x.size), (*many, x.size, x.size + c.size))
+        )
         with_columns = jax.custom_jvp(both, nondiff_argnums=(0,))
         plain.defjvp(rule, symbolic_zeros=True)  # columns that are nan do not spoil the others
         with_columns.defjvp(refuse)
         return plain
 
-    # --- in PyTorch ----------------------------------------------------------------------------------------------------------
+    # --- in PyTorch ----------------------------------------------------------
 
     def in_torch(self, values: Mapping[str, Any], start: Any) -> Any:
-        """The states of the motions from `start`, (..., 2 n), of the system with `values`, (...), by their dotted paths."""
+        """The states of the motions from `start`, (..., 2 n), of the system with `values`, (...),
+        by their dotted paths.
+        """
         torch = _torch()
-        paths, state = self._paths(values), torch.as_tensor(start, dtype=torch.float64, device="cpu")
+        paths = self._paths(values)
+        state = torch.as_tensor(start, dtype=torch.float64, device="cpu")
         self._check_start(tuple(state.shape[-1:]))
         given = [torch.as_tensor(values[path], dtype=torch.float64, device="cpu") for path in paths]
         many = torch.broadcast_shapes(state.shape[:-1], *(number.shape for number in given))
-        numbers = torch.stack([number.expand(many) for number in given], -1) if given else torch.zeros((*many, 0)).double()
+        numbers = (
+            torch.stack([number.expand(many) for number in given], -1)
+            if given
+            else torch.zeros((*many, 0)).double()
+        )
         return self._of_torch.apply(paths, numbers, state.expand(*many, -1))
 
     @cached_property
     def _of_torch(self) -> Any:
         """The states as a function of paths, numbers and start, with its derivatives in both modes."""
-        torch, whole = _torch(), self
+        torch = _torch()
+        whole = self
 
         def outside(function: Any, paths: tuple[str, ...], *given: Any) -> Any:
             return torch.from_numpy(np.array(function(paths, *(x.detach().numpy() for x in given))))
 
         def product(ctx: Any) -> Any:
-            """The derivatives of all states, as the rows of a matrix for each motion: to the start, then to the numbers."""
+            """The derivatives of all states, as the rows of a matrix for each motion: to the start,
+            then to the numbers.
+            """
             found = Columns.apply(ctx.paths, *ctx.saved_tensors)
             return found.reshape(*ctx.saved_tensors[1].shape[:-1], -1, found.shape[-1])
 
@@ -255,7 +317,10 @@ class _StatesFunction:
             @classmethod
             def vmap(cls, info: Any, in_dims: Any, paths: Any, *given: Any) -> Any:
                 placed = zip(given, in_dims[1:], strict=True)
-                given = tuple(x.expand(info.batch_size, *x.shape) if d is None else x.movedim(d, 0) for x, d in placed)
+                given = tuple(
+                    x.expand(info.batch_size, *x.shape) if d is None else x.movedim(d, 0)
+                    for x, d in placed
+                )
                 return cls.apply(paths, *given), 0
 
         class Columns(Function):
@@ -288,33 +353,43 @@ class _StatesFunction:
             @staticmethod
             def backward(ctx: Any, across: Any) -> Any:
                 size = ctx.saved_tensors[1].shape[-1]
-                row = (across.reshape(*ctx.saved_tensors[1].shape[:-1], 1, -1) @ product(ctx)).squeeze(-2)
+                row = (
+                    across.reshape(*ctx.saved_tensors[1].shape[:-1], 1, -1) @ product(ctx)
+                ).squeeze(-2)
                 return None, row[..., size:], row[..., :size]
 
             @staticmethod
             def jvp(ctx: Any, _: Any, *moved: Any) -> Any:
-                columns, size = product(ctx), ctx.saved_tensors[1].shape[-1]
+                columns = product(ctx)
+                size = ctx.saved_tensors[1].shape[-1]
                 parts = zip((columns[..., size:], columns[..., :size]), moved, strict=True)
-                moves = [(part @ by.unsqueeze(-1)).squeeze(-1) for part, by in parts if by is not None]
+                moves = [
+                    (part @ by.unsqueeze(-1)).squeeze(-1) for part, by in parts if by is not None
+                ]
                 return sum(moves).reshape(*ctx.saved_tensors[1].shape[:-1], *whole.many, size)
 
         return States
 
-    # --- outside of both -----------------------------------------------------------------------------------------------------
+    # --- outside of both -----------------------------------------------------
 
     def _states(self, *given: Any) -> np.ndarray:
-        """The states, for paths, numbers and start; of many motions, if these have axes before their own."""
+        """The states, for paths, numbers and start; of many motions, if these have axes before
+        their own.
+        """
         return self._found(False, *given)[0]
 
     def _with_columns(self, *given: Any) -> tuple[np.ndarray, ...]:
         """The states with their derivatives to the start and to the numbers."""
         return self._found(True, *given)
 
-    def _found(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _found(
+        self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
         if not (many := start.shape[:-1]):
             return self._of_one(columns, paths, numbers, start)
         numbers, start = (x.reshape(math.prod(many), x.shape[-1]) for x in (numbers, start))
-        sums = self.system.in_gap_coordinates is not self.system  # lanes have no derivatives of such motions to parameters
+        # lanes have no derivatives of such motions to parameters
+        sums = self.system.in_gap_coordinates is not self.system
         if self.times is None and not (columns and sums):
             found = self._in_lanes(columns, paths, numbers, start)
         else:
@@ -322,16 +397,24 @@ class _StatesFunction:
             found = tuple(map(np.array, zip(*each, strict=True)))
         return tuple(part.reshape(*many, *part.shape[1:]) for part in found)
 
-    def _of_one(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _of_one(
+        self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
         asked = self._arguments(start) | {"dense": self.times is not None}
         asked["system"] = self.system.with_(dict(zip(paths, numbers.tolist(), strict=True)))
         if not columns:
             return (self._read(simulate(**asked)),)
         found = sensitivities(parameters=paths, **asked)
-        by = np.hstack([found.state, found.parameters]) if self.times is None else found.at(self.times)
+        by = (
+            np.hstack([found.state, found.parameters])
+            if self.times is None
+            else found.at(self.times)
+        )
         return self._read(found.motion), by
 
-    def _in_lanes(self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _in_lanes(
+        self, columns: bool, paths: tuple[str, ...], numbers: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
         """The ends of many motions; one that cannot go on is followed alone, which says why."""
         more: dict[str, Any] = {
             "parameters": dict(zip(paths, numbers.T, strict=True)),
@@ -342,12 +425,15 @@ class _StatesFunction:
         for i, stop in enumerate(stops):
             if stop not in (Stop.HORIZON, Stop.REST, Stop.LIMIT, Stop.SINGULAR):
                 self._of_one(False, paths, numbers[i], start[i])
-        states = np.column_stack([found[name].values for name in state_names(self.system.model.coordinates)])
+        states = np.column_stack(
+            [found[name].values for name in state_names(self.system.model.coordinates)]
+        )
         return (states, found.derivative.values) if columns else (states,)
 
     def _arguments(self, start: np.ndarray) -> dict[str, Any]:
         """What is asked of a motion from a start, (2 n,), or of many, (2 n, m)."""
-        model, halves = self.system.model, np.split(start, 2)
+        model = self.system.model
+        halves = np.split(start, 2)
         position, velocity = (half.tolist() if half.ndim == 1 else [*half] for half in halves)
         moving = velocity[: len(model.moving)]
         given = {"velocity": moving[0] if len(moving) == 1 else tuple(moving)}

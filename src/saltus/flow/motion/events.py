@@ -1,4 +1,6 @@
-"""The events of a motion, what they say of the contacts, and why motions end: the one place in Python that knows all kinds."""
+"""The events of a motion, what they say of the contacts, and why motions end: the one place in
+Python that knows all kinds.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ class EventKind(StrEnum):
     GRAZING = "grazing"  #: the gap touches zero without a speed, to within the working precision
     REST = "rest"  #: the system comes to rest at contact, at once or as the limit of impacts
     RELEASE = "release"  #: the system leaves contact from rest
-    CHATTER = "chatter"  #: impacts without loss became too small to follow; the phase is lost from here on
+    # : impacts without loss became too small to follow; the phase is lost from here on
+    CHATTER = "chatter"
     LIMIT = "limit"  #: a margin reached zero
     HELD = "held"  #: of several contacts, some come to rest as the limit of impacts
     STICK = "stick"  #: a friction changes from sliding to sticking
@@ -104,7 +107,11 @@ class Impacts(RowTable):
         columns: dict[str, Any] = {"time": self.time, "side": self.side}
         for name in ("velocity_before", "velocity_after"):
             values = getattr(self, name)
-            columns |= {name: values} if values.ndim == 1 else {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
+            columns |= (
+                {name: values}
+                if values.ndim == 1
+                else {f"{name}_{i}": values[:, i] for i in range(values.shape[1])}
+            )
         return columns
 
 
@@ -112,11 +119,15 @@ class MotionEvents(RowTable, Sequence[Event]):
     """The events of a motion in order of time, made one by one from the kernel's arrays."""
 
     def __init__(self, length: float, labels: np.ndarray, values: np.ndarray) -> None:
-        self._length, self._labels, self._values = length, labels, values
+        self._length = length
+        self._labels = labels
+        self._values = values
 
     @cached_property
     def times(self) -> np.ndarray:
-        """The dimensionless times, (n,): the kernel counts forcing periods of a `length` apart from the time within them."""
+        """The dimensionless times, (n,): the kernel counts forcing periods of a `length` apart from
+        the time within them.
+        """
         times: np.ndarray = self._labels[:, 0] * self._length + self._values[:, 0]
         return times
 
@@ -139,16 +150,27 @@ class MotionEvents(RowTable, Sequence[Event]):
         return Event(float(self.times[index]), EVENT_KINDS[kind], int(side), before, after)
 
     def __repr__(self) -> str:
-        counts = {kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)}
+        counts = {
+            kind.value: int(np.sum(self._labels[:, 1] == i)) for i, kind in enumerate(EVENT_KINDS)
+        }
         return f"MotionEvents({', '.join(f'{n} {kind}' for kind, n in counts.items() if n)})"
 
     def _table(self) -> dict[str, Any]:
-        names = [field.name for field in fields(self[0])] if len(self) else [field.name for field in fields(Event)]
+        names = (
+            [field.name for field in fields(self[0])]
+            if len(self)
+            else [field.name for field in fields(Event)]
+        )
         columns: dict[str, Any] = {}
         for name in names:
-            values = [str(value) if isinstance(value, EventKind) else value for value in (getattr(each, name) for each in self)]
+            values = [
+                str(value) if isinstance(value, EventKind) else value
+                for value in (getattr(each, name) for each in self)
+            ]
             if values and isinstance(values[0], tuple):
-                columns |= {f"{name}_{i}": [value[i] for value in values] for i in range(len(values[0]))}
+                columns |= {
+                    f"{name}_{i}": [value[i] for value in values] for i in range(len(values[0]))
+                }
             else:
                 columns[name] = values
         return columns
@@ -158,37 +180,48 @@ class MotionEvents(RowTable, Sequence[Event]):
         return self._of_kinds(kind)
 
     def _of_kinds(self, *kinds: EventKind) -> Self:
-        return self._only(np.any([self._labels[:, 1] == EVENT_KINDS.index(kind) for kind in kinds], axis=0))
+        return self._only(
+            np.any([self._labels[:, 1] == EVENT_KINDS.index(kind) for kind in kinds], axis=0)
+        )
 
     @property
     def codes(self) -> np.ndarray:
-        """(n, 2): the number of each kind in the order of `EventKind`, and the side, or the contacts and frictions as bits."""
+        """(n, 2): the number of each kind in the order of `EventKind`, and the side, or the
+        contacts and frictions as bits.
+        """
         return self._labels[:, 1:3]
 
     @property
     def details(self) -> np.ndarray:
-        """The detail that the kernel recorded with each event, see `kernel/layout.py`; for a limit the number of the
-        margin."""
+        """The detail that the kernel recorded with each event, see `kernel/layout.py`; for a limit
+        the number of the margin."""
         return self._labels[:, 3]
 
     def in_own_coordinates(self, system: System) -> MotionEvents:
-        """The events with velocities of a system's own coordinates, from those of `system.in_gap_coordinates`."""
+        """The events with velocities of a system's own coordinates, from those of
+        `system.in_gap_coordinates`.
+        """
         return self
 
     def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, and the events of other kinds if wanted, as arrays."""
         impacts = self._of_kinds(EventKind.IMPACT, *also)
-        labels, values = impacts._labels, impacts._values
+        labels = impacts._labels
+        values = impacts._values
         return Impacts(impacts.times, labels[:, 2].astype(np.int8), values[:, 1], values[:, 2])
 
 
 @dataclass(frozen=True, slots=True)
 class ContactEvent:
-    """One event: its time, its contacts or frictions, the velocities of all coordinates before and after it, and all impulses."""
+    """One event: its time, its contacts or frictions, the velocities of all coordinates before and
+    after it, and all impulses.
+    """
 
     time: float
     kind: EventKind
-    contact: str  # the name of the contact or friction, or several with "+" between them; "both" for two of two contacts
+    # the name of the contact or friction, or several with "+" between them; "both" for two of two
+    # contacts
+    contact: str
     velocity_before: tuple[float, ...]
     velocity_after: tuple[float, ...]
     impulse: tuple[float, ...]  # of each contact, along its sign
@@ -198,43 +231,70 @@ class ContactEvents(MotionEvents):
     """The events of a motion with several contacts or frictions, in order of time."""
 
     def __init__(
-        self, length: float, labels: np.ndarray, values: np.ndarray, names: Sequence[Sequence[str]], places: np.ndarray
+        self,
+        length: float,
+        labels: np.ndarray,
+        values: np.ndarray,
+        names: Sequence[Sequence[str]],
+        places: np.ndarray,
     ) -> None:
         super().__init__(length, labels, values)
         self._contacts, self._frictions = names
-        self._own, self._places = (values.shape[1] - 1 - len(self._contacts)) // 2, places  # positions, if velocities need them
+        # positions, if velocities need them
+        self._own = (values.shape[1] - 1 - len(self._contacts)) // 2
+        self._places = places
 
     def _only(self, chosen: Any) -> ContactEvents:
-        values, places = self._values[chosen], self._places[chosen] if self._places.size else self._places
-        return ContactEvents(self._length, self._labels[chosen], values, (self._contacts, self._frictions), places)
+        values = self._values[chosen]
+        places = self._places[chosen] if self._places.size else self._places
+        return ContactEvents(
+            self._length, self._labels[chosen], values, (self._contacts, self._frictions), places
+        )
 
     def _event(self, index: int) -> ContactEvent:
         kind, bits = (int(x) for x in self._labels[index, 1:3])
         before, after, impulse = (tuple(x.tolist()) for x in self._parts(index))
-        return ContactEvent(float(self.times[index]), EVENT_KINDS[kind], self._called(bits), before, after, impulse)
+        return ContactEvent(
+            float(self.times[index]), EVENT_KINDS[kind], self._called(bits), before, after, impulse
+        )
 
     def _parts(self, index: Any) -> list[np.ndarray]:
         return np.split(self._values[index, 1:], [self._own, 2 * self._own], axis=-1)
 
     def in_own_coordinates(self, system: System) -> ContactEvents:
-        """The events with velocities of a system's own coordinates, from those of `system.in_gap_coordinates`."""
+        """The events with velocities of a system's own coordinates, from those of
+        `system.in_gap_coordinates`.
+        """
         before, after, impulses = self._parts(slice(None))
         led = [
-            system.from_gaps(self.times, self._places.T if self._places.size else velocity.T, velocity.T)[1].T
+            system.from_gaps(
+                self.times, self._places.T if self._places.size else velocity.T, velocity.T
+            )[1].T
             for velocity in (before, after)
         ]
         values = np.concatenate([self._values[:, :1], *led, impulses], axis=1)
-        return ContactEvents(self._length, self._labels, values, (self._contacts, self._frictions), self._places)
+        return ContactEvents(
+            self._length, self._labels, values, (self._contacts, self._frictions), self._places
+        )
 
     def _called(self, bits: int) -> str:
-        chosen = [name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1]
+        chosen = [
+            name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1
+        ]
         return "both" if chosen == list(self._contacts) and len(chosen) == 2 else "+".join(chosen)
 
     def impacts(self, *also: EventKind) -> Impacts:
-        """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are (n, coordinates)."""
+        """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are
+        (n, coordinates).
+        """
         impacts = self._of_kinds(EventKind.IMPACT, *also)
         before, after, _ = impacts._parts(slice(None))
-        return Impacts(impacts.times, impacts._labels[:, 2].astype(type_of_bits(len(self._contacts))), before, after)
+        return Impacts(
+            impacts.times,
+            impacts._labels[:, 2].astype(type_of_bits(len(self._contacts))),
+            before,
+            after,
+        )
 
 
 def type_of_bits(count: int) -> type[np.signedinteger[Any]]:
@@ -248,13 +308,27 @@ def masks_of(names: Sequence[str]) -> dict[str, Any]:
     return {"flag_masks": masks, "flag_meanings": " ".join(names)}
 
 
-def modes_of(model: Model, side: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """Closed contacts as bits, the direction in which each friction slides, and the side of each surface, +1 or -1, from the
-    numbers `side` of motions. A friction slides to +1 or -1; 0 where it sticks, 2 where its contact is open."""
-    count, number = len(model.contacts), np.asarray(side).astype(np.int64) - 1
-    pairs = [(number >> (count + 2 * k) & 3) - 1 for k in range(len(model.frictions) + len(model.surfaces))]
-    beside = [each.sign * pair for each, pair in zip(model.surfaces, pairs[len(model.frictions) :], strict=True)]
-    return number & np.int64((1 << count) - 1 if count < 64 else -1), pairs[: len(model.frictions)], beside
+def modes_of(
+    model: Model, side: np.ndarray
+) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Closed contacts as bits, the direction in which each friction slides, and the side of each
+    surface, +1 or -1, from the numbers `side` of motions. A friction slides to +1 or -1; 0 where it
+    sticks, 2 where its contact is open."""
+    count = len(model.contacts)
+    number = np.asarray(side).astype(np.int64) - 1
+    pairs = [
+        (number >> (count + 2 * k) & 3) - 1
+        for k in range(len(model.frictions) + len(model.surfaces))
+    ]
+    beside = [
+        each.sign * pair
+        for each, pair in zip(model.surfaces, pairs[len(model.frictions) :], strict=True)
+    ]
+    return (
+        number & np.int64((1 << count) - 1 if count < 64 else -1),
+        pairs[: len(model.frictions)],
+        beside,
+    )
 
 
 class Stop(StrEnum):
@@ -270,7 +344,8 @@ class Stop(StrEnum):
 
     def __new__(cls, word: str, meaning: str) -> Stop:
         member = str.__new__(cls, word)
-        member._value_, member.meaning = word, meaning
+        member._value_ = word
+        member.meaning = meaning
         return member
 
     HORIZON = "horizon", "the time asked for"
@@ -284,4 +359,7 @@ class Stop(StrEnum):
     STALLED = "stalled", "the acceleration is singular"
     SINGULAR = "singular", "the mass matrix has no inverse"
     OUTSIDE = "outside", "the state at the start lies beyond the contact"
-    UNRESOLVED = "unresolved", "impacts accumulate too slowly to be followed: more than a million in a unit of time"
+    UNRESOLVED = (
+        "unresolved",
+        "impacts accumulate too slowly to be followed: more than a million in a unit of time",
+    )

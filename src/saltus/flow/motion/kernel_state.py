@@ -1,5 +1,6 @@
-"""What Python and the scalar kernels share of one motion: the kernel's state, from the start to the end, and the records that it
-fills: all steps of the motion, the states at given times, or its events alone."""
+"""What Python and the scalar kernels share of one motion: the kernel's state, from the start to the
+end, and the records that it fills: all steps of the motion, the states at given times, or its
+events alone."""
 
 from __future__ import annotations
 
@@ -16,7 +17,15 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
 from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
-from saltus.flow.kernel.memory import AT_START, MOTION, WHOLE_RECORD, EventBuffers, MotionNumbers, StepBuffers, motion_record
+from saltus.flow.kernel.memory import (
+    AT_START,
+    MOTION,
+    WHOLE_RECORD,
+    EventBuffers,
+    MotionNumbers,
+    StepBuffers,
+    motion_record,
+)
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
@@ -40,13 +49,18 @@ class KernelState:
         ParameterError
             The state lies beyond the contact, or the model's gap or reset is impossible.
         """
-        at, breaks = request.clock, run.env[2]
+        at = request.clock
+        breaks = run.env[2]
         self.rows = NO_ROWS  # of several contacts
-        self.state = _first_state(run, request.start)  # coordinates, velocities, each with its tangent's columns, and shifts
-        self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)  # one record MOTION
+        # coordinates, velocities, each with its tangent's columns, and shifts
+        self.state = _first_state(run, request.start)
+        # one record MOTION
+        self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)
         mode, side, leave_by = self._at_contact(request, run)
         piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
-        dense = int(request.dense or request.sample_times is not None or _is_nonlinear(request.system))
+        dense = int(
+            request.dense or request.sample_times is not None or _is_nonlinear(request.system)
+        )
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, at.length, request.tol)
 
@@ -57,7 +71,9 @@ class KernelState:
 
     def advance(self, run: Program, steps: StepBuffers, events: EventBuffers) -> int:
         """Call the kernel; returns the `Status` with which it stops."""
-        return self._kernel()(self.array, self.state, run.env, run.model, self.rows, (steps, events))
+        return self._kernel()(
+            self.array, self.state, run.env, run.model, self.rows, (steps, events)
+        )
 
     def with_empty_buffers(self) -> None:
         """Let the kernel record from the beginning of its buffers on."""
@@ -66,10 +82,16 @@ class KernelState:
     def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
         """The mode and the side at the start, and by which side a motion leaves that is not unique."""
         position, speed = request.start.tolist()[:: request.start.size // 2]
-        mode, side = side_of_state(run.structure.sizes.sides, position, speed, run.model.geometry.tolist())
+        mode, side = side_of_state(
+            run.structure.sizes.sides, position, speed, run.model.geometry.tolist()
+        )
         if mode == Mode.BEYOND:
-            model, name = request.system.model, request.system.model.coordinates[0]
-            raise ParameterError(f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}", name)
+            model = request.system.model
+            name = request.system.model.coordinates[0]
+            raise ParameterError(
+                f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}",
+                name,
+            )
         return mode, side, request.side or 0
 
     def _kernel(self) -> Callable[..., int]:
@@ -81,7 +103,9 @@ class KernelState:
 
     @property
     def columns(self) -> np.ndarray:
-        """The tangent's columns, (2 own coordinates, columns): the rows of the coordinates, then those of the velocities."""
+        """The tangent's columns, (2 own coordinates, columns): the rows of the coordinates, then
+        those of the velocities.
+        """
         now = self.numbers
         both = self.state[: 2 * now.dof].reshape(2, 1 + now.columns, now.own)
         columns: np.ndarray = both[:, 1:].transpose(0, 2, 1).reshape(2 * now.own, -1)
@@ -94,45 +118,69 @@ def time_of(numbers: Any) -> float:
     return time
 
 
-Again = Callable[[Any, Mapping[str, Any], Any], Motion | None]  # of system, coordinates and velocity, as `simulate` takes them
+# of system, coordinates and velocity, as `simulate` takes them
+Again = Callable[[Any, Mapping[str, Any], Any], Motion | None]
 
 
 def remember(request: MotionRequest, run: Program) -> None:
-    """Let the plan of a request keep a way to make its motion from other starts, once it has been asked for twice: in loops of
-    users all but the start is the same, and the rest of Python takes four times as long as the kernel for a forcing period.
+    """Let the plan of a request keep a way to make its motion from other starts, once it has been
+    asked for twice: in loops of users all but the start is the same, and the rest of Python takes
+    four times as long as the kernel for a forcing period.
 
-    Only the events of these motions are kept, and their systems have one coordinate and at most one contact. Where one call of
-    the kernel is not enough there is no motion: `follow` makes it then, or refuses it.
+    Only the events of these motions are kept, and their systems have one coordinate and at most one
+    contact. Where one call of the kernel is not enough there is no motion: `follow` makes it then,
+    or refuses it.
     """
-    kept, system, structure, breaks = request.plan.again, request.system, run.structure, run.env[2]
+    kept = request.plan.again
+    system = request.system
+    structure = run.structure
+    breaks = run.env[2]
     if not kept:
         kept.append(None)
         return
-    sizes, own = structure.sizes, request.given is system and breaks.size == 0 and not structure.several
+    sizes = structure.sizes
+    own = request.given is system and breaks.size == 0 and not structure.several
     if kept[0] is not None or not own or (sizes.own, sizes.columns, sizes.first_order) != (1, 0, 0):
         return
-    name, kernel, env, model = system.model.coordinates[0], load_kernel(), run.env, run.model
-    blank, buffers = bytes(KernelState(request, run)._memory), Recorder(request, run, taylor_order(request.tol))
+    name = system.model.coordinates[0]
+    kernel = load_kernel()
+    env = run.env
+    model = run.model
+    blank = bytes(KernelState(request, run)._memory)
+    buffers = Recorder(request, run, taylor_order(request.tol))
     local, first, _, _, *rest = AT_START.unpack_from(blank)
-    size, steps, geometry = len(buffers.events.event_labels), buffers.steps, model.geometry.tolist()
+    size = len(buffers.events.event_labels)
+    steps = buffers.steps
+    geometry = model.geometry.tolist()
     most = 2.0 * math.pi if request.plan.angles else np.inf  # beyond it `simulate` warns
-    same = {"tol": request.tol, "start": request.time} | dict.fromkeys(("limit", "dense", "kept", "sampled_validity"))
+    same = {"tol": request.tol, "start": request.time} | dict.fromkeys(
+        ("limit", "dense", "kept", "sampled_validity")
+    )
 
     def motion(system: System, coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
         value = coordinates.get(name)
         if type(value) is not float or type(velocity) is not float or len(coordinates) > 1:
             return None
         mode, side = side_of_state(sizes.sides, value, velocity, geometry)
-        if mode == Mode.BEYOND or not (abs(value) <= min(most, LIMITS.value) and abs(velocity) <= LIMITS.value):
+        if mode == Mode.BEYOND or not (
+            abs(value) <= min(most, LIMITS.value) and abs(velocity) <= LIMITS.value
+        ):
             return None
-        memory, state = bytearray(blank), np.array((value, velocity))
+        memory = bytearray(blank)
+        state = np.array((value, velocity))
         AT_START.pack_into(memory, 0, local, first, mode, side, *rest)
-        labels, values = events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, 3)))
-        if kernel(np.ndarray((1,), MOTION, memory), state, env, model, NO_ROWS, (steps, events)) != Status.DONE:
+        labels, values = events = EventBuffers(
+            np.empty((size, 4), dtype=np.int64), np.empty((size, 3))
+        )
+        if (
+            kernel(np.ndarray((1,), MOTION, memory), state, env, model, NO_ROWS, (steps, events))
+            != Status.DONE
+        ):
             return None
         now: Any = MotionNumbers._make(WHOLE_RECORD.unpack(memory))
         position, speed = state.tolist()
-        count, mode = now.recorded_events, now.mode
+        count = now.recorded_events
+        mode = now.mode
         return motion_of(
             **same,
             system=system,
@@ -151,46 +199,70 @@ def remember(request: MotionRequest, run: Program) -> None:
 
 def _first_state(run: Program, start: np.ndarray) -> np.ndarray:
     """Coordinates and velocities, each followed by the tangent's columns, and the shifts."""
-    columns, own = run.structure.sizes.columns, start.size // 2
+    columns = run.structure.sizes.columns
+    own = start.size // 2
     if not columns:
         return start.copy()
     unit = np.eye(columns, start.size)  # row j is the initial value of column j
-    return np.concatenate([start[:own], unit[:, :own].ravel(), start[own:], unit[:, own:].ravel(), np.zeros(columns)])
+    return np.concatenate(
+        [start[:own], unit[:, :own].ravel(), start[own:], unit[:, own:].ravel(), np.zeros(columns)]
+    )
 
 
 def _parts(system: System) -> tuple[Any, Any, Any]:
-    """The contacts, frictions and surfaces of a system's model, which may make them anew whenever they are asked for."""
-    model, found = system.model, system._remembered
-    parts: tuple[Any, Any, Any] = found("parts", lambda: (model.contacts, model.frictions, model.surfaces))
+    """The contacts, frictions and surfaces of a system's model, which may make them anew whenever
+    they are asked for.
+    """
+    model = system.model
+    found = system._remembered
+    parts: tuple[Any, Any, Any] = found(
+        "parts", lambda: (model.contacts, model.frictions, model.surfaces)
+    )
     return parts
 
 
 class ContactState(KernelState):
-    """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of `FrictionColumn`."""
+    """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of
+    `FrictionColumn`.
+    """
 
     def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
-        """Fill the rows; the kernel first decides which contacts at rest at their positions stay closed.
+        """Fill the rows; the kernel first decides which contacts at rest at their positions stay
+        closed.
 
         Raises
         ------
         ParameterError
             The state lies beyond a contact, or moves into a contact that it is at.
         """
-        names, numbers = request.system.model.coordinates, request.start.tolist()
-        position, speeds = numbers[: len(names)], numbers[len(names) :]
+        names = request.system.model.coordinates
+        numbers = request.start.tolist()
+        position = numbers[: len(names)]
+        speeds = numbers[len(names) :]
         own_contacts, own_frictions, surfaces = _parts(request.system)
-        held, rubbed = run.trace.contact_coordinates, run.trace.friction_coordinates
+        held = run.trace.contact_coordinates
+        rubbed = run.trace.friction_coordinates
         self.rows = contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
         if run.trace.friction_contacts:
             contacts[len(held) :, FrictionColumn.PRESSED] = np.add(run.trace.friction_contacts, 1)
-        contacts[:, ContactColumn.COORDINATE] = held + tuple(max(place, -1 - place) for place in rubbed)
+        contacts[:, ContactColumn.COORDINATE] = held + tuple(
+            max(place, -1 - place) for place in rubbed
+        )
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             place = names.index(contact.coordinate)
-            gap, rate = contact.gap(position[place]), contact.sign * speeds[place]
+            gap = contact.gap(position[place])
+            rate = contact.sign * speeds[place]
             if gap < 0.0 or (gap == 0.0 and rate < 0.0):
                 where = f"{contact.coordinate} = {position[place]:g}"
-                what = f"lies beyond the contact {contact.name!r}" if gap < 0.0 else f"moves into the contact {contact.name!r}"
-                raise ParameterError(f"{where} {what} at {contact.coordinate} = {float(contact.position):g}", contact.coordinate)
+                what = (
+                    f"lies beyond the contact {contact.name!r}"
+                    if gap < 0.0
+                    else f"moves into the contact {contact.name!r}"
+                )
+                raise ParameterError(
+                    f"{where} {what} at {contact.coordinate} = {float(contact.position):g}",
+                    contact.coordinate,
+                )
             row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
@@ -201,14 +273,18 @@ class ContactState(KernelState):
         for row, surface in zip(contacts[len(contacts) - len(surfaces) :], surfaces, strict=True):
             place = names.index(surface.coordinate)
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE
-            row[FrictionColumn.SLIDES] = int(np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1)
+            row[FrictionColumn.SLIDES] = int(
+                np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1
+            )
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
     def _kernel(self) -> Callable[..., int]:
         return load_contacts_kernel()
 
     def side(self, numbers: Any) -> int:
-        """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which frictions slide."""
+        """1 plus the bits that `modes_of` reads: the closed contacts, and the directions in which
+        frictions slide.
+        """
         side: int = numbers.side
         return side
 
@@ -217,10 +293,14 @@ class ContactState(KernelState):
 class RecorderSettings:
     """How much of a motion is kept."""
 
-    steps: int = 10_000_000  # The largest number of steps of a motion that is kept whole; they take about 2 GB.
+    # The largest number of steps of a motion that is kept whole; they take about 2 GB.
+    steps: int = 10_000_000
     events: int = 20_000_000  # The largest number of events that are kept.
-    rate: int = 1_000_000  # The most impacts in a unit of time: more are an accumulation that is not resolved.
-    burst: int = 20_000  # With several contacts, impacts between two checks of their rate: each takes a pass of the kernel.
+    # The most impacts in a unit of time: more are an accumulation that is not resolved.
+    rate: int = 1_000_000
+    # With several contacts, impacts between two checks of their rate: each takes a pass of the
+    # kernel.
+    burst: int = 20_000
     buffer: int = 4096  # The steps, and events, that one call of the kernel may record.
 
 
@@ -228,7 +308,9 @@ MOST = RecorderSettings()
 
 
 def _is_nonlinear(system: System) -> bool:
-    """Whether velocities of the system that was given depend on positions, which events do not have, but steps do."""
+    """Whether velocities of the system that was given depend on positions, which events do not
+    have, but steps do.
+    """
     return getattr(system.model, "is_nonlinear", False)
 
 
@@ -243,20 +325,26 @@ def joined(chunks: list[np.ndarray]) -> np.ndarray:
 @cache
 def no_steps(rows: int, count: int) -> StepBuffers:
     """Buffers into which the kernel writes nothing, for motions of which only the events are kept."""
-    return StepBuffers(np.empty((8, 2), dtype=np.int64), np.empty((8, 2)), np.empty((8, rows, count)))
+    return StepBuffers(
+        np.empty((8, 2), dtype=np.int64), np.empty((8, 2)), np.empty((8, rows, count))
+    )
 
 
 class Recorder:
     """Takes the contents of the kernel's buffers whenever these are full.
 
-    With `sample_times` the dense output of each buffer is sampled, checked for validity and dropped, so that memory holds only
-    the samples and the events.
+    With `sample_times` the dense output of each buffer is sampled, checked for validity and
+    dropped, so that memory holds only the samples and the events.
     """
 
     def __init__(self, request: MotionRequest, run: Program, order: int) -> None:
-        self._system, self._times, self._columns = request.system, request.sample_times, run.structure.sizes.columns
-        self._own, self._several = run.structure.sizes.own, run.structure.several
-        self._begin, self._drops = request.start[: self._own], not request.dense and request.sample_times is None
+        self._system = request.system
+        self._times = request.sample_times
+        self._columns = run.structure.sizes.columns
+        self._own = run.structure.sizes.own
+        self._several = run.structure.several
+        self._begin = request.start[: self._own]
+        self._drops = not request.dense and request.sample_times is None
         self._bends = _is_nonlinear(request.system)
         self._wide = request.dense and request.sample_times is None and request.dense_tangent
         self._rows = self._own * (1 + self._columns if self._wide else 1), order + 2
@@ -268,11 +356,16 @@ class Recorder:
         self._length = request.clock.length
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
-        self._places: list[np.ndarray] = []  # of the events, if the equations are in coordinates that bend
+        # of the events, if the equations are in coordinates that bend
+        self._places: list[np.ndarray] = []
         self._last: DenseOutput | None = None
         self._samples: list[tuple[np.ndarray, ...]] = []
         self._next = 0  # index of the first sample time that is still to come
-        periods = request.clock.last - request.clock.first if request.clock.length else request.clock.end - request.clock.local
+        periods = (
+            request.clock.last - request.clock.first
+            if request.clock.length
+            else request.clock.end - request.clock.local
+        )
         self.make_buffers(min(MOST.buffer, 24 * (2 + int(periods))))
 
     def make_buffers(self, size: int = MOST.buffer) -> None:
@@ -280,7 +373,11 @@ class Recorder:
         width = self._width + self._columns
         self.events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, width)))
         if self._keeps_steps:
-            self.steps = StepBuffers(np.empty((size, 2), dtype=np.int64), np.empty((size, 2)), np.empty((size, *self._rows)))
+            self.steps = StepBuffers(
+                np.empty((size, 2), dtype=np.int64),
+                np.empty((size, 2)),
+                np.empty((size, *self._rows)),
+            )
         else:
             self.steps = no_steps(*self._rows)
 
@@ -290,12 +387,16 @@ class Recorder:
 
     def take(self, numbers: Any) -> None:
         """Take what the buffers hold."""
-        steps, events = numbers.recorded_steps, numbers.recorded_events
-        labels, values = self.events.event_labels[:events], self.events.event_values[:events]
+        steps = numbers.recorded_steps
+        events = numbers.recorded_events
+        labels = self.events.event_labels[:events]
+        values = self.events.event_values[:events]
         if steps:
             kinds, spans, series = [a[:steps] for a in self.steps]
             series = series.copy() if 2 * steps < len(self.steps.step_series) else series
-            self._last = DenseOutput(kinds[:, 0] * self._length + spans[:, 0], spans[:, 1], kinds[:, 1], series)
+            self._last = DenseOutput(
+                kinds[:, 0] * self._length + spans[:, 0], spans[:, 1], kinds[:, 1], series
+            )
             if not self._drops:
                 self._add(self._last)
         if self._bends:
@@ -325,8 +426,9 @@ class Recorder:
         self._pieces = [piece]
 
     def _check_memory(self, piece: DenseOutput) -> None:
-        """Refuse to keep more steps than there is room for; at the end all of them are copied once. Steps of stiff motions are so
-        short that the number of forcing periods says nothing about it."""
+        """Refuse to keep more steps than there is room for; at the end all of them are copied once.
+        Steps of stiff motions are so short that the number of forcing periods says nothing about
+        it."""
         size = self._kept / piece.start.size * (piece.series.nbytes + 24 * piece.start.size)
         free = free_memory() if size > LIMITS.any_machine else np.inf
         if size > LIMITS.memory * free:
@@ -343,7 +445,9 @@ class Recorder:
 
     @property
     def is_short(self) -> bool:
-        """Whether the events of the motion alone are kept, and were in the buffers of one call of the kernel."""
+        """Whether the events of the motion alone are kept, and were in the buffers of one call of
+        the kernel.
+        """
         return self._drops and len(self._events) == 1
 
     def last_hit(self) -> list[int]:
@@ -354,17 +458,26 @@ class Recorder:
 
     def all_events(self) -> MotionEvents:
         """All events of the motion."""
-        labels, values = self._events[0] if len(self._events) == 1 else [joined([e[i] for e in self._events]) for i in (0, 1)]
+        labels, values = (
+            self._events[0]
+            if len(self._events) == 1
+            else [joined([e[i] for e in self._events]) for i in (0, 1)]
+        )
         values = values[:, : self._width] if self._columns else values
         if self._several:
             contacts, *others = _parts(self._system)
-            names = [part.name for part in contacts], [part.name for parts in others for part in parts]
+            names = (
+                [part.name for part in contacts],
+                [part.name for parts in others for part in parts],
+            )
             places = joined(self._places) if self._bends else np.empty(0)
             return ContactEvents(self._length, labels, values, names, places)
         return MotionEvents(self._length, labels, values)
 
     def event_shifts(self) -> np.ndarray:
-        """The shift of each event along each column of the tangent, (events, columns); nan where it is not known."""
+        """The shift of each event along each column of the tangent, (events, columns); nan where it
+        is not known.
+        """
         return joined([values[:, self._width :] for _, values in self._events])
 
     def dense(self) -> DenseOutput | None:
@@ -372,31 +485,53 @@ class Recorder:
         return self._output(0, self._own)
 
     def tangent(self) -> DenseOutput | None:
-        """That of its columns, the coordinates of one after those of the other; None without any, or where they were not kept."""
-        return self._output(self._own, self._own * (1 + self._columns)) if self._columns and self._wide else None
+        """That of its columns, the coordinates of one after those of the other; None without any,
+        or where they were not kept.
+        """
+        return (
+            self._output(self._own, self._own * (1 + self._columns))
+            if self._columns and self._wide
+            else None
+        )
 
     def _output(self, first: int, last: int) -> DenseOutput | None:
         if self._times is not None or not self._pieces:
             return None
         if len(self._pieces) > 1:
-            self._pieces = [DenseOutput(*(np.concatenate([getattr(each, name) for each in self._pieces]) for name in FIELDS))]
+            self._pieces = [
+                DenseOutput(
+                    *(
+                        np.concatenate([getattr(each, name) for each in self._pieces])
+                        for name in FIELDS
+                    )
+                )
+            ]
         (whole,) = self._pieces
         if last - first == whole.series.shape[1]:
             return whole
         return DenseOutput(whole.start, whole.length, whole.side, whole.series[:, first:last])
 
-    def samples(self, end: float, position: np.ndarray, velocity: np.ndarray, side: int) -> Samples | None:
-        """The states at the sample times up to the end, for which the given state is used; None if no samples were asked for."""
+    def samples(
+        self, end: float, position: np.ndarray, velocity: np.ndarray, side: int
+    ) -> Samples | None:
+        """The states at the sample times up to the end, for which the given state is used; None if
+        no samples were asked for.
+        """
         if self._times is None:
             return None
         stop = int(np.searchsorted(self._times, end + 1e-15 * abs(end), side="right"))
         if not self._pieces:  # it has no length
             one = np.ones(stop)
-            return Samples(self._times[:stop], np.outer(position, one), np.outer(velocity, one), side * one)
+            return Samples(
+                self._times[:stop], np.outer(position, one), np.outer(velocity, one), side * one
+            )
         self._sample(self._pieces[-1], stop)
-        samples = Samples(*(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4)))
+        samples = Samples(
+            *(np.concatenate([chunk[i] for chunk in self._samples], axis=-1) for i in range(4))
+        )
         last = samples.time >= end  # known exactly, and after an impact there
-        samples.position[:, last], samples.velocity[:, last] = position[:, None], velocity[:, None]
+        samples.position[:, last] = position[:, None]
+        samples.velocity[:, last] = velocity[:, None]
         samples.side[last] = side
         return samples
 

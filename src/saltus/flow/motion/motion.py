@@ -1,4 +1,6 @@
-"""The result of a simulation: the end state, the events, the dense output, and the validity of the motion."""
+"""The result of a simulation: the end state, the events, the dense output, and the validity of the
+motion.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,15 @@ import numpy as np
 
 from saltus.checks import Numbers, check_count, instants
 from saltus.errors import ParameterError, near, shown
-from saltus.flow.motion.events import EventKind, Impacts, MotionEvents, Stop, masks_of, modes_of, type_of_bits
+from saltus.flow.motion.events import (
+    EventKind,
+    Impacts,
+    MotionEvents,
+    Stop,
+    masks_of,
+    modes_of,
+    type_of_bits,
+)
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.progress import html_table
 from saltus.result import Result, provenance, table_of
@@ -29,7 +39,9 @@ SHARES = np.append(np.arange(8) / 8, 1.0 - 2.0**-30)
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """States at given times: `time` (n,), `position` and `velocity` (degrees of freedom, n), `side` (n,), 0 at rest."""
+    """States at given times: `time` (n,), `position` and `velocity` (degrees of freedom, n), `side`
+    (n,), 0 at rest.
+    """
 
     time: np.ndarray
     position: np.ndarray
@@ -41,8 +53,9 @@ class Samples:
 class Motion(Result):
     """An exact motion of a system.
 
-    The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall oscillator. `motion.position` has
-    all coordinates. With several degrees of freedom positions and velocities are tuples.
+    The coordinate at the end has the model's own name: `motion.theta`, or `motion.x` for a wall
+    oscillator. `motion.position` has all coordinates. With several degrees of freedom positions and
+    velocities are tuples.
 
     Attributes
     ----------
@@ -59,20 +72,22 @@ class Motion(Result):
     velocity
         The velocity at the end; a tuple where there are several coordinates.
     side
-        The side at the end: +1 or -1, and 0 at rest; for a model with contacts or frictions a number that encodes `closed` and
-        `sliding`.
+        The side at the end: +1 or -1, and 0 at rest; for a model with contacts or frictions a
+        number that encodes `closed` and `sliding`.
     stop
         Why it ended.
     limit
         The margin that stopped it.
     chatter_speed
-        If the motion ends in chatter, the rate of the gap just after impacts on `side`; the state is then given as at rest.
+        If the motion ends in chatter, the rate of the gap just after impacts on `side`; the state
+        is then given as at rest.
     periods
         The whole forcing periods since time 0.
     events
         All events, in the order of time.
     dense
-        The Taylor series of all its steps, in `system.in_gap_coordinates`; None where they were not kept.
+        The Taylor series of all its steps, in `system.in_gap_coordinates`; None where they were not
+        kept.
     kept
         The states at the times that `simulate(times=...)` was given.
     sampled_validity
@@ -104,14 +119,21 @@ class Motion(Result):
     def __getattr__(self, name: str) -> Any:
         known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
         if name not in known:
-            raise AttributeError(f"a Motion has no {name!r}" + (f"; {near(name, known)}" if known else ""))
+            raise AttributeError(
+                f"a Motion has no {name!r}" + (f"; {near(name, known)}" if known else "")
+            )
         return self.position[known.index(name)] if len(known) > 1 else self.position
 
     def __repr__(self) -> str:
         names = self.system.model.coordinates
-        state = ", ".join(f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True))
+        state = ", ".join(
+            f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True)
+        )
         where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
-        return f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, impacts={len(self.impacts)}, stop={where})"
+        return (
+            f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, "
+            f"impacts={len(self.impacts)}, stop={where})"
+        )
 
     @cached_property
     def impacts(self) -> Impacts:
@@ -126,11 +148,17 @@ class Motion(Result):
     @property
     def closed(self) -> tuple[str, ...]:
         """The contacts that are closed at the end, of a model with several."""
-        return tuple(contact.name for i, contact in enumerate(self.system.model.contacts) if (self.side - 1) >> i & 1)
+        return tuple(
+            contact.name
+            for i, contact in enumerate(self.system.model.contacts)
+            if (self.side - 1) >> i & 1
+        )
 
     @property
     def sliding(self) -> dict[str, int]:
-        """The direction in which each friction slides at the end, 0 where it sticks, of a model with frictions."""
+        """The direction in which each friction slides at the end, 0 where it sticks, of a model
+        with frictions.
+        """
         model = self.system.model
         _, slides, _ = modes_of(model, np.array(self.side))
         return {friction.name: int(s) for friction, s in zip(model.frictions, slides, strict=True)}
@@ -139,10 +167,14 @@ class Motion(Result):
     def sides(self) -> dict[str, int]:
         """The side of each surface at the end, +1 or -1, of a model with surfaces."""
         model = self.system.model
-        return {each.name: int(s) for each, s in zip(model.surfaces, modes_of(model, np.array(self.side))[2], strict=True)}
+        return {
+            each.name: int(s)
+            for each, s in zip(model.surfaces, modes_of(model, np.array(self.side))[2], strict=True)
+        }
 
     def closed_at(self, time: float) -> int:
-        """The contacts that are closed just after a time, of a model with several: the sum of 2^i over them.
+        """The contacts that are closed just after a time, of a model with several: the sum of 2^i
+        over them.
 
         Parameters
         ----------
@@ -150,7 +182,9 @@ class Motion(Result):
             The dimensionless time.
         """
         if not self.start <= time <= self.time:
-            raise ParameterError(f"time must lie in [{self.start:g}, {self.time:g}], the span of the motion", "time")
+            raise ParameterError(
+                f"time must lie in [{self.start:g}, {self.time:g}], the span of the motion", "time"
+            )
         return int(modes_of(self.system.model, self._states(np.array([time]))[2])[0][0])
 
     @property
@@ -162,11 +196,14 @@ class Motion(Result):
 
     @property
     def phase_known(self) -> bool:
-        """Whether the phase is exact: False once impacts without loss were averaged (see `EventKind.CHATTER`)."""
+        """Whether the phase is exact: False once impacts without loss were averaged (see
+        `EventKind.CHATTER`).
+        """
         return len(self.events.of(EventKind.CHATTER)) == 0
 
     def at(self, times: Numbers) -> tuple[Any, Any]:
-        """Coordinate and velocity at any times of the motion, at the method's accuracy; at an impact, the values after it.
+        """Coordinate and velocity at any times of the motion, at the method's accuracy; at an
+        impact, the values after it.
 
         Parameters
         ----------
@@ -176,7 +213,8 @@ class Motion(Result):
         Returns
         -------
         tuple[Any, Any]
-            Two floats for one time, two arrays (n,) for n times; (degrees of freedom, n) where there are several.
+            Two floats for one time, two arrays (n,) for n times; (degrees of freedom, n) where
+            there are several.
 
         Raises
         ------
@@ -187,29 +225,44 @@ class Motion(Result):
         if len(self.system.model.coordinates) == 1:
             position, velocity = position[0], velocity[0]
         if np.ndim(times) == 0:
-            return (float(position[0]), float(velocity[0])) if position.ndim == 1 else (position[:, 0], velocity[:, 0])
+            return (
+                (float(position[0]), float(velocity[0]))
+                if position.ndim == 1
+                else (position[:, 0], velocity[:, 0])
+            )
         return position, velocity
 
     def _check_times(self, times: np.ndarray) -> None:
         """Refuse times of which the motion has no states."""
         if self.dense is None and self.time > self.start:
             raise ParameterError(
-                "this motion was not kept densely: only its end, its events and what it `kept` are known", "times"
+                (
+                    "this motion was not kept densely: only its end, its events and what it `kept` "
+                    "are known"
+                ),
+                "times",
             )
         slack = 1e-12 * max(1.0, abs(self.time))
-        if times.size and not (times.min() >= self.start - slack and times.max() <= self.time + slack):
-            raise ParameterError(f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion", "times")
+        if times.size and not (
+            times.min() >= self.start - slack and times.max() <= self.time + slack
+        ):
+            raise ParameterError(
+                f"times must lie in [{self.start:g}, {self.time:g}], the span of the motion",
+                "times",
+            )
 
     def _states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         self._check_times(times)
         if self.dense is None:
-            position, velocity = np.atleast_1d(self.position), np.atleast_1d(self.velocity)
+            position = np.atleast_1d(self.position)
+            velocity = np.atleast_1d(self.velocity)
             tile = np.ones(times.size)
             return position[:, None] * tile, velocity[:, None] * tile, self.side * tile
         position, velocity, side = self.dense.states(times)
         position, velocity = self.system.from_gaps(times, position, velocity)
         end = times >= self.time  # the end itself is known exactly, and after an impact there
-        position[:, end], velocity[:, end] = np.reshape(self.position, (-1, 1)), np.reshape(self.velocity, (-1, 1))
+        position[:, end] = np.reshape(self.position, (-1, 1))
+        velocity[:, end] = np.reshape(self.velocity, (-1, 1))
         side[end] = self.side
         return position, velocity, side
 
@@ -226,7 +279,8 @@ class Motion(Result):
         return found
 
     def extrema_between(self, times: Numbers) -> np.ndarray:
-        """The least and the largest value of each coordinate between every two neighbours of times in ascending order.
+        """The least and the largest value of each coordinate between every two neighbours of times
+        in ascending order.
 
         Parameters
         ----------
@@ -241,36 +295,50 @@ class Motion(Result):
         Raises
         ------
         ParameterError
-            A time lies outside the motion, the times do not ascend, or the motion was computed with dense=False.
+            A time lies outside the motion, the times do not ascend, or the motion was computed with
+            dense=False.
         """
         bounds = instants(times)
         if len(bounds) < 2 or (np.diff(bounds) < 0.0).any():
-            raise ParameterError(f"times must be at least two in ascending order, got {shown(times)}", "times")
+            raise ParameterError(
+                f"times must be at least two in ascending order, got {shown(times)}", "times"
+            )
         self._check_times(bounds)
-        steps = [] if self.dense is None else [self.dense.start, self.dense.start + self.dense.length]
+        steps = (
+            [] if self.dense is None else [self.dense.start, self.dense.start + self.dense.length]
+        )
         edges = np.unique(np.clip(np.concatenate([bounds, *steps]), bounds[0], bounds[-1]))
         seen = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
         position, velocity, _ = self._states(np.append(seen.ravel(), bounds))
-        at_bounds, rate = position[:, seen.size :].T, velocity[:, : seen.size].reshape(len(velocity), *seen.shape)
+        at_bounds = position[:, seen.size :].T
+        rate = velocity[:, : seen.size].reshape(len(velocity), *seen.shape)
         within = np.searchsorted(bounds, edges[:-1], side="right") - 1
         inner = position[:, : seen.size].reshape(rate.shape).transpose(1, 2, 0)
-        found = [np.minimum(at_bounds[:-1], at_bounds[1:]), np.maximum(at_bounds[:-1], at_bounds[1:])]
+        found = [
+            np.minimum(at_bounds[:-1], at_bounds[1:]),
+            np.maximum(at_bounds[:-1], at_bounds[1:]),
+        ]
         for extremum, values in zip((np.minimum, np.maximum), found, strict=True):
             extremum.at(values, within, extremum.reduce(inner, axis=1))
         place, step, sample = np.nonzero(rate[:, :, :-1] * rate[:, :, 1:] < 0.0)
-        low, high, row, near = seen[step, sample], seen[step, sample + 1], within[step], inner[step, sample, place]
+        low = seen[step, sample]
+        high = seen[step, sample + 1]
+        row = within[step]
+        near = inner[step, sample, place]
         fastest = np.abs(rate[place, step, sample]) + np.abs(rate[place, step, sample + 1])
-        reach = (high - low) * fastest  # at least twice as far as it goes from the first of both times
-        last = (near - reach < found[0][row, place]) | (near + reach > found[1][row, place])  # the others are not the outermost
+        # at least twice as far as it goes from the first of both times
+        reach = (high - low) * fastest
+        # the others are not the outermost
+        last = (near - reach < found[0][row, place]) | (near + reach > found[1][row, place])
         turned = self._turned(place[last], low[last], high[last])
         for extremum, values in zip((np.minimum, np.maximum), found, strict=True):
             extremum.at(values, (row[last], place[last]), turned)
         return np.stack(found, axis=-1)
 
     def _turned(self, place: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Coordinates, by their places, where their velocities are 0 between two times at which these have different signs, (n,)
-        each: by regula falsi, in which the value at an end that stays is halved. A coordinate's error is the square of that of
-        the time."""
+        """Coordinates, by their places, where their velocities are 0 between two times at which
+        these have different signs, (n,) each: by regula falsi, in which the value at an end that
+        stays is halved. A coordinate's error is the square of that of the time."""
         each = np.arange(len(place))
         a, b = (self._states(times)[1][place, each] for times in (low, high))
         for _ in SHARES:
@@ -283,7 +351,8 @@ class Motion(Result):
 
     @cached_property
     def validity(self) -> Validity:
-        """The margins of the model that the motion passes, and for what share of the time (errata 20, 21).
+        """The margins of the model that the motion passes, and for what share of the time (errata
+        20, 21).
 
         Raises
         ------
@@ -293,14 +362,18 @@ class Motion(Result):
         found = self.sampled_validity
         if found is None:
             if self.dense is None and self.time > self.start:
-                raise ParameterError("a motion computed with dense=False has no validity; leave dense out, or give times=...")
+                raise ParameterError(
+                    "a motion computed with dense=False has no validity; leave dense out, or "
+                    "give times=..."
+                )
             check = ValidityCheck(self.system.in_gap_coordinates)
             if self.dense is not None:
                 check.add(self.dense)
             found = check.result(self.time - self.start)
         if self.limit is None or found.first.get(self.limit, self.time) is not None:
             return found
-        return replace(found, first=found.first | {self.limit: self.time})  # it ended at the very instant
+        # it ended at the very instant
+        return replace(found, first=found.first | {self.limit: self.time})
 
     def samples(self, count: int) -> Samples:
         """States at evenly spaced times over the motion, its start and its end included.
@@ -332,12 +405,21 @@ class Motion(Result):
     def _repr_html_(self) -> str:
         names = self.system.model.coordinates
         state = dict(zip(names, np.atleast_1d(self.position).tolist(), strict=True))
-        facts = {"time": self.time, **state, "velocity": self.velocity, "impacts": len(self.impacts), "stop": self.stop.meaning}
-        return html_table(f"Motion of {type(self.system.model).__name__}", facts | ({"margin": self.limit} if self.limit else {}))
+        facts = {
+            "time": self.time,
+            **state,
+            "velocity": self.velocity,
+            "impacts": len(self.impacts),
+            "stop": self.stop.meaning,
+        }
+        return html_table(
+            f"Motion of {type(self.system.model).__name__}",
+            facts | ({"margin": self.limit} if self.limit else {}),
+        )
 
     def to_xarray(self, times: Numbers | None = None) -> xarray.Dataset:
-        """The motion as a dataset with units and provenance; by default at the times of its samples, else at 200 times in a
-        forcing period, or 2000 in all without a forcing.
+        """The motion as a dataset with units and provenance; by default at the times of its
+        samples, else at 200 times in a forcing period, or 2000 in all without a forcing.
 
         Parameters
         ----------
@@ -348,56 +430,79 @@ class Motion(Result):
 
 
 def motion_of(**fields: Any) -> Motion:
-    """A motion of all its fields. What a frozen dataclass does to set them one by one takes longer than a short motion."""
+    """A motion of all its fields.
+
+    What a frozen dataclass does to set them one by one takes longer than a short motion.
+    """
     motion = object.__new__(Motion)
     vars(motion).update(fields)
     return motion
 
 
 def in_own_coordinates(system: System, motion: Motion) -> Motion:
-    """The motion of a system, from that of `system.in_gap_coordinates`; the same object where that is the system itself."""
+    """The motion of a system, from that of `system.in_gap_coordinates`; the same object where that
+    is the system itself.
+    """
     if motion.system is system:
         return motion
     position, velocity = system.from_gaps(motion.time, motion.position, motion.velocity)
-    one, kept = len(position) == 1, motion.kept
+    one = len(position) == 1
+    kept = motion.kept
     return replace(
         motion,
         system=system,
         position=float(position[0]) if one else tuple(position.tolist()),
         velocity=float(velocity[0]) if one else tuple(velocity.tolist()),
         events=motion.events.in_own_coordinates(system),
-        kept=kept and Samples(kept.time, *system.from_gaps(kept.time, kept.position, kept.velocity), kept.side),
+        kept=kept
+        and Samples(
+            kept.time, *system.from_gaps(kept.time, kept.position, kept.velocity), kept.side
+        ),
     )
 
 
-# --- as a dataset ----------------------------------------------------------------------------------------------------
+# --- as a dataset ------------------------------------------------------------
 
 
 def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
-    """The sampled states over `time` and the impacts over `impact`; the attributes hold all that is needed to repeat the
-    motion."""
+    """The sampled states over `time` and the impacts over `impact`; the attributes hold all that is
+    needed to repeat the motion."""
     import xarray
 
     period = motion.system.load.period
     if times is None and motion.kept is not None:
-        times, position, velocity, side = (getattr(motion.kept, n) for n in ("time", "position", "velocity", "side"))
+        times, position, velocity, side = (
+            getattr(motion.kept, n) for n in ("time", "position", "velocity", "side")
+        )
     else:
         times = _default_times(motion, period) if times is None else instants(times)
         position, velocity, side = motion._states(times)
     names = motion.system.model.coordinates
-    dataset = xarray.Dataset(coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})})
+    dataset = xarray.Dataset(
+        coords={"time": ("time", times, {"units": "1", "long_name": "dimensionless time tau"})}
+    )
     for i, name in enumerate(names):
         unit = motion.system.model.unit_of(name)
         dataset[name] = ("time", position[i], {"units": unit})
-        dataset[rate_name(name, names)] = ("time", velocity[i], {"units": unit, "long_name": f"d {name} / d tau"})
+        dataset[rate_name(name, names)] = (
+            "time",
+            velocity[i],
+            {"units": unit, "long_name": f"d {name} / d tau"},
+        )
     if motion.system.model.holds_coordinates:
         _add_contacts(motion, dataset, side)
     else:
-        dataset["side"] = ("time", side.astype(np.int8), {"units": "1", "long_name": "side, 0 at rest"})
+        dataset["side"] = (
+            "time",
+            side.astype(np.int8),
+            {"units": "1", "long_name": "side, 0 at rest"},
+        )
         for name in ("time", "velocity_before", "velocity_after"):
             unit = "1" if name == "time" else motion.system.model.unit_of(names[0])
             dataset[f"impact_{name}"] = ("impact", getattr(motion.impacts, name), {"units": unit})
-    dataset.attrs = {"title": "motion computed by saltus", "kind": "motion"} | provenance(motion.system, tol=motion.tol)
+    dataset.attrs = {"title": "motion computed by saltus", "kind": "motion"} | provenance(
+        motion.system, tol=motion.tol
+    )
     dataset.attrs |= {
         "stop": motion.stop.value + (f" ({motion.limit})" if motion.limit else ""),
         "end_time": motion.time,
@@ -411,18 +516,30 @@ def to_dataset(motion: Motion, times: Any = None) -> xarray.Dataset:
 
 
 def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> None:
-    """Add the closed contacts, the directions of frictions, and the impacts: times, contacts, positions and velocities."""
-    model, impacts = motion.system.model, motion.impacts
-    names, contacts = model.coordinates, [contact.name for contact in model.contacts]
+    """Add the closed contacts, the directions of frictions, and the impacts: times, contacts,
+    positions and velocities.
+    """
+    model = motion.system.model
+    impacts = motion.impacts
+    names = model.coordinates
+    contacts = [contact.name for contact in model.contacts]
     flags = {"units": "1"} | masks_of(contacts)
     closed, slides, sides = modes_of(model, side)
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
         text += ", 2 where its contact is open" * (friction.contact is not None)
-        dataset[f"sliding_{friction.name}"] = ("time", direction.astype(np.int8), {"units": "1", "long_name": text})
+        dataset[f"sliding_{friction.name}"] = (
+            "time",
+            direction.astype(np.int8),
+            {"units": "1", "long_name": text},
+        )
     for surface, beside in zip(model.surfaces, sides, strict=True):
         text = f"side of the surface {surface.name}"
-        dataset[f"side_{surface.name}"] = ("time", beside.astype(np.int8), {"units": "1", "long_name": text})
+        dataset[f"side_{surface.name}"] = (
+            "time",
+            beside.astype(np.int8),
+            {"units": "1", "long_name": text},
+        )
     if not contacts:
         return
     dataset["closed_contacts"] = (
@@ -431,14 +548,21 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
         flags | {"long_name": "contacts that are closed"},
     )
     dataset["impact_time"] = ("impact", impacts.time, {"units": "1"})
-    dataset["impact_contacts"] = ("impact", impacts.side, flags | {"long_name": "contacts that were hit"})
+    dataset["impact_contacts"] = (
+        "impact",
+        impacts.side,
+        flags | {"long_name": "contacts that were hit"},
+    )
     position = np.full((len(names), len(impacts)), np.nan)
     if motion.dense is not None and len(impacts):
         position = motion._states(impacts.time)[0]
     for i, name in enumerate(names):
         unit = {"units": model.unit_of(name)}
         dataset[f"impact_{name}"] = ("impact", position[i], unit)
-        for when, velocity in (("before", impacts.velocity_before), ("after", impacts.velocity_after)):
+        for when, velocity in (
+            ("before", impacts.velocity_before),
+            ("after", impacts.velocity_after),
+        ):
             jumping = name if name in model.first_order else rate_name(name, names)
             dataset[f"impact_{jumping}_{when}"] = ("impact", velocity[:, i], unit)
 
@@ -449,10 +573,16 @@ def rate_name(name: str, names: tuple[str, ...]) -> str:
 
 
 def _default_times(motion: Motion, period: float | None) -> np.ndarray:
-    count = 10 * PERIOD_SAMPLES if period is None else int(np.ceil(PERIOD_SAMPLES * (motion.time - motion.start) / period))
+    count = (
+        10 * PERIOD_SAMPLES
+        if period is None
+        else int(np.ceil(PERIOD_SAMPLES * (motion.time - motion.start) / period))
+    )
     return np.linspace(motion.start, motion.time, max(2, count + 1))
 
 
 def state_names(names: tuple[str, ...]) -> tuple[str, ...]:
-    """The names of the state variables, coordinates and then velocities, of a model with these coordinates."""
+    """The names of the state variables, coordinates and then velocities, of a model with these
+    coordinates.
+    """
     return *names, *(rate_name(name, names) for name in names)

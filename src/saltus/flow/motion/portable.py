@@ -1,7 +1,8 @@
 """A motion's code and memory for another processor: what the page in a browser is made of.
 
-The kernels are those of this machine, from the same source; a structure's functions are the same texts. Their memory is described
-by tables that are made from the types with which they are compiled, so that nobody writes down twice where a number is.
+The kernels are those of this machine, from the same source; a structure's functions are the same
+texts. Their memory is described by tables that are made from the types with which they are
+compiled, so that nobody writes down twice where a number is.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ ENV = ("parameters", "constants", "breaks", "table")
 
 @dataclass(frozen=True)
 class PortableKernel:
-    """A kernel for another processor: that for models with several contacts or frictions, or that for at most one contact."""
+    """A kernel for another processor: that for models with several contacts or frictions, or that
+    for at most one contact.
+    """
 
     several: bool
 
@@ -65,21 +68,31 @@ class PortableKernel:
 
     @property
     def arguments(self) -> list[dict[str, Any]]:
-        """The arguments of `advance` one after the other: their names, "array", "record" or "function", and the dimensions."""
+        """The arguments of `advance` one after the other: their names, "array", "record" or
+        "function", and the dimensions.
+        """
         names = ("numbers", "state", "env", "functions", "rows", "buffers")
         kinds = (ADVANCE_CONTACTS if self.several else ADVANCE).args
-        return [leaf for name, kind in zip(names, kinds, strict=True) for leaf in _leaves(name, kind)]
+        return [
+            leaf for name, kind in zip(names, kinds, strict=True) for leaf in _leaves(name, kind)
+        ]
 
 
 def _leaves(name: str, kind: Any) -> list[dict[str, Any]]:
     if hasattr(kind, "ndim"):
         record = hasattr(kind.dtype, "fields")
         made = {"name": name, "kind": "record" if record else "array", "dimensions": kind.ndim}
-        return [made | {"whole": str(kind.dtype) == "int64", "size": kind.dtype.size if record else 8}]
+        return [
+            made | {"whole": str(kind.dtype) == "int64", "size": kind.dtype.size if record else 8}
+        ]
     if not hasattr(kind, "types"):
         return [{"name": name, "kind": "function", "dimensions": 0}]
     fields = getattr(kind, "fields", ENV if name == "env" else ("steps", "events"))
-    return [leaf for field, each in zip(fields, kind.types, strict=True) for leaf in _leaves(field, each)]
+    return [
+        leaf
+        for field, each in zip(fields, kind.types, strict=True)
+        for leaf in _leaves(field, each)
+    ]
 
 
 def part_at(system: Any, path: str) -> Any:
@@ -93,18 +106,26 @@ class PortableMotion:
     """What another processor needs to follow the motions of a system, with any numbers."""
 
     def __init__(self, system: System) -> None:
-        self.system, self.run = system, program(system)
+        self.system = system
+        self.run = program(system)
         self.kernel = PortableKernel(self.run.trace.several)
 
         once = {path: part_at(system, path) for path, _ in self._evaluated[0].records}
         self._pulses = [path for path, signal in once.items() if isinstance(signal, Pulse)]
 
     def functions(self) -> list[WrittenFunction]:
-        """The functions of the structure, which the kernel calls, and `edges`, when each pulse of the load begins and ends."""
+        """The functions of the structure, which the kernel calls, and `edges`, when each pulse of
+        the load begins and ends.
+        """
         pulses = [part_at(self._twin, path) for path in self._pulses]
         edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length)])
         drawn = [values_function("drawing", self._drawn[1])] if self._drawn[1] else []
-        return [*structure_functions(self.run.trace), edges, margins_function(*self._evaluated[:2]), *drawn]
+        return [
+            *structure_functions(self.run.trace),
+            edges,
+            margins_function(*self._evaluated[:2]),
+            *drawn,
+        ]
 
     @cached_property
     def _twin(self) -> Any:
@@ -114,42 +135,62 @@ class PortableMotion:
 
     @cached_property
     def _drawn(self) -> tuple[list[dict[str, Any]], list[Expr]]:
-        """The shapes of the model's own drawing, and their points and radii as expressions of the coordinates and the numbers.
+        """The shapes of the model's own drawing, and their points and radii as expressions of the
+        coordinates and the numbers.
 
-        Nothing of a model without one, or with one that cannot be traced, as it compares or needs plain numbers.
+        Nothing of a model without one, or with one that cannot be traced, as it compares or needs
+        plain numbers.
         """
         draw: Any = getattr(self._twin.model, "drawing", None)
         if draw is None:
             return [], []
-        place = np.array([Expr("coordinate", (), i) for i in range(self.run.trace.dof)], dtype=object)
+        place = np.array(
+            [Expr("coordinate", (), i) for i in range(self.run.trace.dof)], dtype=object
+        )
         try:
-            shapes = [(shape, np.asarray(shape.points, dtype=object).reshape(-1, 2)) for shape in draw(place)]
+            shapes = [
+                (shape, np.asarray(shape.points, dtype=object).reshape(-1, 2))
+                for shape in draw(place)
+            ]
         except (SaltusError, ArithmeticError, AttributeError, TypeError, ValueError):
             return [], []
-        parts = [{"kind": shape.kind, "role": shape.role, "points": len(points)} for shape, points in shapes]
+        parts = [
+            {"kind": shape.kind, "role": shape.role, "points": len(points)}
+            for shape, points in shapes
+        ]
         values = [value for shape, points in shapes for value in (*points.ravel(), shape.radius)]
         return parts, [combine("add", value, 0.0) for value in values]
 
     @cached_property
     def _evaluated(self) -> tuple[Trace, tuple[str, ...], bool]:
-        """A trace with what a page can compute along motions, its names, and whether the last of them is the kinetic energy."""
+        """A trace with what a page can compute along motions, its names, and whether the last of
+        them is the kinetic energy.
+        """
         names = self.system.model.margin_names(self.system.load)
         for chosen, energy in ((names, True), (names, False), ((), True)):
             try:
                 traced = trace(self.system, chosen, energy=energy)
             except SaltusError:  # margins may compare, which only Python's own check of a motion can; and not all have an energy
                 continue
-            if traced.records[: len(self.run.trace.records)] == self.run.trace.records:  # the kernel finds its own rows
+            # the kernel finds its own rows
+            if traced.records[: len(self.run.trace.records)] == self.run.trace.records:
                 return traced, tuple(traced.margins), energy
         return self.run.trace, (), False
 
     def layout(self) -> dict[str, Any]:
         """Where all numbers are in memory, and what those of the kernel mean."""
-        trace, structure = self.run.trace, self.run.structure
+        trace = self.run.trace
+        structure = self.run.structure
         before = len(trace.mass) + len(trace.restitution)
-        places = {name: [field[1], bool(np.issubdtype(field[0], np.integer))] for name, field in (MOTION.fields or {}).items()}
+        places = {
+            name: [field[1], bool(np.issubdtype(field[0], np.integer))]
+            for name, field in (MOTION.fields or {}).items()
+        }
         return {
-            **{kind.__name__: {member.name: int(member) for member in kind} for kind in ENUMERATIONS},
+            **{
+                kind.__name__: {member.name: int(member) for member in kind}
+                for kind in ENUMERATIONS
+            },
             "record": places,
             "record_size": MOTION.itemsize,
             "most_size": LIMITS.value,
@@ -159,7 +200,9 @@ class PortableMotion:
             "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
             "constant_count": structure.constant_count + len(self.run.data),
             "data": self.run.data.tolist(),
-            "modes": behind_parameters(structure.frictions, structure.sizes.local) if trace.several else [],
+            "modes": behind_parameters(structure.frictions, structure.sizes.local)
+            if trace.several
+            else [],
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
             "friction_coordinates": list(trace.friction_coordinates),
@@ -173,14 +216,18 @@ class PortableMotion:
             "drawing": self._drawn[0],
             "event_kinds": [str(kind) for kind in EventKind],
             "refusals": {
-                int(status): text for status in Status if (text := refusal(self.system, status, "{time}", "{velocity}"))
+                int(status): text
+                for status in Status
+                if (text := refusal(self.system, status, "{time}", "{velocity}"))
             },
             "stops": self._stops(),
             "stop_meanings": {str(stop): stop.meaning for stop in Stop},
         }
 
     def _records(self) -> dict[str, Any]:
-        """What the load reads of tables: of a pulse, which clock it is; of a record, its own breakpoints and polynomials."""
+        """What the load reads of tables: of a pulse, which clock it is; of a record, its own
+        breakpoints and polynomials.
+        """
         rows: list[dict[str, Any]] = []
         for path, order in self._evaluated[0].records:
             if path in self._pulses:
@@ -188,14 +235,24 @@ class PortableMotion:
             else:
                 breaks, table = record_table(self.system, [(path, order)])
                 rows.append({"breaks": breaks.tolist(), "table": table[0].tolist()})
-        most = 2 * len(self._pulses) + sum({row["breaks"][0]: len(row["breaks"]) for row in rows if "breaks" in row}.values())
+        most = 2 * len(self._pulses) + sum(
+            {row["breaks"][0]: len(row["breaks"]) for row in rows if "breaks" in row}.values()
+        )
         clocks = {"since": SINCE, "within": WITHIN, "after": AFTER}
-        return {"rows": rows, "pulses": len(self._pulses), "most": most, "width": RECORD_WIDTH, **clocks}
+        return {
+            "rows": rows,
+            "pulses": len(self._pulses),
+            "most": most,
+            "width": RECORD_WIDTH,
+            **clocks,
+        }
 
     def _stops(self) -> dict[int, str]:
         """The name of the end of a motion for each reason that the kernel gives."""
         known = {str(stop) for stop in Stop}
-        found = {int(status): status.name.lower() for status in Status if status.name.lower() in known}
+        found = {
+            int(status): status.name.lower() for status in Status if status.name.lower() in known
+        }
         if self.system.model.singularity:
             found[Status.STALLED] = str(Stop.SINGULAR)
         return found | {int(Status.LIMITED): str(Stop.LIMIT)}
@@ -204,14 +261,18 @@ class PortableMotion:
         """The contacts and frictions of the model, by their names."""
         model = self.system.model
         return {
-            "contacts": [{"name": c.name, "coordinate": c.coordinate, "sign": c.sign} for c in model.contacts],
+            "contacts": [
+                {"name": c.name, "coordinate": c.coordinate, "sign": c.sign} for c in model.contacts
+            ],
             "frictions": [{"name": f.name, "coordinate": f.coordinate} for f in model.frictions],
             "sides": [{"side": side} for side in model.sides],
         }
 
 
 def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
-    """The function `edges(parameters, out)`, which fills an array with the values of expressions of the parameters."""
+    """The function `edges(parameters, out)`, which fills an array with the values of expressions of
+    the parameters.
+    """
     return WrittenFunction(
         "edges",
         memory.CONSTANTS,
@@ -222,11 +283,15 @@ def edges_function(roots: Sequence[Expr]) -> WrittenFunction:
 
 
 def margins_function(traced: Trace, names: Sequence[str]) -> WrittenFunction:
-    """The function `margins` of a trace that stops at these: their values at a state, with velocities and accelerations behind
-    the coordinates."""
-    rates = [(op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)]
+    """The function `margins` of a trace that stops at these: their values at a state, with
+    velocities and accelerations behind the coordinates."""
+    rates = [
+        (op, k, i) for k, op in ((1, "velocity"), (2, "acceleration")) for i in range(traced.dof)
+    ]
     behind = {Expr(op, (), i): Expr("coordinate", (), k * traced.dof + i) for op, k, i in rates}
-    return values_function("margins", [substitute_leaves(traced.margins[name], behind) for name in names])
+    return values_function(
+        "margins", [substitute_leaves(traced.margins[name], behind) for name in names]
+    )
 
 
 def values_function(name: str, roots: list[Expr]) -> WrittenFunction:

@@ -1,4 +1,6 @@
-"""Sensitivities: the derivatives of a motion to the state that it starts from and to parameters, impacts included."""
+"""Sensitivities: the derivatives of a motion to the state that it starts from and to parameters,
+impacts included.
+"""
 
 from __future__ import annotations
 
@@ -40,17 +42,19 @@ IRREGULAR = {
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities(Result):
-    """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2 n numbers.
+    """The derivatives of a motion of n degrees of freedom; a state is (coordinates, velocities), 2
+    n numbers.
 
-    They hold for the motion that `simulate` returns for the same arguments. Its start is at a fixed `time`. Its end is at a fixed
-    time if a `duration` was asked for; after a number of `periods` it moves with the load's frequency, and at a margin with the
-    margin. A derivative is one-sided if the motion starts at a contact, is released by a jump of the load, ends on an event, or
-    grazes the contact (see `grazings`).
+    They hold for the motion that `simulate` returns for the same arguments. Its start is at a fixed
+    `time`. Its end is at a fixed time if a `duration` was asked for; after a number of `periods` it
+    moves with the load's frequency, and at a margin with the margin. A derivative is one-sided if
+    the motion starts at a contact, is released by a jump of the load, ends on an event, or grazes
+    the contact (see `grazings`).
 
-    `event_times` has a row for each of `motion.events` and a column for each initial coordinate, initial velocity and
-    parameter: the derivatives of the event's time. They are nan if the event has none (a grazing, the beginning of chatter, or
-    impacts or releases of several contacts that are not simultaneous in neighbouring motions), and after the motion has lost its
-    derivative.
+    `event_times` has a row for each of `motion.events` and a column for each initial coordinate,
+    initial velocity and parameter: the derivatives of the event's time. They are nan if the event
+    has none (a grazing, the beginning of chatter, or impacts or releases of several contacts that
+    are not simultaneous in neighbouring motions), and after the motion has lost its derivative.
 
     Attributes
     ----------
@@ -65,11 +69,13 @@ class Sensitivities(Result):
     event_times
         The derivatives of the events' times, as above, (events, 2 n + parameters).
     grazings
-        The times at which the motion touches the contact; motions that pass on the other side have other derivatives.
+        The times at which the motion touches the contact; motions that pass on the other side have
+        other derivatives.
     undefined
         Why some or all derivatives at the end do not exist; these are nan.
     tangent
-        The Taylor series of the derivatives along the motion, from which `at` evaluates them; None where they were not kept.
+        The Taylor series of the derivatives along the motion, from which `at` evaluates them; None
+        where they were not kept.
     at_end
         The derivatives at the end at a fixed time, (2 n, 2 n + parameters).
 
@@ -91,12 +97,13 @@ class Sensitivities(Result):
     at_end: np.ndarray
 
     def at(self, times: Numbers) -> np.ndarray:
-        """The derivatives of the state at any times of the motion, at fixed times and to its accuracy; at an impact, those
-        just after it.
+        """The derivatives of the state at any times of the motion, at fixed times and to its
+        accuracy; at an impact, those just after it.
 
-        They jump at impacts with the state. Just before one they are those of the last number below its time,
-        `np.nextafter(time, -np.inf)`. A motion whose end moves, with the forcing period or with a margin, has in `state` and
-        `parameters` the derivatives of the moving end, and here those at the fixed time.
+        They jump at impacts with the state. Just before one they are those of the last number below
+        its time, `np.nextafter(time, -np.inf)`. A motion whose end moves, with the forcing period
+        or with a margin, has in `state` and `parameters` the derivatives of the moving end, and
+        here those at the fixed time.
 
         Parameters
         ----------
@@ -106,8 +113,9 @@ class Sensitivities(Result):
         Returns
         -------
         np.ndarray
-            (2 n, 2 n + parameters) for one time, (m, 2 n, 2 n + parameters) for m: rows as in `state`, and the columns of
-            `event_times`. They are nan from where the motion has lost its derivative.
+            (2 n, 2 n + parameters) for one time, (m, 2 n, 2 n + parameters) for m: rows as in
+            `state`, and the columns of `event_times`. They are nan from where the motion has lost
+            its derivative.
 
         Raises
         ------
@@ -120,7 +128,8 @@ class Sensitivities(Result):
         >>> result.at([0.0, 1.0]).shape
         (2, 2, 3)
         """
-        wanted, motion = instants(times), self.motion
+        wanted = instants(times)
+        motion = self.motion
         motion._check_times(wanted)
         found = np.broadcast_to(self.at_end, (wanted.size, *self.at_end.shape)).copy()
         inner = wanted < motion.time
@@ -128,36 +137,78 @@ class Sensitivities(Result):
             assert self.tangent is not None
             rates = self.tangent.states(wanted[inner])[:2]
             own = len(motion.system.in_gap_coordinates.model.coordinates)
-            columns = np.concatenate([x.reshape(-1, own, x.shape[1]) for x in rates], axis=1).transpose(2, 1, 0)
+            columns = np.concatenate(
+                [x.reshape(-1, own, x.shape[1]) for x in rates], axis=1
+            ).transpose(2, 1, 0)
             start = motion._states(np.array([motion.start]))[:2]
-            found[inner] = OwnColumns(motion.system, self.parameter_paths, motion.start, start).later(
-                wanted[inner], motion, columns
-            )
+            found[inner] = OwnColumns(
+                motion.system, self.parameter_paths, motion.start, start
+            ).later(wanted[inner], motion, columns)
         return found[0] if np.ndim(times) == 0 else found
 
     @property
     def determinant(self) -> float:
-        """The determinant of `state`, by which the flow has scaled volumes of states; 0 after rest, nan where `state` is nan."""
+        """The determinant of `state`, by which the flow has scaled volumes of states; 0 after rest,
+        nan where `state` is nan.
+        """
         return float(np.linalg.det(self.state)) if np.isfinite(self.state).all() else math.nan
 
     def to_xarray(self) -> xarray.Dataset:
-        """`derivative` (state, to) of the state at the end, and `event_time_derivative` (event, to) of the events' times."""
+        """`derivative` (state, to) of the state at the end, and `event_time_derivative` (event, to)
+        of the events' times.
+        """
         system = self.motion.system
         names = state_names(system.model.coordinates)
         to = [*(f"start_{name}" for name in names), *self.parameter_paths]
         columns: dict[str, tuple[Any, ...]] = {
-            "derivative": (("state", "to"), np.hstack([self.state, self.parameters]), "1", "of the state at the end"),
-            "event_time": ("event", [event.time for event in self.motion.events], "1", "times of the motion's events"),
-            "event_kind": ("event", [event.kind.value for event in self.motion.events], "1", "what they are"),
-            "event_time_derivative": (("event", "to"), self.event_times, "1", "of the events' times"),
-            "grazing_time": ("grazing", self.grazings, "1", "times at which the motion touches the contact"),
+            "derivative": (
+                ("state", "to"),
+                np.hstack([self.state, self.parameters]),
+                "1",
+                "of the state at the end",
+            ),
+            "event_time": (
+                "event",
+                [event.time for event in self.motion.events],
+                "1",
+                "times of the motion's events",
+            ),
+            "event_kind": (
+                "event",
+                [event.kind.value for event in self.motion.events],
+                "1",
+                "what they are",
+            ),
+            "event_time_derivative": (
+                ("event", "to"),
+                self.event_times,
+                "1",
+                "of the events' times",
+            ),
+            "grazing_time": (
+                "grazing",
+                self.grazings,
+                "1",
+                "times at which the motion touches the contact",
+            ),
         }
         facts = {"end_time": self.motion.time, "undefined": self.undefined or ""}
-        return result_dataset("sensitivities", columns, {"state": list(names), "to": to}, system, tol=self.motion.tol, **facts)
+        return result_dataset(
+            "sensitivities",
+            columns,
+            {"state": list(names), "to": to},
+            system,
+            tol=self.motion.tol,
+            **facts,
+        )
 
     def __repr__(self) -> str:
         to = ", ".join(("state", *self.parameter_paths))
-        rest = f", undefined: {self.undefined}" if self.undefined else f", determinant={self.determinant:.6g}"
+        rest = (
+            f", undefined: {self.undefined}"
+            if self.undefined
+            else f", determinant={self.determinant:.6g}"
+        )
         return f"Sensitivities(of {self.motion!r} to {to}{rest})"
 
 
@@ -176,16 +227,18 @@ def sensitivities(
     progress: Progress = silent,
     **coordinates: float,
 ) -> Sensitivities:
-    """The derivatives of an exact motion to its initial state and to parameters, with the saltation of every event.
+    """The derivatives of an exact motion to its initial state and to parameters, with the saltation
+    of every event.
 
-    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, which is expanded together with the motion, in the same steps. At an
-    impact v+ = R(v-, t, c) at the contact x(c), whose time has the derivative dt = (x_c - u-) / v-,
+    Along an arc u = dq/dc obeys u'' = a_q u + a_v u' + a_c, which is expanded together with the
+    motion, in the same steps. At an impact v+ = R(v-, t, c) at the contact x(c), whose time has the
+    derivative dt = (x_c - u-) / v-,
 
         u+ = x_c - v+ dt,     u'+ = R_v (u'- + a_old dt) + R_t dt + R_c - a_new dt.
 
-    The determinant of this map is R_v v+ / v-. A release moves with the root of the contact acceleration; at rest the derivatives
-    are those of the contact's position. With several contacts the law of the acting contacts is differentiated (see
-    `contacts/tangent.py`).
+    The determinant of this map is R_v v+ / v-. A release moves with the root of the contact
+    acceleration; at rest the derivatives are those of the contact's position. With several contacts
+    the law of the acting contacts is differentiated (see `contacts/tangent.py`).
 
     Parameters
     ----------
@@ -199,7 +252,8 @@ def sensitivities(
     Raises
     ------
     ParameterError
-        A path leads to no number (the message has similar paths), or another argument has no meaning.
+        A path leads to no number (the message has similar paths), or another argument has no
+        meaning.
     MotionError
         As for `simulate`.
 
@@ -227,16 +281,25 @@ def sensitivities(
     return derivatives_of(request, None, progress)
 
 
-def derivatives_of(request: MotionRequest, run: Program | None, progress: Progress = silent) -> Sensitivities:
+def derivatives_of(
+    request: MotionRequest, run: Program | None, progress: Progress = silent
+) -> Sensitivities:
     """`sensitivities` of a request, with its program if that is known."""
-    followed, paths = follow(request, progress, run), request.sensitivities or ()
-    motion, n = followed.motion, len(request.given.model.coordinates)
-    rates, at_end = state_rates(motion), followed.columns
-    seen, event_times = in_own_coordinates(request.given, motion), followed.shifts
+    followed = follow(request, progress, run)
+    paths = request.sensitivities or ()
+    motion = followed.motion
+    n = len(request.given.model.coordinates)
+    rates = state_rates(motion)
+    at_end = followed.columns
+    seen = in_own_coordinates(request.given, motion)
+    event_times = followed.shifts
     if seen is not motion:
         start = request.given.from_gaps(request.time, *np.split(request.start, 2))
         own = OwnColumns(request.given, paths, request.time, [x[:, None] for x in start])
-        at_end, event_times = own.later(np.array([motion.time]), seen, at_end[None])[0], own.of_start(event_times)
+        at_end, event_times = (
+            own.later(np.array([motion.time]), seen, at_end[None])[0],
+            own.of_start(event_times),
+        )
         rates = own.rates(motion.time, motion.position, rates)
     shift = _end_shift(motion, event_times, paths, request.periods)
     columns = at_end + np.outer(rates, shift) if shift.any() else at_end
@@ -255,9 +318,11 @@ def derivatives_of(request: MotionRequest, run: Program | None, progress: Progre
 
 @dataclass(frozen=True, eq=False)
 class OwnColumns:
-    """Derivatives in a system's own coordinates, from those of `system.in_gap_coordinates`; the same where that is itself.
+    """Derivatives in a system's own coordinates, from those of `system.in_gap_coordinates`; the
+    same where that is itself.
 
-    With the states x of the system and y of the other one, y_0 = in(x_0, c) at the start and x = out(y, c) at a time,
+    With the states x of the system and y of the other one, y_0 = in(x_0, c) at the start and x =
+    out(y, c) at a time,
 
         dx/dx_0 = out_y (dy/dy_0) in_x,    dx/dc = out_y (dy/dc + (dy/dy_0) in_c) + out_c.
     """
@@ -268,9 +333,14 @@ class OwnColumns:
     start: Any  # the own coordinates and velocities there, (n, 1) each
 
     def of_start(self, columns: np.ndarray) -> np.ndarray:
-        """Columns (..., 2 n + parameters) along the own state at the start and along parameters at this fixed state."""
-        model, load, n = self._model, self.system.load, len(self._model.coordinates)
-        into, first = state_slopes(model.gap_values, self.time, self.start, load)[0], columns[..., : 2 * n]
+        """Columns (..., 2 n + parameters) along the own state at the start and along parameters at
+        this fixed state.
+        """
+        model = self._model
+        load = self.system.load
+        n = len(self._model.coordinates)
+        into = state_slopes(model.gap_values, self.time, self.start, load)[0]
+        first = columns[..., : 2 * n]
         moved = first @ self._by_numbers("gap_values", self.time, *self.start)[0]
         return np.concatenate([first @ into, columns[..., 2 * n :] + moved], axis=-1)
 
@@ -288,19 +358,32 @@ class OwnColumns:
     def rates(self, time: float, position: Any, rates: np.ndarray) -> np.ndarray:
         """The velocity and acceleration of the own coordinates at a time, (2 n,)."""
         v, a = ([*x] if len(x) > 1 else x[0] for x in np.split(rates, 2))
-        return np.concatenate([np.atleast_1d(x) for x in self._model.own_values(time, self.system.load, position, v, a)[1:]])
+        return np.concatenate(
+            [
+                np.atleast_1d(x)
+                for x in self._model.own_values(time, self.system.load, position, v, a)[1:]
+            ]
+        )
 
     @property
     def _model(self) -> Any:
         return self.system.in_gap_coordinates.model
 
-    def _by_numbers(self, method: str, times: Any, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """The derivatives of `own_values` or `gap_values` to the parameters, (m, 2 n, parameters), at complex numbers."""
+    def _by_numbers(
+        self, method: str, times: Any, position: np.ndarray, velocity: np.ndarray
+    ) -> np.ndarray:
+        """The derivatives of `own_values` or `gap_values` to the parameters, (m, 2 n, parameters),
+        at complex numbers.
+        """
         size = len((self.system.model if method == "own_values" else self._model).coordinates)
-        step, found = 1e-100, np.zeros((position.shape[1], 2 * size, len(self.paths)))
+        step = 1e-100
+        found = np.zeros((position.shape[1], 2 * size, len(self.paths)))
         for j, path in enumerate(self.paths):
             chosen = {path: 1j * step}
-            twin = substitute(self.system.in_gap_coordinates, lambda at, x, by=chosen: x + by[at] if at in by else x)  # type: ignore[misc]
+            twin = substitute(
+                self.system.in_gap_coordinates,
+                lambda at, x, by=chosen: x + by[at] if at in by else x,  # type: ignore[misc]
+            )
             given = ([*values] if len(values) > 1 else values[0] for values in (position, velocity))
             changed = getattr(twin.model, method)(times, twin.load, *given)
             each = [x for part in changed for x in (part if isinstance(part, tuple) else (part,))]
@@ -310,16 +393,23 @@ class OwnColumns:
 
 
 def state_slopes(lead: Any, times: Any, states: Sequence[Any], load: Any) -> np.ndarray:
-    """The derivatives, at complex numbers, of the states that `lead` makes, `own_values` or `gap_values`, to the states that it
-    is given: coordinates and velocities of m motions, (n, m) each; (m, 2 c, 2 n) for c coordinates that `lead` returns."""
-    state, step, n = np.array([*states[0], *states[1]], dtype=complex), 1e-100, len(states[0])
+    """The derivatives, at complex numbers, of the states that `lead` makes, `own_values` or
+    `gap_values`, to the states that it is given: coordinates and velocities of m motions, (n, m)
+    each; (m, 2 c, 2 n) for c coordinates that `lead` returns."""
+    state = np.array([*states[0], *states[1]], dtype=complex)
+    step = 1e-100
+    n = len(states[0])
     found = []
     for j in range(2 * n):
         beside = state.copy()
         beside[j] += 1j * step
-        changed = lead(times, load, *(tuple(half) if n > 1 else half[0] for half in np.split(beside, 2)))
+        changed = lead(
+            times, load, *(tuple(half) if n > 1 else half[0] for half in np.split(beside, 2))
+        )
         values = [x for part in changed for x in (part if isinstance(part, tuple) else (part,))]
-        found.append(np.stack([np.imag(x) / step * np.ones(state.shape[1]) for x in values], axis=1))
+        found.append(
+            np.stack([np.imag(x) / step * np.ones(state.shape[1]) for x in values], axis=1)
+        )
     return np.stack(found, axis=-1)
 
 
@@ -334,43 +424,70 @@ def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
-def _end_shift(motion: Motion, event_times: np.ndarray, paths: tuple[str, ...], periods: float | None) -> np.ndarray:
-    """The shift of the time at the end along each column: with the margin that ends the motion, or with the forcing period."""
+def _end_shift(
+    motion: Motion, event_times: np.ndarray, paths: tuple[str, ...], periods: float | None
+) -> np.ndarray:
+    """The shift of the time at the end along each column: with the margin that ends the motion, or
+    with the forcing period.
+    """
     shift = np.zeros(event_times.shape[1])
     if motion.stop is Stop.LIMIT:
         return np.asarray(event_times[-1])
     if periods is not None and FREQUENCY in paths:
         frequency = motion.system.load.frequency
         assert frequency is not None
-        shift[shift.size - len(paths) + paths.index(FREQUENCY)] = -2.0 * math.pi * periods / frequency**2
+        shift[shift.size - len(paths) + paths.index(FREQUENCY)] = (
+            -2.0 * math.pi * periods / frequency**2
+        )
     return shift
 
 
 def state_rates(motion: Motion) -> np.ndarray:
     """The time derivative of the state at the end of a motion, (2 degrees of freedom,)."""
-    system, side = motion.system, motion.side
+    system = motion.system
+    side = motion.side
     velocity = np.atleast_1d(motion.velocity)
     if side == 0:
         return np.zeros(2 * velocity.size)
     acceleration: Any
     if system.model.holds_coordinates:
-        held = {contact.coordinate for contact in system.model.contacts if contact.name in motion.closed}
-        above = [each.sign * s for each, s in zip(system.model.surfaces, motion.sides.values(), strict=True)]
+        held = {
+            contact.coordinate for contact in system.model.contacts if contact.name in motion.closed
+        }
+        above = [
+            each.sign * s
+            for each, s in zip(system.model.surfaces, motion.sides.values(), strict=True)
+        ]
         slides = [*motion.sliding.values(), *above]
-        held |= {friction.coordinate for friction, s in zip(system.model.frictions, slides, strict=False) if s == 0}
-        free, q = [float(name not in held) for name in system.model.coordinates], motion.position
-        acceleration = solved_motion(system.model, motion.time, q, motion.velocity, system.load, free, slides).acceleration
+        held |= {
+            friction.coordinate
+            for friction, s in zip(system.model.frictions, slides, strict=False)
+            if s == 0
+        }
+        free = [float(name not in held) for name in system.model.coordinates]
+        q = motion.position
+        acceleration = solved_motion(
+            system.model, motion.time, q, motion.velocity, system.load, free, slides
+        ).acceleration
     else:
-        acceleration = system.model.acceleration(motion.time, motion.position, motion.velocity, float(side), system.load)
+        acceleration = system.model.acceleration(
+            motion.time, motion.position, motion.velocity, float(side), system.load
+        )
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
 
 
 def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
-    """Why some columns are nan: the last event at which the motion has lost its derivative; None if all are finite."""
+    """Why some columns are nan: the last event at which the motion has lost its derivative; None if
+    all are finite.
+    """
     if np.isfinite(columns).all():
         return None
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
-        if event.kind is EventKind.IMPACT and motion.system.model.contacts and detail != ImpactDetail.REGULAR:
+        if (
+            event.kind is EventKind.IMPACT
+            and motion.system.model.contacts
+            and detail != ImpactDetail.REGULAR
+        ):
             return IRREGULAR[ImpactDetail(detail)].format(time=event.time)
         if event.kind is EventKind.CHATTER:
             return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"

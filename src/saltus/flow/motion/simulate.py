@@ -1,4 +1,6 @@
-"""Simulation: from a system and a state to a motion; and the request for one, its arguments, read and checked once."""
+"""Simulation: from a system and a state to a motion; and the request for one, its arguments, read
+and checked once.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,15 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
-from saltus.flow.motion.kernel_state import MOST, Again, ContactState, KernelState, Recorder, remember, time_of
+from saltus.flow.motion.kernel_state import (
+    MOST,
+    Again,
+    ContactState,
+    KernelState,
+    Recorder,
+    remember,
+    time_of,
+)
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
 from saltus.progress import Progress, silent
@@ -22,7 +32,17 @@ from saltus.systems import System, check_system, read_start
 from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
-ARGUMENTS = ("velocity", "periods", "duration", "tol", "time", "side", "stop_at", "dense", "progress")
+ARGUMENTS = (
+    "velocity",
+    "periods",
+    "duration",
+    "tol",
+    "time",
+    "side",
+    "stop_at",
+    "dense",
+    "progress",
+)
 
 MOST_PERIODS = 2**53  # as many as can be counted exactly
 
@@ -38,31 +58,38 @@ class Clock(NamedTuple):
 
 
 def clock(time: Any, length: Any, periods: float | None, duration: float | None) -> Clock:
-    """The start and the end of motions that begin at `time`, under loads of period `length` (or None), and last `periods` or
-    `duration`.
+    """The start and the end of motions that begin at `time`, under loads of period `length` (or
+    None), and last `periods` or `duration`.
 
     Raises
     ------
     ParameterError
-        Both of `periods` and `duration` are given, or neither; one is negative or too long to count; or `periods` is given
-        without a forcing period.
+        Both of `periods` and `duration` are given, or neither; one is negative or too long to
+        count; or `periods` is given without a forcing period.
     """
     if (periods is None) == (duration is None):
         raise ParameterError("say how long: either periods=... or duration=...", "periods")
     span = periods if duration is None else duration
-    check_number("periods" if duration is None else "duration", span, at_least=0.0, at_most=LIMITS.periods)
+    check_number(
+        "periods" if duration is None else "duration", span, at_least=0.0, at_most=LIMITS.periods
+    )
     assert span is not None
     if length is None:
         if periods is not None:
             raise ParameterError(
-                "the load has no frequency, so there are no forcing periods; give duration=... instead", "periods"
+                "the load has no frequency, so there are no forcing periods; give duration=... instead",
+                "periods",
             )
         return Clock(0, time, 0, time + span, 0.0)
     one = isinstance(time, float) and isinstance(length, float)  # without arrays, which take longer
-    divided, reach = divmod if one else np.divmod, abs(time) / length + (span / length if periods is None else span)
+    divided = divmod if one else np.divmod
+    reach = abs(time) / length + (span / length if periods is None else span)
     reach = reach if one else np.max(reach, initial=0.0)
     if not reach < MOST_PERIODS:
-        raise ParameterError(f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them", "time")
+        raise ParameterError(
+            f"the motion must start and end within 2^53 forcing periods, got {reach:g} of them",
+            "time",
+        )
     first, local = divided(time, length)
     if periods is None:
         passed, end = divided(local + span, length)
@@ -83,7 +110,8 @@ class MotionPlan(NamedTuple):
 
 
 class MotionRequest:
-    """The arguments of `simulate` as they are given, and the quantities that follow from them; it is not changed once it is made.
+    """The arguments of `simulate` as they are given, and the quantities that follow from them; it
+    is not changed once it is made.
 
     Attributes
     ----------
@@ -122,26 +150,34 @@ class MotionRequest:
         dense_tangent: bool = True,
     ) -> None:
         check_system(system, "simulate", several_contacts=True)
-        structure_key(system)  # what a system remembers is forgotten where values that its classes read have changed
+        # what a system remembers is forgotten where values that its classes read have changed
+        structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
-        self.given, self.system = system, system.in_gap_coordinates
-        self.plan = _plan(system, (periods, duration, tol, time, side, stop_at, dense, times is None))
+        self.given = system
+        self.system = system.in_gap_coordinates
+        self.plan = _plan(
+            system, (periods, duration, tol, time, side, stop_at, dense, times is None)
+        )
         self.limits, self.clock = self.plan.limits, self.plan.clock
         for i, name in self.plan.angles:
             notice_degrees(name, start.item(i))
-        self.time, self.tol = float(time), float(tol)
+        self.time = float(time)
+        self.tol = float(tol)
         self.start = start
         if self.system is not system:
             structure_key(self.system)
             self.start = np.concatenate(system.to_gaps(self.time, *np.split(start, 2)))
         self.sample_times = None if times is None else _sample_times(times, self.time)
-        self.periods, self.side, self.sensitivities = periods, side, sensitivities
-        self.dense, self.dense_tangent = dense, dense_tangent
+        self.periods = periods
+        self.side = side
+        self.sensitivities = sensitivities
+        self.dense = dense
+        self.dense_tangent = dense_tangent
 
 
 def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
-    """The plan of a request. A system remembers the last one: in a loop the arguments are the same objects at every call, and
-    are checked once."""
+    """The plan of a request. A system remembers the last one: in a loop the arguments are the same
+    objects at every call, and are checked once."""
     last: list[MotionPlan] = system._remembered("plan", list)
     for plan in last:
         if all(map(is_, plan.asked, asked)):
@@ -161,13 +197,18 @@ def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
     return made
 
 
-# The names of the arguments, without and with derivatives: a misspelt one arrives among the coordinates.
+# The names of the arguments, without and with derivatives: a misspelt one arrives among the
+# coordinates.
 NAMES = (*ARGUMENTS, "times"), (*ARGUMENTS, "parameters")
 
 
 def _angles(system: System) -> list[tuple[int, str]]:
     """The coordinates that are angles, each with its place."""
-    return [(i, name) for i, name in enumerate(system.model.coordinates) if system.model.unit_of(name) == "rad"]
+    return [
+        (i, name)
+        for i, name in enumerate(system.model.coordinates)
+        if system.model.unit_of(name) == "rad"
+    ]
 
 
 def _check_dense(when: Clock, periods: float | None, duration: float | None) -> None:
@@ -185,8 +226,16 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
         times = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
         times = np.array([np.nan])
-    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < start).any():
-        raise ParameterError(f"times must be numbers that do not decrease, from the start {start:g} on, got {given!r}", "times")
+    if (
+        times.ndim != 1
+        or not np.isfinite(times).all()
+        or (np.diff(times) < 0).any()
+        or (times < start).any()
+    ):
+        raise ParameterError(
+            f"times must be numbers that do not decrease, from the start {start:g} on, got {given!r}",
+            "times",
+        )
     return times
 
 
@@ -222,16 +271,19 @@ def simulate(
     tol
         The error that one step may make, relative to the state, in [1e-15, 1e-6].
     time
-        The dimensionless time at the start. As any number it is rounded to 1e-16 of its size, and the phase of the load with it:
-        far from 0 (6e-11 at 1e6, 1e-4 at 1e12) give the time within a forcing period instead.
+        The dimensionless time at the start. As any number it is rounded to 1e-16 of its size, and
+        the phase of the load with it: far from 0 (6e-11 at 1e6, 1e-4 at 1e12) give the time within
+        a forcing period instead.
     side
         The side, +1 or -1, to which the motion goes from rest at the contact if that is not unique.
     stop_at
-        Margins of the model that end the motion, such as "kinematic_limit"; the model's own `stops` always do.
+        Margins of the model that end the motion, such as "kinematic_limit"; the model's own `stops`
+        always do.
     dense
         Whether to keep the motion between the events; with False only the events are kept.
     times
-        Times at which the states are kept in place of the whole motion, for motions that are too long to be kept whole.
+        Times at which the states are kept in place of the whole motion, for motions that are too
+        long to be kept whole.
     progress
         Called from time to time with the fraction done and what is being done.
     coordinates
@@ -242,7 +294,8 @@ def simulate(
     ParameterError
         An argument has no meaning.
     MotionError
-        The motion is not unique, an impact has no solution, or the numbers overflow; the message says at which time.
+        The motion is not unique, an impact has no solution, or the numbers overflow; the message
+        says at which time.
 
     Examples
     --------
@@ -269,13 +322,19 @@ def simulate(
     return in_own_coordinates(system, follow(request, progress).motion)
 
 
-def _like_the_last(system: Any, asked: tuple[Any, ...], coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:
-    """The motion, if this system was followed before with the same arguments but the start, and kept a way to do it again."""
+def _like_the_last(
+    system: Any, asked: tuple[Any, ...], coordinates: Mapping[str, Any], velocity: Any
+) -> Motion | None:
+    """The motion, if this system was followed before with the same arguments but the start, and
+    kept a way to do it again.
+    """
     memory = getattr(system, "_memory", None)
     for plan in memory.get("plan", ()) if memory else ():
         for again in plan.again if all(map(is_, plan.asked, asked)) else ():
             structure_key(system)  # as for every motion
-            return again(system, coordinates, velocity) if again and system._memory is memory else None
+            return (
+                again(system, coordinates, velocity) if again and system._memory is memory else None
+            )
     return None
 
 
@@ -303,7 +362,9 @@ class Followed(NamedTuple):
 
 
 def follow(request: MotionRequest, progress: Progress, run: Program | None = None) -> Followed:
-    """Follow the motion of a request, with its tangent if the request asks for one; `run` is its program, if that is known."""
+    """Follow the motion of a request, with its tangent if the request asks for one; `run` is its
+    program, if that is known.
+    """
     made = run or known_program(request.system, request.limits, request.sensitivities)
     now = (ContactState if made.structure.several else KernelState)(request, made)
     recorder = Recorder(request, made, taylor_order(request.tol))
@@ -313,11 +374,20 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
     return Followed(_collect(request, now, status, numbers, recorder), now, recorder)
 
 
-def _advance(request: MotionRequest, run: Program, now: KernelState, recorder: Recorder, progress: Progress) -> tuple[int, Any]:
-    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended, and its numbers then."""
-    at, system, many = request.clock, request.system, MOST.burst if run.structure.several else MOST.rate
-    begin, end = at.first * at.length + at.local, at.last * at.length + at.end
-    checked_at, counted, unit = begin, 0, min(at.length or 1.0, 1.0) * many / MOST.rate
+def _advance(
+    request: MotionRequest, run: Program, now: KernelState, recorder: Recorder, progress: Progress
+) -> tuple[int, Any]:
+    """Call the kernel until the motion ends, emptying its buffers in between; returns why it ended,
+    and its numbers then.
+    """
+    at = request.clock
+    system = request.system
+    many = MOST.burst if run.structure.several else MOST.rate
+    begin = at.first * at.length + at.local
+    end = at.last * at.length + at.end
+    checked_at = begin
+    counted = 0
+    unit = min(at.length or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
@@ -337,7 +407,8 @@ def _advance(request: MotionRequest, run: Program, now: KernelState, recorder: R
                     f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
                     f"{_why_so_many(system, recorder)}, or ask for a shorter time"
                 )
-            checked_at, counted = time, recorder.total
+            checked_at = time
+            counted = recorder.total
         if recorder.total > MOST.events:
             raise MotionError(
                 f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
@@ -348,17 +419,24 @@ def _advance(request: MotionRequest, run: Program, now: KernelState, recorder: R
 
 
 def _at_contacts(system: System, recorder: Recorder) -> str:
-    """The contacts of the last impacts with their restitution, in words; empty for a model with one contact."""
+    """The contacts of the last impacts with their restitution, in words; empty for a model with one
+    contact.
+    """
     if not system.model.contacts:
         return ""
-    matrix, hit = system.impact.restitution_matrix(system.model), recorder.last_hit()
-    return " at " + " and ".join(f"{system.model.contacts[i].name!r} (e = {float(matrix[i][i]):g})" for i in hit)
+    matrix = system.impact.restitution_matrix(system.model)
+    hit = recorder.last_hit()
+    return " at " + " and ".join(
+        f"{system.model.contacts[i].name!r} (e = {float(matrix[i][i]):g})" for i in hit
+    )
 
 
 def _why_so_many(system: System, recorder: Recorder) -> str:
     """Why impacts follow one another so fast, and what to change, in words."""
     matrix = system.impact.restitution_matrix(system.model) if system.model.contacts else []
-    if any(float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())):
+    if any(
+        float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())
+    ):
         return (
             "without a loss impacts on a contact that stays pressed never end, and with several contacts they are not averaged; "
             "give them a loss, an e below 1"
@@ -368,9 +446,13 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
 
 def _refuse_crushed(system: System, now: KernelState, chosen: list[int]) -> None:
     """Refuse a motion in which these contacts close in on a body between them."""
-    own, first = now.numbers.own, now.numbers.dof
+    own = now.numbers.own
+    first = now.numbers.dof
     if sentence := crushed(
-        system, time_of(now.numbers), np.concatenate([now.state[:own], now.state[first : first + own]]), chosen
+        system,
+        time_of(now.numbers),
+        np.concatenate([now.state[:own], now.state[first : first + own]]),
+        chosen,
     ):
         raise MotionError(sentence)
 
@@ -378,11 +460,16 @@ def _refuse_crushed(system: System, now: KernelState, chosen: list[int]) -> None
 def _refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
     numbers = now.numbers
-    time, own = time_of(numbers), numbers.own
-    position, velocity = now.state[:own], now.state[numbers.dof : numbers.dof + own]
+    time = time_of(numbers)
+    own = numbers.own
+    position = now.state[:own]
+    velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT):
-        gaps = [each.gap(position[system.model.coordinates.index(each.coordinate)]) for each in system.model.contacts]
+        gaps = [
+            each.gap(position[system.model.coordinates.index(each.coordinate)])
+            for each in system.model.contacts
+        ]
         _refuse_crushed(system, now, [i for i, gap in enumerate(gaps) if np.isclose(gap, 0.0)])
         sentence = paradox(system, time, (tuple(position), tuple(velocity))) or sentence
     if sentence is not None:
@@ -390,7 +477,9 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
 
 
 def refusal(system: System, status: int, time: str, velocity: str) -> str | None:
-    """The sentence for a status that is no regular end of a motion, at a time and with a velocity given as text; else None."""
+    """The sentence for a status that is no regular end of a motion, at a time and with a velocity
+    given as text; else None.
+    """
     at = f"at time {time}"
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.holds_coordinates:
         choice = "no choice of closed contacts, and of what sticks, is consistent"
@@ -424,17 +513,33 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     return None
 
 
-def _collect(request: MotionRequest, now: KernelState, status: int, numbers: Any, recorder: Recorder) -> Motion:
+def _collect(
+    request: MotionRequest, now: KernelState, status: int, numbers: Any, recorder: Recorder
+) -> Motion:
     """The motion from the kernel's last state and its records."""
-    events, start = recorder.all_events(), request.time
-    time, mode, own, state = time_of(numbers), numbers.mode, numbers.own, now.state.tolist()
-    position, velocity, side = state[:own], state[numbers.dof : numbers.dof + own], now.side(numbers)
-    stop, limit = (Stop.REST if mode == Mode.REST else Stop.HORIZON), None
+    events = recorder.all_events()
+    start = request.time
+    time = time_of(numbers)
+    mode = numbers.mode
+    own = numbers.own
+    state = now.state.tolist()
+    position = state[:own]
+    velocity = state[numbers.dof : numbers.dof + own]
+    side = now.side(numbers)
+    stop = Stop.REST if mode == Mode.REST else Stop.HORIZON
+    limit = None
     if status == Status.LIMITED:
-        stop, limit = Stop.LIMIT, request.limits[events.details[-1]]
+        stop = Stop.LIMIT
+        limit = request.limits[events.details[-1]]
     if status == Status.STALLED:
-        stop, limit = Stop.SINGULAR, request.system.model.singularity  # `_refuse` lets no other motion stall
-    samples = None if request.sample_times is None else recorder.samples(time, np.array(position), np.array(velocity), side)
+        # `_refuse` lets no other motion stall
+        stop = Stop.SINGULAR
+        limit = request.system.model.singularity
+    samples = (
+        None
+        if request.sample_times is None
+        else recorder.samples(time, np.array(position), np.array(velocity), side)
+    )
     return motion_of(
         system=request.system,
         tol=request.tol,

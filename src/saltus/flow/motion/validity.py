@@ -1,4 +1,6 @@
-"""Dense output, the Taylor series of every step, the validity of a motion, by the margins along it, and why none leads beyond."""
+"""Dense output, the Taylor series of every step, the validity of a motion, by the margins along it,
+and why none leads beyond.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,19 @@ from saltus.flow.kernel.layout import LOSSLESS
 from saltus.progress import html_table, rows_table
 from saltus.systems import System, energy_gain, friction_margins
 
-STEP_SAMPLES = 12  # samples in each step to find changes of sign; a step is shorter than the time scale of a margin
-RIDDERS_ITERATIONS = 8  # of Ridders' method, each of which doubles the correct digits or at least halves the bracket
+# samples in each step to find changes of sign; a step is shorter than the time scale of a margin
+STEP_SAMPLES = 12
+# of Ridders' method, each of which doubles the correct digits or at least halves the bracket
+RIDDERS_ITERATIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class DenseOutput:
-    """The steps of a motion: step i starts at `start[i]` on `side[i]` (0: at rest) and holds the coordinates' Taylor series.
+    """The steps of a motion: step i starts at `start[i]` on `side[i]` (0: at rest) and holds the
+    coordinates' Taylor series.
 
-    `series` has shape (steps, degrees of freedom, order + 2), in powers of the time since the step's start.
+    `series` has shape (steps, degrees of freedom, order + 2), in powers of the time since the
+    step's start.
     """
 
     start: np.ndarray
@@ -34,11 +40,17 @@ class DenseOutput:
         return float(self.start[-1] + self.length[-1])
 
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact, those after it."""
+        """Coordinates and velocities, each (degrees of freedom, n), and sides (n,); at an impact,
+        those after it.
+        """
         step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
-        tau, used, series = times - self.start[step], step, self.series
-        if times.size < 4 * len(self.start):  # else all steps are turned round once, in place of one for each time
-            used, series = np.arange(times.size), self.series[step]
+        tau = times - self.start[step]
+        used = step
+        series = self.series
+        # else all steps are turned round once, in place of one for each time
+        if times.size < 4 * len(self.start):
+            used = np.arange(times.size)
+            series = self.series[step]
         rows = np.ascontiguousarray(series.transpose(2, 1, 0))  # of one power each
         value = np.take(rows[-1], used, axis=1)
         slope = np.zeros_like(value)
@@ -53,7 +65,11 @@ class DenseOutput:
         """The second derivatives of the coordinates, (degrees of freedom, n)."""
         step = np.clip(np.searchsorted(self.start, times, side="right") - 1, 0, None)
         powers = np.arange(2, self.series.shape[2])
-        return np.asarray(evaluate(self.series[step][:, :, 2:] * (powers * (powers - 1)), times - self.start[step]))
+        return np.asarray(
+            evaluate(
+                self.series[step][:, :, 2:] * (powers * (powers - 1)), times - self.start[step]
+            )
+        )
 
 
 def evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
@@ -66,7 +82,8 @@ def evaluate(coefficients: np.ndarray, tau: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Validity:
-    """The validity of a motion: which margins of the model it passes, and for what share of the time.
+    """The validity of a motion: which margins of the model it passes, and for what share of the
+    time.
 
     Attributes
     ----------
@@ -75,7 +92,8 @@ class Validity:
     share
         The share of the motion's time that is spent beyond each margin.
     gains
-        The contacts at which the impact law may raise the kinetic energy, and by what share of it (see `energy_gain`).
+        The contacts at which the impact law may raise the kinetic energy, and by what share of it
+        (see `energy_gain`).
 
     Examples
     --------
@@ -96,7 +114,10 @@ class Validity:
     def _repr_html_(self) -> str:
         if not self.first and not self.gains:
             return html_table("Validity", {"margins": str(self)})
-        rows = {name: "respected" if t is None else f"passed first at {t:.6g}" for name, t in self.first.items()}
+        rows = {
+            name: "respected" if t is None else f"passed first at {t:.6g}"
+            for name, t in self.first.items()
+        }
         shares = [f"{100 * self.share[name]:.3g} %" for name in self.first]
         gained = {name: self.gain(name) for name in self.gains}
         columns = {"margin": [*rows, *gained], "motion": [*rows.values(), *gained.values()]}
@@ -104,7 +125,12 @@ class Validity:
 
     def __str__(self) -> str:
         parts = [
-            f"{name} " + ("respected" if t is None else f"passed first at {t:.6g}, {100 * self.share[name]:.3g} % of the time")
+            f"{name} "
+            + (
+                "respected"
+                if t is None
+                else f"passed first at {t:.6g}, {100 * self.share[name]:.3g} % of the time"
+            )
             for name, t in self.first.items()
         ]
         parts += [f"impacts at {name} {self.gain(name)}" for name in self.gains]
@@ -123,15 +149,19 @@ class Validity:
 
 
 class ValidityCheck:
-    """Evaluates the model's margins along dense output, given in one piece or in several; their zeros are found to rounding.
+    """Evaluates the model's margins along dense output, given in one piece or in several; their
+    zeros are found to rounding.
 
-    A margin that is passed and regained within a twelfth of one step may be missed. Times of rest are left out.
+    A margin that is passed and regained within a twelfth of one step may be missed. Times of rest
+    are left out.
     """
 
     def __init__(self, system: System) -> None:
         self._system = system
         side = (*system.model.sides, 1)[0]
-        state: Any = 0.0 if len(system.model.coordinates) == 1 else (0.0,) * len(system.model.coordinates)
+        state: Any = (
+            0.0 if len(system.model.coordinates) == 1 else (0.0,) * len(system.model.coordinates)
+        )
         names = system.model.margins(0.0, state, state, state, side, system.load)
         self._first: dict[str, float | None] = dict.fromkeys(names)
         self._beyond: dict[str, float] = dict.fromkeys(names, 0.0)
@@ -151,30 +181,49 @@ class ValidityCheck:
 
     def result(self, duration: float) -> Validity:
         """The validity of a motion of this duration."""
-        model, shares = (
-            self._system.model,
-            {name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()},
+        model = self._system.model
+        shares = {
+            name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()
+        }
+        gains = (
+            energy_gain(self._system.contact_model, self._system.impact) if model.contacts else {}
         )
-        gains = energy_gain(self._system.contact_model, self._system.impact) if model.contacts else {}
-        return Validity(dict(self._first), shares, {name: gain for name, gain in gains.items() if gain > LOSSLESS})
+        return Validity(
+            dict(self._first),
+            shares,
+            {name: gain for name, gain in gains.items() if gain > LOSSLESS},
+        )
 
 
 def _beyond(
-    system: System, dense: DenseOutput, name: str, value: np.ndarray, tau: np.ndarray, step: np.ndarray
+    system: System,
+    dense: DenseOutput,
+    name: str,
+    value: np.ndarray,
+    tau: np.ndarray,
+    step: np.ndarray,
 ) -> tuple[float | None, float]:
-    """The first time at which a margin is negative, and the total time for which it is, from its samples in every step."""
+    """The first time at which a margin is negative, and the total time for which it is, from its
+    samples in every step.
+    """
     value = np.broadcast_to(value, tau.shape)
-    left, right = np.arange(value.size - 1), np.arange(1, value.size)
+    left = np.arange(value.size - 1)
+    right = np.arange(1, value.size)
     same = step[left] == step[right]
     left, right = left[same], right[same]
-    out_left, out_right = value[left] < 0, value[right] < 0
+    out_left = value[left] < 0
+    out_right = value[right] < 0
     spent = np.where(out_left & out_right, tau[right] - tau[left], 0.0)
     starts = np.where(out_left, dense.start[step[left]] + tau[left], np.inf)
     mixed = np.flatnonzero(out_left != out_right)
     if mixed.size:
         change = _sign_change(system, dense, name, value, tau, step, left[mixed], right[mixed])
-        spent[mixed] = np.where(out_left[mixed], change - tau[left[mixed]], tau[right[mixed]] - change)
-        starts[mixed] = np.where(out_left[mixed], starts[mixed], dense.start[step[left[mixed]]] + change)
+        spent[mixed] = np.where(
+            out_left[mixed], change - tau[left[mixed]], tau[right[mixed]] - change
+        )
+        starts[mixed] = np.where(
+            out_left[mixed], starts[mixed], dense.start[step[left[mixed]]] + change
+        )
     first = starts.min() if starts.size else np.inf
     return (float(first) if np.isfinite(first) else None), float(spent.sum())
 
@@ -189,28 +238,48 @@ def _sign_change(
     left: np.ndarray,
     right: np.ndarray,
 ) -> np.ndarray:
-    """The times at which a margin changes its sign between the samples `left` and `right`, by Ridders' method for all at once."""
-    low, high, at_low, at_high = tau[left], tau[right], value[left], value[right]
+    """The times at which a margin changes its sign between the samples `left` and `right`, by
+    Ridders' method for all at once.
+    """
+    low = tau[left]
+    high = tau[right]
+    at_low = value[left]
+    at_high = value[right]
     root = low
     for _ in range(RIDDERS_ITERATIONS):
         middle = 0.5 * (low + high)
         at_middle = _margins(system, dense, middle, step[left])[name]
         spread = np.sqrt(at_middle**2 - at_low * at_high)
         shift = np.where(
-            spread > 0, (middle - low) * np.sign(at_low - at_high) * at_middle / np.where(spread > 0, spread, 1.0), 0.0
+            spread > 0,
+            (middle - low)
+            * np.sign(at_low - at_high)
+            * at_middle
+            / np.where(spread > 0, spread, 1.0),
+            0.0,
         )
         root = np.clip(middle + shift, low, high)
         at_root = _margins(system, dense, root, step[left])[name]
         for x, at_x in ((middle, at_middle), (root, at_root)):
-            inside, like_low = (x >= low) & (x <= high), (at_x < 0) == (at_low < 0)
-            low, at_low = np.where(inside & like_low, x, low), np.where(inside & like_low, at_x, at_low)
-            high, at_high = np.where(inside & ~like_low, x, high), np.where(inside & ~like_low, at_x, at_high)
+            inside = (x >= low) & (x <= high)
+            like_low = (at_x < 0) == (at_low < 0)
+            low, at_low = (
+                np.where(inside & like_low, x, low),
+                np.where(inside & like_low, at_x, at_low),
+            )
+            high, at_high = (
+                np.where(inside & ~like_low, x, high),
+                np.where(inside & ~like_low, at_x, at_high),
+            )
     return np.asarray(root)
 
 
 def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
-    """Coordinates, velocities and accelerations at even times of every moving step: matrix products, for speed."""
-    coefficients, h = dense.series[moving], dense.length[moving]
+    """Coordinates, velocities and accelerations at even times of every moving step: matrix
+    products, for speed.
+    """
+    coefficients = dense.series[moving]
+    h = dense.length[moving]
     fraction = np.linspace(0.0, 1.0, STEP_SAMPLES + 1)
     state = []
     for _ in range(3):
@@ -222,7 +291,9 @@ def _grid(dense: DenseOutput, moving: np.ndarray) -> list[np.ndarray]:
 
 
 def _states(dense: DenseOutput, tau: np.ndarray, step: np.ndarray) -> list[np.ndarray]:
-    """Coordinates, velocities and accelerations at the times `tau` after the starts of the given steps."""
+    """Coordinates, velocities and accelerations at the times `tau` after the starts of the given
+    steps.
+    """
     coefficients = dense.series[step]
     state = []
     for _ in range(3):
@@ -232,19 +303,33 @@ def _states(dense: DenseOutput, tau: np.ndarray, step: np.ndarray) -> list[np.nd
 
 
 def _margins(
-    system: System, dense: DenseOutput, tau: np.ndarray, step: np.ndarray, state: list[np.ndarray] | None = None
+    system: System,
+    dense: DenseOutput,
+    tau: np.ndarray,
+    step: np.ndarray,
+    state: list[np.ndarray] | None = None,
 ) -> dict[str, Any]:
-    """The model's margins at the times `tau` after the starts of the given steps, from the steps' own series."""
+    """The model's margins at the times `tau` after the starts of the given steps, from the steps'
+    own series.
+    """
     theta, velocity, acceleration = _states(dense, tau, step) if state is None else state
     if len(system.model.coordinates) == 1:
         theta, velocity, acceleration = theta[0], velocity[0], acceleration[0]
-    return system.model.margins(dense.start[step] + tau, theta, velocity, acceleration, dense.side[step], system.load)
+    return system.model.margins(
+        dense.start[step] + tau, theta, velocity, acceleration, dense.side[step], system.load
+    )
 
 
 def crushed(system: System, time: float, state: np.ndarray, chosen: Sequence[int]) -> str:
-    """Which contacts close in on a body between them at a state, of those that are chosen, in words; empty if none do."""
+    """Which contacts close in on a body between them at a state, of those that are chosen, in
+    words; empty if none do.
+    """
     model: Any = system.model
-    if not system.dependent or len(chosen) < 2 or not model.close_in(time, system.load, state, chosen):
+    if (
+        not system.dependent
+        or len(chosen) < 2
+        or not model.close_in(time, system.load, state, chosen)
+    ):
         return ""
     names = " and ".join(repr(model.contacts[i].name) for i in chosen)
     return (
@@ -254,16 +339,31 @@ def crushed(system: System, time: float, state: np.ndarray, chosen: Sequence[int
 
 
 def paradox(system: System, time: float, state: tuple[Any, Any]) -> str:
-    """At which contact Painleve's paradox leaves no reaction or several, in words; empty if at none."""
-    if not system.model.holds_coordinates or all(friction.contact is None for friction in system.contact_model.frictions):
+    """At which contact Painleve's paradox leaves no reaction or several, in words; empty if at
+    none.
+    """
+    if not system.model.holds_coordinates or all(
+        friction.contact is None for friction in system.contact_model.frictions
+    ):
         return ""
     model = system.contact_model
-    gaps = {contact: contact.gap(state[0][model.coordinates.index(contact.coordinate)]) for contact in model.contacts}
-    closed = {contact.name: contact.coordinate for contact, gap in gaps.items() if np.isclose(gap, 0.0)}  # or just closing
+    gaps = {
+        contact: contact.gap(state[0][model.coordinates.index(contact.coordinate)])
+        for contact in model.contacts
+    }
+    # or just closing
+    closed = {
+        contact.name: contact.coordinate for contact, gap in gaps.items() if np.isclose(gap, 0.0)
+    }
     free = [float(name not in closed.values()) for name in model.coordinates]
-    one, other = (friction_margins(model, time, *state, system.load, free, [s] * len(model.frictions)) for s in (1.0, -1.0))
+    one, other = (
+        friction_margins(model, time, *state, system.load, free, [s] * len(model.frictions))
+        for s in (1.0, -1.0)
+    )
     for friction in (each for each in model.frictions if each.contact in closed):
-        pair = np.array([one[friction.limit], other[friction.limit]]) / (0.5 * (one[friction.limit] + other[friction.limit]))
+        pair = np.array([one[friction.limit], other[friction.limit]]) / (
+            0.5 * (one[friction.limit] + other[friction.limit])
+        )
         if pair.min() <= 0.0:
             way = "forwards" if pair[0] < pair[1] else "backwards"
             return (

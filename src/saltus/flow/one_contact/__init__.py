@@ -1,1 +1,3 @@
-"""The motion of models with one contact: an arc, an impact, rest, accumulations of impacts and chatter."""
+"""The motion of models with one contact: an arc, an impact, rest, accumulations of impacts and
+chatter.
+"""

@@ -1,4 +1,5 @@
-"""The events at the contact: impacts, rest and release, the ends of accumulations of impacts, and chatter.
+"""The events at the contact: impacts, rest and release, the ends of accumulations of impacts, and
+chatter.
 
 Its compiled part goes into one module with that of `kernel.py`.
 """
@@ -24,10 +25,17 @@ from saltus.flow.kernel.layout import (
     Status,
 )
 from saltus.flow.kernel.roots import horner, leading
-from saltus.flow.kernel.steps import columns_at_event, forget, motion_end, record_event, record_shift, record_step
+from saltus.flow.kernel.steps import (
+    columns_at_event,
+    forget,
+    motion_end,
+    record_event,
+    record_shift,
+    record_step,
+)
 from saltus.taylor import lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -39,7 +47,8 @@ def rate_of(motion, side):
 @lean_jit
 def set_state(motion, position, velocity):
     """Put the first coordinate and its velocity into the state."""
-    motion.coordinates[0], motion.velocities[0] = position, velocity
+    motion.coordinates[0] = position
+    motion.velocities[0] = velocity
 
 
 @lean_jit
@@ -55,28 +64,39 @@ def hold(motion):
 
 @lean_jit
 def contact_accelerations(motion, t):
-    """Fill `b` with the Taylor series in time of the gap's second derivative at rest at contact, on side +1 and on side -1."""
-    b, w = motion.pull_series, motion.recurrences
+    """Fill `b` with the Taylor series in time of the gap's second derivative at rest at contact, on
+    side +1 and on side -1.
+    """
+    b = motion.pull_series
+    w = motion.recurrences
     for i in range(min(motion.sides, 2)):
-        motion.contact_series(t, motion.origin, 1.0 - 2.0 * i, motion.env, motion.piece, b[i], w, motion.order)
+        motion.contact_series(
+            t, motion.origin, 1.0 - 2.0 * i, motion.env, motion.piece, b[i], w, motion.order
+        )
 
 
 @lean_jit
 def leave_or_stay(motion):
-    """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if that is not unique.
+    """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if
+    that is not unique.
 
-    On each side the sign of the first non-zero Taylor coefficient of the contact acceleration decides; `SKIP` holds the side, if
-    any, on which the acceleration has just been found to be zero. If both sides point outward the motion is not unique, unless
-    the caller has given the side (`LEAVE_BY`).
+    On each side the sign of the first non-zero Taylor coefficient of the contact acceleration
+    decides; `SKIP` holds the side, if any, on which the acceleration has just been found to be
+    zero. If both sides point outward the motion is not unique, unless the caller has given the side
+    (`LEAVE_BY`).
     """
-    b, order, released, outward = motion.pull_series, motion.order, motion.skip, 0
+    b = motion.pull_series
+    order = motion.order
+    released = motion.skip
+    outward = 0
     contact_accelerations(motion, motion.time)
     for i in range(motion.sides):
         side = 1 - 2 * i
         skip = leading(b[i], 1 if released == side else 0, order)
         if skip < order and b[i, skip] > 0.0 and (outward == 0 or motion.leave_by != motion.side):
             outward += 1
-            motion.side, motion.skip = side, skip + 2
+            motion.side = side
+            motion.skip = skip + 2
     if outward == 2 and motion.leave_by != motion.side:
         return False
     motion.mode = Mode.ARC if outward > 0 else Mode.REST
@@ -86,7 +106,8 @@ def leave_or_stay(motion):
 @lean_jit
 def contact_pull(motion, side, t):
     """The second derivative of the gap at rest at contact on one side, and its rate of change."""
-    b, w = motion.pull_series, motion.recurrences
+    b = motion.pull_series
+    w = motion.recurrences
     motion.contact_series(t, motion.origin, side, motion.env, motion.piece, b[0], w, 1)
     return b[0, 0], b[0, 1]
 
@@ -95,22 +116,27 @@ def contact_pull(motion, side, t):
 def accumulation(motion, speed, t, tol):
     """The mode that follows a small impact, and, for an accumulation, the time left until its end.
 
-    REST: impacts accumulate soon. From the gap's speed v on side s the time left is
-    2 v (1/abs(a_s) + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next side and e1, e2
-    the factors of the next two impacts; its error is of the order of the square of the time left times the relative rate of
-    change of the accelerations. CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations change slowly
-    over two of them. ARC: neither of these.
+    REST: impacts accumulate soon. From the gap's speed v on side s the time left is 2 v (1/abs(a_s)
+    + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next
+    side and e1, e2 the factors of the next two impacts; its error is of the order of the square of
+    the time left times the relative rate of change of the accelerations. CHATTER: impacts lose
+    nothing, are slower than CHATTER_SPEED, and the accelerations change slowly over two of them.
+    ARC: neither of these.
     """
-    side, piece = float(motion.side), motion.piece
+    side = float(motion.side)
+    piece = motion.piece
     here, slope_here = contact_pull(motion, side, t)
     if here >= 0.0:
         return Mode.ARC, 0.0
-    next_side, after = motion.reset(t, motion.origin, -speed / rate_of(motion, side), side, motion.env, piece)
+    next_side, after = motion.reset(
+        t, motion.origin, -speed / rate_of(motion, side), side, motion.env, piece
+    )
     there, slope_there = contact_pull(motion, next_side, t)
     if there >= 0.0 or after != after:
         return Mode.ARC, 0.0
     next_speed = rate_of(motion, next_side) * after
-    first, second = next_speed / speed, 0.0
+    first = next_speed / speed
+    second = 0.0
     if first > 0.0:
         third_side, last = motion.reset(t, motion.origin, -after, next_side, motion.env, piece)
         second = rate_of(motion, third_side) * last / next_speed
@@ -133,9 +159,11 @@ def slow_speed(tol):
 
 @lean_jit
 def rest_columns(motion, t, tol):
-    """The tangent at rest that begins at once; after an impact that leaves no speed, its instant moves as that of the impact.
+    """The tangent at rest that begins at once; after an impact that leaves no speed, its instant
+    moves as that of the impact.
 
-    A motion that begins next to rest comes to rest soon, unless impacts lose nothing: then there is no derivative to the state.
+    A motion that begins next to rest comes to rest soon, unless impacts lose nothing: then there is
+    no derivative to the state.
     """
     mode, _ = accumulation(motion, TINY, t, tol)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
@@ -146,11 +174,16 @@ def rest_columns(motion, t, tol):
 
 @lean_jit
 def release_columns(motion, t):
-    """The tangent at a release. Its instant moves with the simple root of the contact acceleration; if a jump of the load
-    releases the system, the instant is fixed."""
-    breaks, piece = motion.breaks, motion.piece
+    """The tangent at a release. Its instant moves with the simple root of the contact acceleration;
+    if a jump of the load releases the system, the instant is fixed."""
+    breaks = motion.breaks
+    piece = motion.piece
     detail = ReleaseDetail.AT_A_ROOT if motion.skip <= 3 else ReleaseDetail.AT_NONE
-    if motion.skip == 2 and piece > 0 and abs(breaks[piece - 1] - motion.origin - t) < 1e-12 * max(1.0, abs(motion.origin)):
+    if (
+        motion.skip == 2
+        and piece > 0
+        and abs(breaks[piece - 1] - motion.origin - t) < 1e-12 * max(1.0, abs(motion.origin))
+    ):
         detail = ReleaseDetail.AT_A_JUMP
     columns_at_event(motion, EventCode.RELEASE, detail, t, float(motion.side))
     for j in range(motion.columns):
@@ -161,7 +194,10 @@ def release_columns(motion, t):
 
 @lean_jit
 def decide_at_rest(motion):
-    """Decide whether a system at rest at the contact stays or leaves. Returns PAUSED to go on, or NOT_UNIQUE."""
+    """Decide whether a system at rest at the contact stays or leaves.
+
+    Returns PAUSED to go on, or NOT_UNIQUE.
+    """
     t = motion.time
     if not leave_or_stay(motion):
         return Status.NOT_UNIQUE
@@ -180,7 +216,9 @@ def decide_at_rest(motion):
 
 @lean_jit
 def end_accumulation(motion, left, t_end):
-    """Come to rest after the time `left`, within which all further impacts of the accumulation take place."""
+    """Come to rest after the time `left`, within which all further impacts of the accumulation take
+    place.
+    """
     t = motion.time
     record_event(motion, EventCode.REST, 0, t + left, 0.0, 0.0)
     if motion.columns > 0:
@@ -193,11 +231,18 @@ def end_accumulation(motion, left, t_end):
 
 @lean_jit
 def decide(motion, t_end):
-    """Find the next mode of a system at the contact. Returns PAUSED to go on, or why the motion ends."""
-    t, velocity, tol = motion.time, motion.velocities[0], motion.tolerance
+    """Find the next mode of a system at the contact.
+
+    Returns PAUSED to go on, or why the motion ends.
+    """
+    t = motion.time
+    velocity = motion.velocities[0]
+    tol = motion.tolerance
     if velocity == 0.0:
         return decide_at_rest(motion)
-    motion.mode, motion.skip, motion.rested = Mode.ARC, 1, 0
+    motion.mode = Mode.ARC
+    motion.skip = 1
+    motion.rested = 0
     speed = rate_of(motion, float(motion.side)) * velocity
     if speed < slow_speed(tol):
         mode, left = accumulation(motion, speed, t, tol)
@@ -209,19 +254,29 @@ def decide(motion, t_end):
             record_event(motion, EventCode.CHATTER, 0, t, velocity, velocity)
             forget(motion)
             hold(motion)
-            motion.chatter_speed, motion.skip = speed, 0
-        motion.mode, motion.rested = mode, 0 if mode == Mode.ARC else 1
+            motion.chatter_speed = speed
+            motion.skip = 0
+        motion.mode = mode
+        motion.rested = 0 if mode == Mode.ARC else 1
     return Status.PAUSED
 
 
 @lean_jit
 def impact(motion, t, before):
-    """Apply the reset at time `t` to the velocity `before`. Returns PAUSED, or NO_IMPACT with the velocity left in the state."""
-    side, piece, contact = float(motion.side), motion.piece, motion.geometry[Geometry.CONTACT]
+    """Apply the reset at time `t` to the velocity `before`.
+
+    Returns PAUSED, or NO_IMPACT with the velocity left in the state.
+    """
+    side = float(motion.side)
+    piece = motion.piece
+    contact = motion.geometry[Geometry.CONTACT]
     motion.time = t
     set_state(motion, contact, before)
-    motion.mode, motion.skip, motion.rested = Mode.CONTACT, 0, 0
-    if rate_of(motion, side) * before >= 0.0:  # a triple root of the gap within rounding: there is no closing speed
+    motion.mode = Mode.CONTACT
+    motion.skip = 0
+    motion.rested = 0
+    # a triple root of the gap within rounding: there is no closing speed
+    if rate_of(motion, side) * before >= 0.0:
         set_state(motion, contact, 0.0)
         record_event(motion, EventCode.GRAZING, GrazingDetail.TRIPLE, t, before, 0.0)
         forget(motion)
@@ -238,7 +293,7 @@ def impact(motion, t, before):
     return Status.PAUSED
 
 
-# --- chatter: the averaged law of impacts that lose nothing ------------------------------------------------------------
+# --- chatter: the averaged law of impacts that lose nothing ------------------
 #
 # The speeds v_s on the sides s are proportional to one speed v. The action v^2 sum v_s / abs(a_s) decays with the mean damping
 # over a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), under any load that presses both contacts. The phase is lost.
@@ -246,25 +301,39 @@ def impact(motion, t, before):
 
 @lean_jit
 def chatter_sums(motion, h, x, factor, t):
-    """The sums over the sides of g v / abs(a) and v / abs(a), with the damping g, for unit speed, at the share x of a step."""
-    b, order = motion.pull_series, motion.order
-    damping, duration = 0.0, 0.0
+    """The sums over the sides of g v / abs(a) and v / abs(a), with the damping g, for unit speed,
+    at the share x of a step.
+    """
+    b = motion.pull_series
+    order = motion.order
+    damping = 0.0
+    duration = 0.0
     for i in range(motion.sides):
         side = 1.0 - 2.0 * i
         pull = abs(horner(b[i], order, x * h))
         share = (1.0 if side == motion.side else factor) / pull
-        damping += share * motion.contact_damping(t + x * h, motion.origin, side, motion.env, motion.piece)
+        damping += share * motion.contact_damping(
+            t + x * h, motion.origin, side, motion.env, motion.piece
+        )
         duration += share
     return damping, duration
 
 
 @lean_jit
 def chatter_decay(motion, h):
-    """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s), decays as the mean damping."""
-    t, side = motion.time, float(motion.side)
+    """Advance the chatter speed over a step: the action, v^2 times the duration sum v_s/abs(a_s),
+    decays as the mean damping.
+    """
+    t = motion.time
+    side = float(motion.side)
     contact_accelerations(motion, t)
     next_side, after = motion.reset(
-        t, motion.origin, -motion.chatter_speed / rate_of(motion, side), side, motion.env, motion.piece
+        t,
+        motion.origin,
+        -motion.chatter_speed / rate_of(motion, side),
+        side,
+        motion.env,
+        motion.piece,
     )
     factor = rate_of(motion, next_side) * after / motion.chatter_speed
     decay = 0.0

@@ -1,23 +1,44 @@
-"""The scalar flow of one motion: arcs, impacts, rest and release, accumulations of impacts, chatter.
+"""The scalar flow of one motion: arcs, impacts, rest and release, accumulations of impacts,
+chatter.
 
-The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, this file and `kernel/loop.py`,
-which calls it, are compiled as one module, once for all models with at most one contact: the functions that are generated for a
-structure (see `kernel/compiled.py`) are in its memory. These files therefore consist of plain loops under the
-decorators of `saltus.taylor`, and share one namespace. All of a motion's memory is in `motion` (see `kernel/memory.py`).
+The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, this
+file and `kernel/loop.py`, which calls it, are compiled as one module, once for all models with at
+most one contact: the functions that are generated for a structure (see `kernel/compiled.py`) are in
+its memory. These files therefore consist of plain loops under the decorators of `saltus.taylor`,
+and share one namespace. All of a motion's memory is in `motion` (see `kernel/memory.py`).
 
-A motion is in one of the modes of `Mode`. If a tangent is asked for (see `kernel/event_derivatives.py`), its columns are further
-coordinates, which `series` expands with the others. The steps are chosen by the motion itself, so that its impacts are the same
-to the last bit with and without tangent, except where a column needs shorter steps. At an event the structure's function
-`tangent` computes the new columns and the shift of the event, which are nan where there is no derivative.
+A motion is in one of the modes of `Mode`. If a tangent is asked for (see
+`kernel/event_derivatives.py`), its columns are further coordinates, which `series` expands with the
+others. The steps are chosen by the motion itself, so that its impacts are the same to the last bit
+with and without tangent, except where a column needs shorter steps. At an event the structure's
+function `tangent` computes the new columns and the shift of the event, which are nan where there is
+no derivative.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SHORTEST, EventCode, GrazingDetail, Mode, Status
+from saltus.flow.kernel.layout import (
+    CHATTER_SPEED,
+    EXACT,
+    SHORTEST,
+    EventCode,
+    GrazingDetail,
+    Mode,
+    Status,
+)
 from saltus.flow.kernel.memory import OneContactParts
-from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, first_root, horner, leading, margin_root, scale_gap
+from saltus.flow.kernel.roots import (
+    NEVER,
+    SIMPLE,
+    contact_root,
+    first_root,
+    horner,
+    leading,
+    margin_root,
+    scale_gap,
+)
 from saltus.flow.kernel.steps import (
     column_step,
     columns_at_event,
@@ -30,10 +51,17 @@ from saltus.flow.kernel.steps import (
     step_arrays,
     step_size,
 )
-from saltus.flow.one_contact.impacts import chatter_decay, contact_accelerations, decide, hold, impact, rate_of
+from saltus.flow.one_contact.impacts import (
+    chatter_decay,
+    contact_accelerations,
+    decide,
+    hold,
+    impact,
+    rate_of,
+)
 from saltus.taylor import jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @lean_jit
@@ -42,34 +70,50 @@ def arc_step(motion, t, target, size):
     natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
     if motion.columns > 0:
         natural = min(natural, column_step(motion))
-    while motion.checked > 0 and leaps(motion, t, float(motion.side), min(natural, target - t), size):
+    while motion.checked > 0 and leaps(
+        motion, t, float(motion.side), min(natural, target - t), size
+    ):
         natural = 0.5 * min(natural, target - t)
     return natural
 
 
 @lean_jit
 def first_margin(motion, h, hit, first):
-    """The margin that reaches zero first within the step, and its instant, if this is before `first`; else `hit` and `first`."""
+    """The margin that reaches zero first within the step, and its instant, if this is before
+    `first`; else `hit` and `first`.
+    """
     for j in range(motion.margin_count):
         u = margin_root(motion.margin_series[j], motion.order, h, motion.polynomial)
         if u < first:
-            hit, first = j, u
+            hit = j
+            first = u
     return hit, first
 
 
 @lean_jit
 def arc(motion, target):
-    """One step of a smooth motion, up to the first zero of the gap or of a margin. Returns PAUSED, or why the motion ends."""
-    order, t, side, poly = motion.order, motion.time, motion.side, motion.polynomial
+    """One step of a smooth motion, up to the first zero of the gap or of a margin.
+
+    Returns PAUSED, or why the motion ends.
+    """
+    order = motion.order
+    t = motion.time
+    side = motion.side
+    poly = motion.polynomial
     size = expand(motion, t, float(side), order)
     natural = arc_step(motion, t, target, size)
     h = min(natural, target - t)
-    hit, first, touch = -1, NEVER, NEVER
+    hit = -1
+    first = NEVER
+    touch = NEVER
     if motion.sides > 0:
         kind, u, touch = contact_root(motion.gap_series, motion.skip, order, h, poly)
         if kind == SIMPLE:
-            hit, first = motion.margin_count, u
-        elif 0.75 < touch <= 1.0 and h == natural:  # a touch near the end of a step could be found again in the next one
+            hit = motion.margin_count
+            first = u
+        elif (
+            0.75 < touch <= 1.0 and h == natural
+        ):  # a touch near the end of a step could be found again in the next one
             h, touch = 0.5 * h, NEVER
     hit, first = first_margin(motion, h, hit, first)
     if touch < first and touch <= 1.0:
@@ -102,31 +146,40 @@ def arc(motion, target):
 
 @lean_jit
 def first_release(motion, b, order, h, poly):
-    """The first instant at which a contact acceleration points outward, as a share of the step, and its side; 0 and 0 if one does
-    already at the start."""
-    first, released = NEVER, 0
+    """The first instant at which a contact acceleration points outward, as a share of the step, and
+    its side; 0 and 0 if one does already at the start."""
+    first = NEVER
+    released = 0
     for i in range(motion.sides):
         skip = leading(b[i], 0, order)
         if skip < order and b[i, skip] > 0.0:
-            first, released = 0.0, 0
+            first = 0.0
+            released = 0
         elif skip < order:
             for k in range(order + 1):
                 b[i, k] = -b[i, k]
             scale_gap(b[i], skip, order, h, poly)
             kind, u, _ = first_root(poly, order - skip)
             if kind == SIMPLE and u < first:
-                first, released = u, 1 - 2 * i
+                first = u
+                released = 1 - 2 * i
     return first, released
 
 
 @lean_jit
 def wait_at_contact(motion, target):
-    """One step of REST or CHATTER, up to the first instant at which a contact acceleration points outward."""
-    b, order, t = motion.pull_series, motion.order, motion.time
+    """One step of REST or CHATTER, up to the first instant at which a contact acceleration points
+    outward.
+    """
+    b = motion.pull_series
+    order = motion.order
+    t = motion.time
     h = target - t
     contact_accelerations(motion, t)
     for i in range(motion.sides):
-        h = min(h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(motion.tolerance, EXACT)))
+        h = min(
+            h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(motion.tolerance, EXACT))
+        )
     first, released = first_release(motion, b, order, h, motion.polynomial)
     tau = min(first, 1.0) * h
     if motion.mode == Mode.CHATTER and tau > 0.0:
@@ -136,13 +189,18 @@ def wait_at_contact(motion, target):
     if first > 1.0:
         motion.time = target if h == target - t else t + tau
         grown = motion.chatter_speed > 2.0 * CHATTER_SPEED
-        if motion.mode == Mode.CHATTER and grown:  # the impacts are followed one by one from here on
-            motion.mode, motion.skip, motion.rested = Mode.CONTACT, 0, 0
+        # the impacts are followed one by one from here on
+        if motion.mode == Mode.CHATTER and grown:
+            motion.mode = Mode.CONTACT
+            motion.skip = 0
+            motion.rested = 0
             velocity = motion.chatter_speed / rate_of(motion, float(motion.side))
             motion.velocities[0] = velocity
     else:
-        motion.mode, motion.skip = Mode.CONTACT, released
-        motion.time = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)  # time must increase
+        motion.mode = Mode.CONTACT
+        motion.skip = released
+        # time must increase
+        motion.time = t + tau if t + tau > t or released == 0 else np.nextafter(t, np.inf)
 
 
 @lean_jit
@@ -177,4 +235,6 @@ def one_pass(motion, target, t_end):
 @jit
 def parts_of(numbers, state, env, functions, rows, buffers):
     """The memory of a motion but for its numbers as one named tuple; there are no rows of contacts."""
-    return OneContactParts(state, env, env[0], env[2], functions, step_arrays(numbers), buffers[0], buffers[1])
+    return OneContactParts(
+        state, env, env[0], env[2], functions, step_arrays(numbers), buffers[0], buffers[1]
+    )

@@ -1,7 +1,7 @@
 """What `lanes/handoff.py` needs of a model with one contact, to let the scalar kernel move a lane.
 
-Its compiled part goes into one module with that of `lanes/handoff.py`; `contacts/lane_handoff.py` takes its place for models with
-several contacts.
+Its compiled part goes into one module with that of `lanes/handoff.py`; `contacts/lane_handoff.py`
+takes its place for models with several contacts.
 """
 
 from __future__ import annotations
@@ -10,14 +10,16 @@ from saltus.flow.kernel.layout import EventCode, Geometry, Mode
 from saltus.flow.kernel.memory import OneContactFunctions
 from saltus.taylor import inline_jit, jit, lean_jit
 
-# --- compiled from here on -----------------------------------------------------------------------------------------------
+# --- compiled from here on ---------------------------------------------------
 
 
 @jit
 def functions_of(lane):
     """The functions of the structure that the scalar kernel calls."""
     _, (series, contact_series, reset, contact_damping, tangent) = lane.kernel
-    return OneContactFunctions(series, contact_series, reset, contact_damping, lane.geometry[lane.index], tangent)
+    return OneContactFunctions(
+        series, contact_series, reset, contact_damping, lane.geometry[lane.index], tangent
+    )
 
 
 @inline_jit
@@ -36,7 +38,8 @@ def record_events(lane, motion, events):
     """Record the impacts of the scalar kernel's last call; returns the last event's detail."""
     detail = 0
     for i in range(motion.recorded_events):
-        kind, detail = events.event_labels[i, 1], events.event_labels[i, 3]
+        kind = events.event_labels[i, 1]
+        detail = events.event_labels[i, 3]
         if kind == EventCode.IMPACT:
             lane.impacts += 1.0
             lane.least_speed = min(lane.least_speed, abs(events.event_values[i, 1]))
@@ -52,7 +55,9 @@ def end_scalar(lane, motion):
 
 @lean_jit
 def is_captured(lane, motion, state):
-    """Whether a motion is proved to be captured: at rest, or at the contact with a speed of the gap below the capture speed."""
+    """Whether a motion is proved to be captured: at rest, or at the contact with a speed of the gap
+    below the capture speed.
+    """
     threshold = lane.capture_speed
     if motion.mode == Mode.REST:
         return threshold > 0.0

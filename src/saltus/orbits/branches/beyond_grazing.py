@@ -1,4 +1,6 @@
-"""The continuation of a branch through a grazing: the signature on its other side, and the direction with admissible orbits."""
+"""The continuation of a branch through a grazing: the signature on its other side, and the
+direction with admissible orbits.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,12 @@ PROBES: tuple[float, ...] = tuple(
 
 
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
-    """The point of the branch beyond a grazing, with the direction in which it goes on; or why there is none.
+    """The point of the branch beyond a grazing, with the direction in which it goes on; or why
+    there is none.
 
-    Where the gap touches zero between impacts, the new signature has a pair of impacts without speed there, or a single one at a
-    wall, which turns the motion round. Impacts that have lost their speed are left out of it.
+    Where the gap touches zero between impacts, the new signature has a pair of impacts without
+    speed there, or a single one at a wall, which turns the motion round. Impacts that have lost
+    their speed are left out of it.
     """
     changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
     if isinstance(changed, End):
@@ -33,12 +37,16 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     known = curve.known(unknowns, point.parameters)
     if known is None:
         return End(OrbitEnd.NO_MOTION, point.parameter, detail="on the other side of")
-    return admissible_direction(curve.along_kernel(known)) or End(OrbitEnd.NO_DIRECTION, point.parameter)
+    return admissible_direction(curve.along_kernel(known)) or End(
+        OrbitEnd.NO_DIRECTION, point.parameter
+    )
 
 
-def admissible_direction(start: OrbitPoint, probes: Sequence[float] = PROBES, begun: bool = False) -> OrbitPoint | None:
-    """The point with the direction in which orbits are admissible; with `begun` the first such orbit itself, as the equations are
-    degenerate at `start`."""
+def admissible_direction(
+    start: OrbitPoint, probes: Sequence[float] = PROBES, begun: bool = False
+) -> OrbitPoint | None:
+    """The point with the direction in which orbits are admissible; with `begun` the first such
+    orbit itself, as the equations are degenerate at `start`."""
     for probe in probes:
         for point in (start, start.turned()):
             ahead = point.beside(probe)
@@ -49,32 +57,49 @@ def admissible_direction(start: OrbitPoint, probes: Sequence[float] = PROBES, be
 
 def _turns_round(equations: OrbitEquations, side: int) -> bool:
     """Whether an impact stays on its side, as at a wall."""
-    model, load, impact = equations.system.one_contact, equations.system.load, equations.system.impact
+    model = equations.system.one_contact
+    load = equations.system.load
+    impact = equations.system.impact
     return bool(model.reset(0.0, 1.0, side, load, impact)[0] == side)
 
 
 def inserted(point: OrbitPoint) -> tuple[Any, np.ndarray]:
-    """The problem whose signature has additional impacts where the gap touches zero, and its unknowns: they have no speed."""
-    equations, signature = point.orbit.equations, point.orbit.signature
+    """The problem whose signature has additional impacts where the gap touches zero, and its
+    unknowns: they have no speed.
+    """
+    equations = point.orbit.equations
+    signature = point.orbit.signature
     extremes = point.evaluation.extremes
     segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
-    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * equations.frequency(point.solution.values)
+    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * equations.frequency(
+        point.solution.values
+    )
     side = signature.along()[segment]
     sides = (side,) if _turns_round(equations, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))
     if not signature.sides:
         return equations.with_signature(Signature(sides, signature.period)), touches
     place = segment + 1
-    longer = Signature((*signature.sides[:place], *sides, *signature.sides[place:]), signature.period, signature.symmetric)
+    longer = Signature(
+        (*signature.sides[:place], *sides, *signature.sides[place:]),
+        signature.period,
+        signature.symmetric,
+    )
     unknowns = point.solution.unknowns
-    return equations.with_signature(longer), np.concatenate([unknowns[: 2 * place], touches, unknowns[2 * place :]])
+    return equations.with_signature(longer), np.concatenate(
+        [unknowns[: 2 * place], touches, unknowns[2 * place :]]
+    )
 
 
 def removed(point: OrbitPoint) -> tuple[Any, np.ndarray] | End:
-    """The problem whose signature lacks the impacts that have lost their speed, and its unknowns; or why there is none."""
-    equations, signature = point.orbit.equations, point.orbit.signature
+    """The problem whose signature lacks the impacts that have lost their speed, and its unknowns;
+    or why there is none.
+    """
+    equations = point.orbit.equations
+    signature = point.orbit.signature
     n = len(signature.sides)
-    phases, speeds = point.solution.unknowns[::2], point.solution.unknowns[1::2]
+    phases = point.solution.unknowns[::2]
+    speeds = point.solution.unknowns[1::2]
     slow = int(np.argmin(speeds))
     if _turns_round(equations, signature.sides[slow]):
         gone = [slow]
@@ -85,7 +110,9 @@ def removed(point: OrbitPoint) -> tuple[Any, np.ndarray] | End:
     kept = [i for i in range(n) if i not in gone]
     if not kept:
         return _without_impacts(point, slow)
-    shorter = Signature(tuple(signature.sides[i] for i in kept), signature.period, signature.symmetric)
+    shorter = Signature(
+        tuple(signature.sides[i] for i in kept), signature.period, signature.symmetric
+    )
     return equations.with_signature(shorter), point.solution.unknowns.reshape(n, 2)[kept].ravel()
 
 
@@ -96,24 +123,40 @@ def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: 
         return []
     later = phases[(slow + 1) % n] + (closing if slow + 1 == n else 0.0) - phases[slow]
     earlier = phases[slow] - phases[slow - 1] + (closing if slow == 0 else 0.0)
-    neighbour, distance = ((slow + 1) % n, later) if abs(later) < abs(earlier) else ((slow - 1) % n, earlier)
-    return [slow, neighbour] if abs(distance) < TOLERANCES.pair and speeds[neighbour] < TOLERANCES.pair else []
+    neighbour, distance = (
+        ((slow + 1) % n, later) if abs(later) < abs(earlier) else ((slow - 1) % n, earlier)
+    )
+    return (
+        [slow, neighbour]
+        if abs(distance) < TOLERANCES.pair and speeds[neighbour] < TOLERANCES.pair
+        else []
+    )
 
 
 def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Any, np.ndarray] | End:
-    """An orbit that only touches the contact once a period, as an orbit without impacts: the problem and the state at phase 0."""
-    equations, signature = point.orbit.equations, point.orbit.signature
+    """An orbit that only touches the contact once a period, as an orbit without impacts: the
+    problem and the state at phase 0.
+    """
+    equations = point.orbit.equations
+    signature = point.orbit.signature
     if signature.symmetric:
         return End(OrbitEnd.GRAZES_INTO_REST, point.parameter)
     touch = point.solution.unknowns[2 * slow]
-    lengths = np.diff(np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + equations.closing))
+    lengths = np.diff(
+        np.append(point.solution.unknowns[::2], point.solution.unknowns[0] + equations.closing)
+    )
     side = signature.along()[int(np.argmax(lengths))]
     phase_zero = 2.0 * np.pi * np.ceil(touch / (2.0 * np.pi))
     contact = np.array([float(equations.system_at(point.solution.values).model.contact), 0.0])
-    for periods in range(1, signature.period + 1):  # families of several periods may meet here: take the shortest period
+    # families of several periods may meet here: take the shortest period
+    for periods in range(1, signature.period + 1):
         other: Any = equations.with_signature(Signature((), periods, False, side))
         state = other.carried(contact, touch, phase_zero, point.solution.values)
         later = other.carried(contact, touch, phase_zero + other.closing, point.solution.values)
-        if state is not None and later is not None and np.abs(later - state).max() < TOLERANCES.touching_state:
+        if (
+            state is not None
+            and later is not None
+            and np.abs(later - state).max() < TOLERANCES.touching_state
+        ):
             return other, state
     return End(OrbitEnd.NO_MOTION, point.parameter, detail="from")

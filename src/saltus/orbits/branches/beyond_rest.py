@@ -1,4 +1,6 @@
-"""Where a rest has no duration left, or a release is no longer made: how the motion, and with it a branch, goes on."""
+"""Where a rest has no duration left, or a release is no longer made: how the motion, and with it a
+branch, goes on.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,12 @@ from saltus.systems import arguments_of
 class RestSettings:
     """How far ahead the end of a rest is looked beyond, and how the loss of a release is located."""
 
-    # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried in turn.
+    # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried
+    # in turn.
     after_rest: tuple[float, ...] = (1e-5, 1e-4, 1e-3)
-    # Ahead of an orbit that has nearly shrunk to rest the loss of its release is looked for from this share of the range on,
-    # doubled so many times, and located to this relative precision; the peak of the pull from this phase before the release.
+    # Ahead of an orbit that has nearly shrunk to rest the loss of its release is looked for from
+    # this share of the range on, doubled so many times, and located to this relative precision; the
+    # peak of the pull from this phase before the release.
     nearest_loss: float = 1e-9
     doublings: int = 24
     narrow: float = 1e-12
@@ -32,8 +36,9 @@ SETTINGS = RestSettings()
 
 
 def as_the_motion_goes_on(point: OrbitPoint) -> Restart:
-    """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them. Ever more of them towards the end
-    of the rest, where grazings accumulate, so that the branch goes on from a little farther ahead."""
+    """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them.
+    Ever more of them towards the end of the rest, where grazings accumulate, so that the branch
+    goes on from a little farther ahead."""
     way = point.tangent[-len(point.parameters) :]
     way = way / np.linalg.norm(way / np.array(point.curve.scales))
     state = arguments_of(point.orbit.system, point.orbit.section_state)
@@ -42,21 +47,25 @@ def as_the_motion_goes_on(point: OrbitPoint) -> Restart:
 
 
 def last_release(point: OrbitPoint) -> SpecialPoint | None:
-    """The parameter ahead of an orbit that has nearly shrunk to rest at which the load only just pulls a single contact open
-    (RL); None where it is not near."""
+    """The parameter ahead of an orbit that has nearly shrunk to rest at which the load only just
+    pulls a single contact open (RL); None where it is not near."""
     from scipy.optimize import brentq
 
-    equations, orbit, value = point.curve.equations, point.orbit, point.parameter
+    equations = point.curve.equations
+    orbit = point.orbit
+    value = point.parameter
     known = () if orbit.system.model.holds_coordinates else load_releases(orbit.system)
     if not known:
         return None
 
     def pull(at: float) -> float:
         """The least of the peaks of the pull after these releases, with the parameter at a value."""
-        system, turns = equations.system_at(np.array([at])), [(release, release.time * orbit.frequency) for release in known]
+        system = equations.system_at(np.array([at]))
+        turns = [(release, release.time * orbit.frequency) for release in known]
         return min(release.peak_near(system, phase - SETTINGS.behind) for release, phase in turns)
 
-    reach, before = SETTINGS.nearest_loss * point.curve.scales[0], pull(value)
+    reach = SETTINGS.nearest_loss * point.curve.scales[0]
+    before = pull(value)
     for _ in range(SETTINGS.doublings):
         beyond = value + reach * np.sign(point.tangent[-1])
         if (after := pull(beyond)) < 0.0:

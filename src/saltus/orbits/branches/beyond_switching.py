@@ -1,4 +1,6 @@
-"""The signatures that an orbit with several contacts may have beyond a point at which one of its events appears or is lost."""
+"""The signatures that an orbit with several contacts may have beyond a point at which one of its
+events appears or is lost.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,8 @@ from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System
 
 AFTER_RELEASE = 3  # power of the time with which the gap grows after a release
-# Distances along a branch at which orbits are looked for where an excursion from a closed contact begins: its speeds grow as the
-# distance cubed.
+# Distances along a branch at which orbits are looked for where an excursion from a closed contact
+# begins: its speeds grow as the distance cubed.
 BEGUN = (1e-4, 1e-3, 1e-2)
 MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
 
@@ -51,7 +53,9 @@ class Switching:
         equations: Any = point.orbit.equations
         evaluation = point.solution.evaluation
         phases = equations.split(point.solution.unknowns)[1].tolist()
-        return cls(point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases)))
+        return cls(
+            point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases))
+        )
 
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
@@ -62,23 +66,40 @@ class Switching:
 
     def _together(self) -> Iterator[list[Timed]]:
         """The events beyond a point at which two successive events have come together."""
-        events, n = list(self.events), len(self.events)
+        events = list(self.events)
+        n = len(self.events)
         symmetric = self.equations.signature.symmetric
         for i in range(n if n > 1 else 0):
             j = (i + 1) % n
             if symmetric and j == 0:
-                continue  # the second event lies in the other half: `from_next_event` makes them neighbours
-            first, second = events[i], events[j]
+                # the second event lies in the other half: `from_next_event` makes them neighbours
+                continue
+            first = events[i]
+            second = events[j]
             apart = second.phase - first.phase + (self.equations.closing if j == 0 else 0.0)
             if abs(apart) > TOLERANCES.switching:
                 continue
-            one, other = first.event, second.event
+            one = first.event
+            other = second.event
             if one.contact != other.contact:
                 before = self._before(i)
-                yield _changed(events, {i: None, j: second})  # the impact on the other contact opens this one
-                swapped = before ^ (1 << other.contact) if not other.is_impact or other.closed >> other.contact & 1 else before
-                yield _changed(events, {i: replace(second, phase=first.phase).leaving(swapped), j: first.leaving(other.closed)})
-            elif one.is_impact:  # it is closed for no time, or opens without speed and closes at once
+                # the impact on the other contact opens this one
+                yield _changed(events, {i: None, j: second})
+                swapped = (
+                    before ^ (1 << other.contact)
+                    if not other.is_impact or other.closed >> other.contact & 1
+                    else before
+                )
+                yield _changed(
+                    events,
+                    {
+                        i: replace(second, phase=first.phase).leaving(swapped),
+                        j: first.leaving(other.closed),
+                    },
+                )
+            elif (
+                one.is_impact
+            ):  # it is closed for no time, or opens without speed and closes at once
                 yield _changed(events, {i: first.leaving(other.closed), j: None})
             else:
                 yield _changed(events, {i: None, j: None})
@@ -86,21 +107,34 @@ class Switching:
     def _before(self, i: int) -> int:
         """The contacts that are closed before an event."""
         event = self.events[i - 1].event
-        return (event.image(self.equations.images) if i == 0 and self.equations.signature.symmetric else event).closed
+        return (
+            event.image(self.equations.images)
+            if i == 0 and self.equations.signature.symmetric
+            else event
+        ).closed
 
     def _without_pull(self) -> Iterator[list[Timed]]:
-        """The events beyond a point at which a contact closes with no reaction or opens with no acceleration, or at which its
-        reaction has vanished at the end of a segment."""
-        events, seen = list(self.events), self.evaluation.seen
+        """The events beyond a point at which a contact closes with no reaction or opens with no
+        acceleration, or at which its reaction has vanished at the end of a segment."""
+        events = list(self.events)
+        seen = self.evaluation.seen
         for s in range(len(events)):
             here = events[s]
             if abs(seen[s, SegmentExtremes.PULL]) < TOLERANCES.touch:
                 contact = int(seen[s, SegmentExtremes.PULL + 1])
                 changed = here.event.closed ^ (1 << contact)
-                again = ModeChange(bool(here.event.closed >> contact & 1), contact, here.event.closed)
-                yield [*events[:s], here.leaving(changed), replace(here, event=again), *events[s + 1 :]]
+                again = ModeChange(
+                    bool(here.event.closed >> contact & 1), contact, here.event.closed
+                )
+                yield [
+                    *events[:s],
+                    here.leaving(changed),
+                    replace(here, event=again),
+                    *events[s + 1 :],
+                ]
             if abs(seen[s, SegmentExtremes.TAIL]) < TOLERANCES.touch:
-                contact, following = int(seen[s, SegmentExtremes.TAIL + 1]), events[(s + 1) % len(events)]
+                contact = int(seen[s, SegmentExtremes.TAIL + 1])
+                following = events[(s + 1) % len(events)]
                 phase = following.phase + (self.equations.closing if s + 1 == len(events) else 0.0)
                 release = ModeChange(False, contact, here.event.closed & ~(1 << contact))
                 yield [*events[: s + 1], Timed(release, phase), *events[s + 1 :]]
@@ -113,26 +147,36 @@ class Switching:
                 yield _changed(list(self.events), {i: None})
 
     def _touching(self) -> Iterator[list[Timed]]:
-        """The events with an additional impact where a gap touches 0, or with a release and an impact where a reaction does."""
-        events, seen = list(self.events), self.evaluation.seen
+        """The events with an additional impact where a gap touches 0, or with a release and an
+        impact where a reaction does.
+        """
+        events = list(self.events)
+        seen = self.evaluation.seen
         frequency = self.equations.frequency(self.point.solution.values)
         for place in (SegmentExtremes.GAP, SegmentExtremes.FORCE):
             s = int(np.argmin(seen[:, place]))
             if abs(seen[s, place]) > TOLERANCES.touch:
                 continue
-            contact, closed = int(seen[s, place + 2]), int(self.equations.plan[s, SegmentPlan.ALONG])
-            phase, at = float(seen[s, place + 1]) * frequency, s + 1 if events else 0
+            contact = int(seen[s, place + 2])
+            closed = int(self.equations.plan[s, SegmentPlan.ALONG])
+            phase = float(seen[s, place + 1]) * frequency
+            at = s + 1 if events else 0
             new = [Timed(ModeChange(True, contact, closed), phase)]
             if place == SegmentExtremes.FORCE:
                 if bounces(self.equations.system, contact):
-                    continue  # the contact would bounce to rest after each closing, for which there are no equations yet
+                    # the contact would bounce to rest after each closing, for which there are no
+                    # equations yet
+                    continue
                 new = [Timed(ModeChange(False, contact, closed & ~(1 << contact)), phase), *new]
             yield [*events[:at], *new, *events[at:]]
 
     def equations_with(self, events: list[Timed]) -> tuple[Any, np.ndarray] | None:
-        """The problem with these events and its unknowns at this orbit; None where its motion cannot be followed."""
+        """The problem with these events and its unknowns at this orbit; None where its motion
+        cannot be followed.
+        """
         closed = int(self.equations.plan[0, SegmentPlan.ALONG])
-        changes, period = tuple(timed.event for timed in events), self.equations.signature.period
+        changes = tuple(timed.event for timed in events)
+        period = self.equations.signature.period
         symmetric = self.equations.signature.symmetric
         signature = Signature((), period, symmetric, events=changes, closed=0 if events else closed)
         other = self.equations.with_signature(signature)
@@ -144,17 +188,24 @@ class Switching:
         """The state of the orbit just after the first of the events of the other side."""
         n = 2 * self.equations.own
         for timed, end in zip(self.events, self.evaluation.ends, strict=False):
-            same = (timed.event.is_impact, timed.event.contact) == (first.event.is_impact, first.event.contact)
+            same = (timed.event.is_impact, timed.event.contact) == (
+                first.event.is_impact,
+                first.event.contact,
+            )
             if same and abs(timed.phase - first.phase) < TOLERANCES.switching:
                 return np.asarray(end[SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + n])
         return self._state_at(first.phase)
 
     def _state_at(self, phase: float) -> np.ndarray | None:
-        """The state at a phase of an orbit without events; for an orbit with a single event, the state at the next phase 0."""
-        frequency, n = self.equations.frequency(self.point.solution.values), 2 * self.equations.own
+        """The state at a phase of an orbit without events; for an orbit with a single event, the
+        state at the next phase 0.
+        """
+        frequency = self.equations.frequency(self.point.solution.values)
+        n = 2 * self.equations.own
         begin = self.events[0].phase if self.events else 0.0
         end = phase if not self.events else 2.0 * np.pi * np.ceil(begin / (2.0 * np.pi))
-        closed, start = int(self.equations.plan[0, SegmentPlan.ALONG]), self.evaluation.ends[0, SegmentEnd.NUMBERS :][:n]
+        closed = int(self.equations.plan[0, SegmentPlan.ALONG])
+        start = self.evaluation.ends[0, SegmentEnd.NUMBERS :][:n]
         state: np.ndarray | None = self.equations.carried_along(
             start, closed, np.array([begin, end]) / frequency, self.point.solution.values
         )
@@ -165,12 +216,18 @@ def from_next_event(point: OrbitPoint) -> OrbitPoint:
     """The same symmetric orbit in the equations of the half that begins with its second event."""
     here = Switching.of_point(point)
     phases = [timed.phase for timed in here.events]
-    events = (*here.equations.signature.events[1:], here.equations.signature.events[0].image(here.equations.images))
+    events = (
+        *here.equations.signature.events[1:],
+        here.equations.signature.events[0].image(here.equations.images),
+    )
     equations = here.equations.with_signature(replace(here.equations.signature, events=events))
     place = SegmentEnd.NUMBERS + 8 * equations.own
     state = here.evaluation.ends[0, place : place + 2 * equations.own]
     curve = point.curve.with_equations(equations)
-    found = curve.known(equations.joined(state, np.array([*phases[1:], phases[0] + equations.closing])), point.parameters)
+    found = curve.known(
+        equations.joined(state, np.array([*phases[1:], phases[0] + equations.closing])),
+        point.parameters,
+    )
     assert found is not None, "an orbit can be followed from each of its events"
     turned: OrbitPoint = curve.along_kernel(found)
     return turned
@@ -180,19 +237,25 @@ Cycle = tuple[ModeChange, ...]
 
 
 def cycle_of(signature: Signature) -> Cycle:
-    """The events in cyclic order, the same for signatures that differ only in the event with which their lists begin."""
+    """The events in cyclic order, the same for signatures that differ only in the event with which
+    their lists begin.
+    """
     events = signature.events
     return min((events[i:] + events[:i] for i in range(len(events))), key=repr, default=())
 
 
 def begins_excursion(point: OrbitPoint) -> bool:
-    """Whether a point has an excursion of no duration after a release: its multipliers and its tangent then have no meaning."""
+    """Whether a point has an excursion of no duration after a release: its multipliers and its
+    tangent then have no meaning.
+    """
     equations: Any = point.orbit.equations
     if not equations.signature.events:
         return False
     phases = equations.split(point.solution.unknowns)[1]
     apart = np.diff(np.append(phases, phases[:1] + equations.closing))
-    return bool((apart[equations.plan[:, SegmentPlan.POWER] == AFTER_RELEASE] < TOLERANCES.switching).any())
+    return bool(
+        (apart[equations.plan[:, SegmentPlan.POWER] == AFTER_RELEASE] < TOLERANCES.switching).any()
+    )
 
 
 def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:
@@ -202,10 +265,17 @@ def _changed(events: list[Timed], new: dict[int, Timed | None]) -> list[Timed]:
 
 
 def contact_change(point: OrbitPoint) -> SpecialKind:
-    """The kind of the point at which an event appears or is lost: GR for a grazing, SW for a release or a closing."""
-    orbit, here = point.orbit, Switching.of_point(point)
+    """The kind of the point at which an event appears or is lost: GR for a grazing, SW for a
+    release or a closing.
+    """
+    orbit = point.orbit
+    here = Switching.of_point(point)
     joined = next(iter(here._together()), None) is not None
-    return SpecialKind.SW if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance) else SpecialKind.GR
+    return (
+        SpecialKind.SW
+        if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance)
+        else SpecialKind.GR
+    )
 
 
 def bounces(system: System, contact: int) -> bool:
@@ -214,18 +284,20 @@ def bounces(system: System, contact: int) -> bool:
 
 
 def other_events_side(point: OrbitPoint) -> OrbitPoint | End:
-    """The point of the branch beyond one at which an event appears or is lost, with the direction in which it goes on; or why
-    there is none."""
+    """The point of the branch beyond one at which an event appears or is lost, with the direction
+    in which it goes on; or why there is none."""
     return _beyond_both_halves(point) if point.orbit.symmetric else _with_other_events(point)
 
 
 def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> OrbitPoint | End:
-    """`other_events_side`: the first of the possible signatures that this orbit solves and that has admissible
-    orbits beyond.
+    """`other_events_side`: the first of the possible signatures that this orbit solves and that has
+    admissible orbits beyond.
 
-    Symmetry may let several events change at once; these are then changed one after the other, at most `MOST_TOGETHER`.
+    Symmetry may let several events change at once; these are then changed one after the other, at
+    most `MOST_TOGETHER`.
     """
-    here, reason = Switching.of_point(point), OrbitEnd.TWO_AT_ONCE
+    here = Switching.of_point(point)
+    reason = OrbitEnd.TWO_AT_ONCE
     known = (*known, cycle_of(point.orbit.signature))
     for events in here.other_signatures():
         found = here.equations_with(events)
@@ -234,17 +306,22 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
         solved = point.curve.with_equations(found[0]).known(found[1], point.parameters)
         if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
             continue
-        reason, begun = OrbitEnd.NO_DIRECTION, point.curve.with_equations(found[0]).along_kernel(solved)
-        ahead = _admissible(begun) or (_with_other_events(begun, known) if len(known) < MOST_TOGETHER else None)
+        reason = OrbitEnd.NO_DIRECTION
+        begun = point.curve.with_equations(found[0]).along_kernel(solved)
+        ahead = _admissible(begun) or (
+            _with_other_events(begun, known) if len(known) < MOST_TOGETHER else None
+        )
         if isinstance(ahead, OrbitPoint):
             return ahead
     return End(reason, point.parameter)
 
 
 def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
-    """`other_events_side` of a symmetric orbit: first both halves change alike, then, over the full period, one
-    after the other, which may break the symmetry."""
-    for start in (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,):
+    """`other_events_side` of a symmetric orbit: first both halves change alike, then, over the full
+    period, one after the other, which may break the symmetry."""
+    for start in (
+        (point, from_next_event(point)) if len(point.orbit.signature.events) > 1 else (point,)
+    ):
         ahead = _with_other_events(start)
         if not isinstance(ahead, End):
             return ahead
@@ -253,4 +330,8 @@ def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
 
 
 def _admissible(start: OrbitPoint) -> OrbitPoint | None:
-    return admissible_direction(start, BEGUN, begun=True) if begins_excursion(start) else admissible_direction(start)
+    return (
+        admissible_direction(start, BEGUN, begun=True)
+        if begins_excursion(start)
+        else admissible_direction(start)
+    )

@@ -1,5 +1,5 @@
-"""A branch of periodic orbits along one parameter: its points, its special points and why it ends; the dataset that
-keeps it without loss, and its orbits read back from that."""
+"""A branch of periodic orbits along one parameter: its points, its special points and why it ends;
+the dataset that keeps it without loss, and its orbits read back from that."""
 
 from __future__ import annotations
 
@@ -43,11 +43,13 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
     ends
         Why the branch ends at its first point and at its last one.
     missed
-        The special points that were noticed on the way and could not be located, each with its reason.
+        The special points that were noticed on the way and could not be located, each with its
+        reason.
     path
         The dotted path of the parameter.
     origin
-        Where the branch begins: at an orbit that was given, or at a special point of another branch.
+        Where the branch begins: at an orbit that was given, or at a special point of another
+        branch.
 
     Examples
     --------
@@ -98,27 +100,42 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
 
     def _repr_html_(self) -> str:
         facts = {
-            f"{i + 1}. {p.kind}": f"{self.path} = {p.parameter:.9g}, amplitude {p.orbit.amplitude:.6g}"
+            f"{i + 1}. {p.kind}": (
+                f"{self.path} = {p.parameter:.9g}, amplitude {p.orbit.amplitude:.6g}"
+            )
             for i, p in enumerate(self.special)
         }
         ends = {"begins": str(self.ends[0]), "ends": str(self.ends[1])}
-        span = f"{self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else "none"
-        return html_table(f"Branch along {self.path}", {"points": len(self.points), "from": span, **facts, **ends})
+        span = (
+            f"{self.parameters.min():.6g} to {self.parameters.max():.6g}"
+            if len(self.points)
+            else "none"
+        )
+        return html_table(
+            f"Branch along {self.path}", {"points": len(self.points), "from": span, **facts, **ends}
+        )
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{p.kind} {p.parameter:.6g}" for p in self.special)
-        span = f"{self.path} from {self.parameters.min():.6g} to {self.parameters.max():.6g}" if len(self.points) else self.path
+        span = (
+            f"{self.path} from {self.parameters.min():.6g} to {self.parameters.max():.6g}"
+            if len(self.points)
+            else self.path
+        )
         missed = f"; not located: {', '.join(map(str, self.missed))}" if self.missed else ""
         ends = f"ends: {self.ends[0]} | {self.ends[1]}"
-        return f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; {ends}{missed})"
+        return (
+            f"Branch({span}, {len(self.points)} points, special: {kinds or 'none'}; {ends}{missed})"
+        )
 
 
 def branch_dataset(branch: Branch) -> xarray.Dataset:
     """The dataset of a branch: points along `point`, special points along `special`.
 
-    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see `equations/`), padded with nan and
-    0 to one length. Orbits that rest also have the times of their `releases` and `rests`. The attributes hold, for both ends, the
-    sentence (`ends`), the reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
+    `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see
+    `equations/`), padded with nan and 0 to one length. Orbits that rest also have the times of
+    their `releases` and `rests`. The attributes hold, for both ends, the sentence (`ends`), the
+    reason as a word (`end_reasons`) and the kind of the special point there, if any (`end_kinds`).
     """
     import xarray
 
@@ -126,7 +143,12 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     equations = orbits[0].equations
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
     data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
-    data |= multiplier_columns(orbits) | solution_columns(orbits) | _special(branch.special) | _rests(orbits)
+    data |= (
+        multiplier_columns(orbits)
+        | solution_columns(orbits)
+        | _special(branch.special)
+        | _rests(orbits)
+    )
     attributes: dict[str, Any] = {
         "kind": "branch",
         "path": branch.path,
@@ -144,19 +166,32 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
 def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """The quantities that are one number for each orbit."""
     model = orbits[0].equations.given.model
-    angle, coordinate = {"units": model.unit_of(model.coordinates[0])}, " or ".join(model.coordinates)
+    angle = {"units": model.unit_of(model.coordinates[0])}
+    coordinate = " or ".join(model.coordinates)
 
     def column(value: Any, kind: Any = float) -> np.ndarray:
         return np.array([value(orbit) for orbit in orbits], dtype=kind)
 
     columns = [
-        ("amplitude", column(lambda o: o.amplitude), {**angle, "long_name": f"max abs({coordinate})"}),
+        (
+            "amplitude",
+            column(lambda o: o.amplitude),
+            {**angle, "long_name": f"max abs({coordinate})"},
+        ),
         ("highest", column(lambda o: o.highest), {**angle, "long_name": f"max {coordinate}"}),
         ("lowest", column(lambda o: o.lowest), {**angle, "long_name": f"min {coordinate}"}),
         ("stable", column(lambda o: o.stable, np.int8), {}),
-        ("impact_count", column(lambda o: o.impact_count, int), {"long_name": "impacts in one period of the orbit"}),
+        (
+            "impact_count",
+            column(lambda o: o.impact_count, int),
+            {"long_name": "impacts in one period of the orbit"},
+        ),
         ("slowest", column(lambda o: o.slowest), {"long_name": "least speed of an impact"}),
-        ("clearance", column(lambda o: o.clearance), {"long_name": "least inner minimum of the gap"}),
+        (
+            "clearance",
+            column(lambda o: o.clearance),
+            {"long_name": "least inner minimum of the gap"},
+        ),
         ("residual", column(lambda o: o.residual), {}),
         ("rest_share", column(lambda o: o.rest_share), {}),
     ]
@@ -173,24 +208,34 @@ def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
         return {}
 
     def rows(name: str) -> np.ndarray:
-        return np.array([np.pad(getattr(o, name), (0, width - len(o.releases)), constant_values=np.nan) for o in orbits])
+        return np.array(
+            [
+                np.pad(getattr(o, name), (0, width - len(o.releases)), constant_values=np.nan)
+                for o in orbits
+            ]
+        )
 
     return {name: (("point", "rest"), rows(name)) for name in ("releases", "rests")}
 
 
 def multiplier_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     """The multipliers of each orbit, in rows of one length."""
-    every = [orbit.multipliers for orbit in orbits]  # their number varies: what contacts hold has none
+    # their number varies: what contacts hold has none
+    every = [orbit.multipliers for orbit in orbits]
     values = np.array([np.pad(one, (0, max(map(len, every)) - len(one))) for one in every])
     dims = ("point", "multiplier")
     return {"multiplier_real": (dims, values.real), "multiplier_imag": (dims, values.imag)}
 
 
 def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
-    """The signature of each orbit and the unknowns of its equations, in rows of one length, as `orbits_of` reads them."""
+    """The signature of each orbit and the unknowns of its equations, in rows of one length, as
+    `orbits_of` reads them.
+    """
     width = max(orbit.equations.size for orbit in orbits)
     unknowns = np.full((len(orbits), width), np.nan)
-    sides = np.zeros((len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8)
+    sides = np.zeros(
+        (len(orbits), max(1, max(len(orbit.signature.sides) for orbit in orbits))), dtype=np.int8
+    )
     for row, side, orbit in zip(unknowns, sides, orbits, strict=True):
         row[: orbit.equations.size] = orbit.solution.unknowns
         side[: len(orbit.signature.sides)] = orbit.signature.sides
@@ -209,12 +254,16 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
             {"long_name": "side of an orbit without impacts"},
         ),
     }
-    events = np.full((len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1)
+    events = np.full(
+        (len(orbits), max(1, max(len(orbit.signature.events) for orbit in orbits)), 3), -1
+    )
     for table, orbit in zip(events, orbits, strict=True):
         for row, event in zip(table, orbit.signature.events, strict=False):
             row[:] = event.is_impact, event.contact, event.closed
     closed = np.array([orbit.signature.closed for orbit in orbits])
-    sections = np.array([np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits])
+    sections = np.array(
+        [np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits]
+    )
     return data | {
         "section": ("point", sections),
         "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),
@@ -240,12 +289,20 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "test_value": [s.evidence.value for s in special],
         "special_defect": [s.defect for s in special],
     }
-    return {name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()}
+    return {
+        name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()
+    }
 
 
 def _dtype(name: str) -> type:
     """The type of a column of special points, which NumPy cannot tell if the column has no rows."""
-    return str if name == "kind" else int if name in ("special_impact_count", "special_period") else float
+    return (
+        str
+        if name == "kind"
+        else int
+        if name in ("special_impact_count", "special_period")
+        else float
+    )
 
 
 NEEDED = ("parameter", "unknowns")
@@ -253,10 +310,11 @@ NEEDED = ("parameter", "unknowns")
 
 @answered
 def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
-    """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray` made, bit for bit, in order.
+    """The orbits along `point` of a dataset that `Branch.to_xarray` or `SpecialCurve.to_xarray`
+    made, bit for bit, in order.
 
-    The equations are evaluated at the kept unknowns, which must solve them. `continue_orbit` can go on from
-    each of these orbits.
+    The equations are evaluated at the kept unknowns, which must solve them. `continue_orbit` can go
+    on from each of these orbits.
 
     Parameters
     ----------
@@ -266,8 +324,9 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     Raises
     ------
     ParameterError
-        The dataset is of another kind, of other equations than the model has now, or of another version of saltus; its
-        unknowns do not solve the equations; or the model is the user's own and not registered (`saltus.register`).
+        The dataset is of another kind, of other equations than the model has now, or of another
+        version of saltus; its unknowns do not solve the equations; or the model is the user's own
+        and not registered (`saltus.register`).
 
     Examples
     --------
@@ -276,13 +335,20 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
     True
     """
     check_dataset(dataset, "a branch or a curve of special points", NEEDED, ("system", "tol"))
-    system, tol = System.from_json(dataset.attrs["system"]), float(dataset.attrs["tol"])
+    system = System.from_json(dataset.attrs["system"])
+    tol = float(dataset.attrs["tol"])
     check_provenance(dataset.attrs, system, "the dataset of these orbits")
-    paths = tuple(map(str, dataset["path"].values)) if "path" in dataset.coords else (str(dataset.attrs["path"]),)
+    paths = (
+        tuple(map(str, dataset["path"].values))
+        if "path" in dataset.coords
+        else (str(dataset.attrs["path"]),)
+    )
     values = np.atleast_2d(dataset["parameter"].values.T).T
     known: dict[Signature, OrbitEquations] = {}
     orbits = []
-    for signature, row, value in zip(_signatures(dataset), dataset["unknowns"].values, values, strict=True):
+    for signature, row, value in zip(
+        _signatures(dataset), dataset["unknowns"].values, values, strict=True
+    ):
         if signature not in known:
             known[signature] = equations_of(system, signature, paths, tol)
         orbits.append(_orbit(known[signature], row, value))
@@ -297,9 +363,20 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
         tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table.reshape(-1, 3) if k >= 0)
         for table in dataset["events"].values
     ]
-    more = zip(signatures, changes, dataset["closed_contacts"].values, dataset["section"].values, strict=True)
+    more = zip(
+        signatures,
+        changes,
+        dataset["closed_contacts"].values,
+        dataset["section"].values,
+        strict=True,
+    )
     return [
-        replace(signature, events=events, closed=int(closed), section=None if np.isnan(section) else float(section))
+        replace(
+            signature,
+            events=events,
+            closed=int(closed),
+            section=None if np.isnan(section) else float(section),
+        )
         for signature, events, closed, section in more
     ]
 
@@ -314,6 +391,13 @@ def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> Per
     orbit = PeriodicOrbit.known(equations, row[: equations.size].copy(), values)
     scale = max(1.0, float(np.abs(row[: equations.size]).max()))
     if orbit is None or not orbit.residual <= max(NEWTON.stalled * scale, equations.residual_floor):
-        error = "its motion cannot be followed" if orbit is None else f"its residual is {orbit.residual:.1e}"
-        raise ParameterError(f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the data are damaged")
+        error = (
+            "its motion cannot be followed"
+            if orbit is None
+            else f"its residual is {orbit.residual:.1e}"
+        )
+        raise ParameterError(
+            f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the "
+            "data are damaged"
+        )
     return orbit

@@ -1,4 +1,6 @@
-"""Following orbits along one parameter, through folds and grazings, and from there the branches that are born on the way."""
+"""Following orbits along one parameter, through folds and grazings, and from there the branches
+that are born on the way.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,11 @@ from saltus.systems import check_along, check_path
 if TYPE_CHECKING:
     import xarray
 
-STEP = STEPS.longest  # the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of speed
-# To a nearby value of the parameter a single step may go all the way, and change phases and speeds by 1.
+# the longest step: a thirtieth of the parameter's range, or a tenth of a radian and of a unit of
+# speed
+STEP = STEPS.longest
+# To a nearby value of the parameter a single step may go all the way, and change phases and speeds
+# by 1.
 NEARBY_STEPS = replace(STEPS, longest=1.0, first=0.1)
 
 
@@ -45,7 +50,8 @@ def continue_orbit(
     progress: Progress = silent,
     growing: Callable[[Branch], object] | None = None,
 ) -> Branch:
-    """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound, shrinks to rest or cannot go on.
+    """The branch of an orbit along a parameter, both ways, until it closes, reaches a bound,
+    shrinks to rest or cannot go on.
 
     Parameters
     ----------
@@ -56,22 +62,24 @@ def continue_orbit(
     bounds
         The least and the largest value of the parameter.
     functions
-        Further functions of an orbit whose zeros are special points, by name. Zeros of the model's margins are
-        found in any case.
+        Further functions of an orbit whose zeros are special points, by name. Zeros of the model's
+        margins are found in any case.
     step
         The longest step, in the norm of `OrbitCurve`.
     while_stable
-        Whether to end just beyond the loss of stability; orbits that rest for a part of their period never lose it.
+        Whether to end just beyond the loss of stability; orbits that rest for a part of their
+        period never lose it.
     progress
         Called with the share of the range that has been seen and the value of the parameter.
     growing
-        Called with the branch so far, which has no special points yet, at each new orbit, and with the whole branch at the end.
+        Called with the branch so far, which has no special points yet, at each new orbit, and with
+        the whole branch at the end.
 
     Raises
     ------
     ParameterError
-        `orbit` is none, or not `isolated`; the parameter is unknown, the bounds exclude the orbit, or the step is outside
-        [1e-6, 1].
+        `orbit` is none, or not `isolated`; the parameter is unknown, the bounds exclude the orbit,
+        or the step is outside [1e-6, 1].
 
     Examples
     --------
@@ -82,16 +90,28 @@ def continue_orbit(
     check_step(step)
     for name, function in (functions or {}).items():
         if not callable(function):
-            raise ParameterError(f"functions must be functions of an orbit, and {name!r} is {shown(function)}", "functions")
+            raise ParameterError(
+                f"functions must be functions of an orbit, and {name!r} is {shown(function)}",
+                "functions",
+            )
     low, high = _checked(orbit, path, bounds)
-    first, steps = start(*along(orbit, path), scale=(high - low) / 3.0), replace(STEPS, longest=step)
+    first = start(*along(orbit, path), scale=(high - low) / 3.0)
+    steps = replace(STEPS, longest=step)
     events = partial(BranchEvents, while_stable=while_stable)
-    show, unfinished = growing or _unseen, End(OrbitEnd.GROWING)
+    show = growing or _unseen
+    unfinished = End(OrbitEnd.GROWING)
 
     def grown(points: tuple[OrbitPoint, ...]) -> None:
         show(Branch(points, (), (unfinished, unfinished), (), path))
 
-    course = both_ways(first, lambda: events(functions or {}), {path: (low, high)}, steps, progress, growing and grown)
+    course = both_ways(
+        first,
+        lambda: events(functions or {}),
+        {path: (low, high)},
+        steps,
+        progress,
+        growing and grown,
+    )
     branch = Branch(**vars(course), path=path)
     show(branch)
     return branch
@@ -102,11 +122,13 @@ def _unseen(branch: Branch) -> None:
 
 
 def follow_stable(orbit: PeriodicOrbit, path: str, target: float) -> Branch:
-    """The branch of a stable orbit up to a nearby value of the parameter, or to just beyond its loss of stability if that comes
-    first. The steps are long, because only this outcome is asked for."""
+    """The branch of a stable orbit up to a nearby value of the parameter, or to just beyond its
+    loss of stability if that comes first. The steps are long, because only this outcome is asked
+    for."""
     value = float(orbit.system.get(path))
     low, high = _checked(orbit, path, (min(value, target), max(value, target)))
-    first, events = start(*along(orbit, path), scale=high - low), BranchEvents(while_stable=True)
+    first = start(*along(orbit, path), scale=high - low)
+    events = BranchEvents(while_stable=True)
     run = Continuation({path: (low, high)}, events, NEARBY_STEPS)
     run.follow(first if target > value else first.turned())
     return Branch(**vars(run.course(START)), path=path)
@@ -122,9 +144,15 @@ def follow_from(
     progress: Progress = silent,
 ) -> Branch:
     """The branch that begins at a special point of another one, in the direction of its tangent."""
-    path, steps = first.orbit.equations.paths[0], replace(STEPS, longest=step)
+    path = first.orbit.equations.paths[0]
+    steps = replace(STEPS, longest=step)
     within = {path: bounds}
-    run = Continuation(within, BranchEvents(functions or {}, until), steps, Watch(progress, within, steps.most_points))
+    run = Continuation(
+        within,
+        BranchEvents(functions or {}, until),
+        steps,
+        Watch(progress, within, steps.most_points),
+    )
     run.follow(first, born=True)
     return Branch(**vars(run.course(origin)), path=path, origin=origin)
 
@@ -135,25 +163,37 @@ def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float
     check_path(orbit.system, path)
     value = orbit.system.get(path)
     if not low <= value <= high:
-        raise ParameterError(f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range", "bounds")
+        raise ParameterError(
+            f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range",
+            "bounds",
+        )
     check_along(orbit.system, path, (low, high), "bounds")
     return low, high
 
 
 def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
-    """An orbit as a solution of the problem along a parameter, and whether the system keeps its mirror symmetry along it.
+    """An orbit as a solution of the problem along a parameter, and whether the system keeps its
+    mirror symmetry along it.
 
-    A symmetric orbit is given by half of its period if the system keeps its symmetry, otherwise by all of it.
+    A symmetric orbit is given by half of its period if the system keeps its symmetry, otherwise by
+    all of it.
     """
-    system, signature = orbit.system, orbit.signature
+    system = orbit.system
+    signature = orbit.signature
     symmetric = keeps_symmetry(system, path)
     equations = equations_of(system, signature, (path,))
-    if equations_of(system, Signature((), 1), (path,)).passes_contact != orbit.equations.passes_contact:
+    if (
+        equations_of(system, Signature((), 1), (path,)).passes_contact
+        != orbit.equations.passes_contact
+    ):
         found = _in_other_equations(orbit, path)
     else:
         found = PeriodicOrbit.near(equations, orbit.solution.unknowns, equations.values)
     if found is None:
-        raise ParameterError(f"the orbit does not solve its own equations to be continued along {path}; find it again", "orbit")
+        raise ParameterError(
+            f"the orbit does not solve its own equations to be continued along {path}; find it again",
+            "orbit",
+        )
     if found.symmetric and not symmetric:
         found = full_period(found)
     elif symmetric:
@@ -168,7 +208,9 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
 
 
 def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None:
-    """The orbit solved for again, if the parameter that is now varied decides whether its contact is a singularity."""
+    """The orbit solved for again, if the parameter that is now varied decides whether its contact
+    is a singularity.
+    """
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
     return orbit_near(equations_of(orbit.system, Signature((), 1), (path,)), state, orbit.period)
@@ -188,8 +230,9 @@ def switch_branch(
 ) -> tuple[Branch, ...]:
     """The branches that begin at a special point of another branch.
 
-    At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two unsymmetric orbits, which are
-    mirror images of one another, or, where two branches cross, the two halves of the other branch.
+    At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two
+    unsymmetric orbits, which are mirror images of one another, or, where two branches cross, the
+    two halves of the other branch.
 
     Parameters
     ----------
@@ -198,7 +241,8 @@ def switch_branch(
     bounds, functions, step
         As for `continue_orbit`.
     both
-        Whether both of two branches of mirror images are followed, whose orbits differ in phase and sign only.
+        Whether both of two branches of mirror images are followed, whose orbits differ in phase and
+        sign only.
     progress
         Called at every point with the fraction of the range that is done.
 
@@ -220,7 +264,8 @@ def switch_branch(
     bounds = check_bounds(bounds)
     if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
         raise ParameterError(
-            f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)", "special"
+            f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)",
+            "special",
         )
     if special.kind == SpecialKind.PD:
         starts: tuple[OrbitPoint | None, ...] = (_doubled(special.point),)
@@ -228,8 +273,11 @@ def switch_branch(
         starts = _unsymmetric(special.point)[: 2 if both else 1]
     else:
         starts = _crossing_branch(special.point)
-    origin, begun = _origin(special), [start for start in starts if start is not None]
-    return tuple(follow_from(start, bounds, origin, functions, step, progress=progress) for start in begun)
+    origin = _origin(special)
+    begun = [start for start in starts if start is not None]
+    return tuple(
+        follow_from(start, bounds, origin, functions, step, progress=progress) for start in begun
+    )
 
 
 def _origin(special: SpecialPoint) -> End:
@@ -243,30 +291,42 @@ def _kernel(matrix: np.ndarray) -> np.ndarray:
 
 def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     """The orbit gone round twice, and the direction in which the two rounds differ."""
-    equations, signature = point.orbit.equations, point.orbit.signature
+    equations = point.orbit.equations
+    signature = point.orbit.signature
     if 2 * signature.period > MOST_DOUBLED:
         return None
     direction = equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
-    return _along(point, equations.with_signature(signature.repeated()), equations.repeated(point.solution.unknowns), direction)
+    return _along(
+        point,
+        equations.with_signature(signature.repeated()),
+        equations.repeated(point.solution.unknowns),
+        direction,
+    )
 
 
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
     orbit = full_period(point.orbit)
     direction = point.orbit.equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
-    return tuple(_along(point, orbit.equations, orbit.solution.unknowns, sign * direction) for sign in (1.0, -1.0))
+    return tuple(
+        _along(point, orbit.equations, orbit.solution.unknowns, sign * direction)
+        for sign in (1.0, -1.0)
+    )
 
 
-def _along(point: OrbitPoint, equations: OrbitEquations, unknowns: np.ndarray, direction: np.ndarray) -> OrbitPoint | None:
+def _along(
+    point: OrbitPoint, equations: OrbitEquations, unknowns: np.ndarray, direction: np.ndarray
+) -> OrbitPoint | None:
     """The first point of the new branch, to be followed in a direction of the unknowns."""
-    curve, tangent = point.curve.with_equations(equations), np.append(direction, 0.0)
+    curve = point.curve.with_equations(equations)
+    tangent = np.append(direction, 0.0)
     known = curve.known(unknowns, point.parameters)
     return None if known is None else curve.point_at(known, tangent / curve.norm(tangent))
 
 
 def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
-    """The two halves of the other branch at a crossing: both ways along the direction in the two-dimensional kernel that is
-    orthogonal to the branch's own."""
+    """The two halves of the other branch at a crossing: both ways along the direction in the
+    two-dimensional kernel that is orthogonal to the branch's own."""
     curve = point.curve
     own = point.tangent * curve.weights
     kernel = np.linalg.svd(point.evaluation.derivatives() / curve.weights)[2][-2:]
@@ -279,7 +339,8 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
 
 @dataclass(frozen=True)
 class Cascade(Result):
-    """A cascade of period doublings, with the ratios of their distances, which tend to Feigenbaum's 4.6692.
+    """A cascade of period doublings, with the ratios of their distances, which tend to Feigenbaum's
+    4.6692.
 
     Attributes
     ----------
@@ -311,22 +372,37 @@ class Cascade(Result):
         return np.asarray(steps[:-1] / steps[1:])
 
     def to_xarray(self) -> xarray.Dataset:
-        """`parameter`, `period` and `amplitude` of the doublings over `doubling`, and their `ratio` over `step`."""
-        orbit, path = self.points[0].orbit, self.points[0].orbit.equations.paths[0]
+        """`parameter`, `period` and `amplitude` of the doublings over `doubling`, and their `ratio`
+        over `step`.
+        """
+        orbit = self.points[0].orbit
+        path = self.points[0].orbit.equations.paths[0]
         name = orbit.system.model.coordinates[0]
         amplitudes = [point.amplitude for point in self.points]
         columns: dict[str, tuple[Any, ...]] = {
             "parameter": ("doubling", self.parameters, "1", path),
             "period": ("doubling", self.periods, "1", "forcing periods of the orbits that double"),
-            "amplitude": ("doubling", amplitudes, orbit.system.model.unit_of(name), f"max abs({name})"),
-            "ratio": ("step", self.ratios, "1", "(p_{n+1} - p_n) / (p_{n+2} - p_{n+1}), which tends to 4.6692"),
+            "amplitude": (
+                "doubling",
+                amplitudes,
+                orbit.system.model.unit_of(name),
+                f"max abs({name})",
+            ),
+            "ratio": (
+                "step",
+                self.ratios,
+                "1",
+                "(p_{n+1} - p_n) / (p_{n+2} - p_{n+1}), which tends to 4.6692",
+            ),
         }
         return result_dataset("cascade", columns, None, orbit.system, path=path)
 
 
-def doubling_cascade(first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP) -> Cascade:
-    """The period doublings that follow a first one, each on the branch born at its predecessor, up to `max_period` forcing
-    periods.
+def doubling_cascade(
+    first: SpecialPoint, bounds: tuple[float, float], *, max_period: int = 32, step: float = STEP
+) -> Cascade:
+    """The period doublings that follow a first one, each on the branch born at its predecessor, up
+    to `max_period` forcing periods.
 
     The cascade ends earlier if a doubled branch has no further doubling within the bounds.
 

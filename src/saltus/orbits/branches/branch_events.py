@@ -1,4 +1,6 @@
-"""The events along a branch of orbits: special points, passages through grazings, and the ways in which the branch ends."""
+"""The events along a branch of orbits: special points, passages through grazings, and the ways in
+which the branch ends.
+"""
 
 from __future__ import annotations
 
@@ -42,24 +44,33 @@ Run = Continuation
 
 @dataclass(frozen=True)
 class BranchLimits:
-    """When the continuation of a branch is given up, and how its events are told apart from rounding errors."""
+    """When the continuation of a branch is given up, and how its events are told apart from
+    rounding errors.
+    """
 
     most_impacts: int = 120  # Orbits with more impacts in a period than this are not followed.
-    # Grazings are taken to accumulate when this many in a row have each added impacts, and one of the next two conditions holds.
+    # Grazings are taken to accumulate when this many in a row have each added impacts, and one of
+    # the next two conditions holds.
     accumulating: int = 5
-    accumulation_width: float = 1e-3  # Either all of them lie within this share of the parameter's range,
-    # or the amplitude has shrunk below this share of the largest one, with more impacts than `shrunk_impacts`.
+    # Either all of them lie within this share of the parameter's range,
+    accumulation_width: float = 1e-3
+    # or the amplitude has shrunk below this share of the largest one, with more impacts than
+    # `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit of the branch by this factor:
-    # a thousand of the longest steps lead there.
+    # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit
+    # of the branch by this factor: a thousand of the longest steps lead there.
     largest: float = 1e2
-    same_fold: float = 1e-8  # A fold and a crossing of branches whose parameters differ by less than this are one point.
-    # How far a complex pair of multipliers may be from the unit circle at an NS; a pair farther outside, where areas of the state
-    # plane never grow, is an error of saltus.
+    # A fold and a crossing of branches whose parameters differ by less than this are one point.
+    same_fold: float = 1e-8
+    # How far a complex pair of multipliers may be from the unit circle at an NS; a pair farther
+    # outside, where areas of the state plane never grow, is an error of saltus.
     impossible_pair: float = 1e-6
-    settling: int = 40  # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers are 0
-    # Distances in both directions along the parent's branch, tried in turn until they enclose its special point.
+    # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers
+    # are 0
+    settling: int = 40
+    # Distances in both directions along the parent's branch, tried in turn until they enclose its
+    # special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
 
 
@@ -79,7 +90,10 @@ class OrbitEvents(Events):
         lost = ahead.orbit.equations.lost_ahead(ahead)
         if lost is None:
             return End(OrbitEnd.SHRINKS, ahead.parameter)
-        inside = all(low <= value <= high for (low, high), value in zip(run.bounds.values(), lost.parameters, strict=True))
+        inside = all(
+            low <= value <= high
+            for (low, high), value in zip(run.bounds.values(), lost.parameters, strict=True)
+        )
         run.special += [lost] if inside else []
         return End(OrbitEnd.NO_PULL, lost.parameter, lost.kind) if inside else None
 
@@ -87,7 +101,9 @@ class OrbitEvents(Events):
         return nearest(point, place, other)
 
     def closing(self, first: OrbitPoint, ahead: OrbitPoint) -> OrbitPoint:
-        """The first orbit of a closed branch, by its state at the section that the branch has when it returns to it."""
+        """The first orbit of a closed branch, by its state at the section that the branch has when
+        it returns to it.
+        """
         found: OrbitPoint = first.curve.equations.at_section_of(first, ahead)
         return found
 
@@ -99,16 +115,18 @@ class BranchEvents(OrbitEvents):
     functions: dict[str, UserFunction] = field(default_factory=dict)
     until: SpecialKind | None = None  # the kind of special point at which to end
     while_stable: bool = False  # whether to end beyond the loss of stability
-    # The last step whose cut was computed: the cut decides first whether the step is accepted, then where it ends.
+    # The last step whose cut was computed: the cut decides first whether the step is accepted, then
+    # where it ends.
     last_cut: tuple[OrbitPoint, OrbitPoint, Cut | End | None] | None = None
 
     name = "branch"
     keeps_special = True  # so that a line through the points shows the fold
 
     def accepts(self, point: OrbitPoint, ahead: OrbitPoint) -> bool:
-        """Whether a step may be taken: not if it has jumped onto the branch of the orbits that are their own images, nor if it
-        begins at one grazing and has gone past the next one."""
-        begun = point.iterations == 0  # the first point beyond a grazing: its unknowns are known without solving
+        """Whether a step may be taken: not if it has jumped onto the branch of the orbits that are
+        their own images, nor if it begins at one grazing and has gone past the next one."""
+        # the first point beyond a grazing: its unknowns are known without solving
+        begun = point.iterations == 0
         skipped = begun and grazing(point) <= TOLERANCES.touch and grazing(ahead) < 0.0
         if not point.orbit.equations.accepts(ahead, lambda: self.cut(point, ahead)):
             return False
@@ -119,7 +137,9 @@ class BranchEvents(OrbitEvents):
         return point.orbit.equations.barrier(point)
 
     def cut(self, point: OrbitPoint, ahead: OrbitPoint) -> Cut | End | None:
-        """Where a step is cut: at a grazing, or where a release or a closing of one of several contacts appears or is lost."""
+        """Where a step is cut: at a grazing, or where a release or a closing of one of several
+        contacts appears or is lost.
+        """
         if self.last_cut is None or self.last_cut[0] is not point or self.last_cut[1] is not ahead:
             self.last_cut = point, ahead, self._cut(point, ahead)
         return self.last_cut[2]
@@ -132,8 +152,8 @@ class BranchEvents(OrbitEvents):
         return changed
 
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
-        """The end of a family that reaches orbits that are their own images: at the BPC or PD of the parent's branch at which the
-        family is born."""
+        """The end of a family that reaches orbits that are their own images: at the BPC or PD of
+        the parent's branch at which the family is born."""
         if not passes_image(point, ahead):
             return None
         kind = SpecialKind.BPC if point.orbit.period % 2 else SpecialKind.PD
@@ -141,7 +161,8 @@ class BranchEvents(OrbitEvents):
         if parent is not None:
             last = on_family(point, parent.point)
             beside = None if last is None else beside_image(point, last)
-            if beside is not None:  # between the last point and the end the family may have further special points
+            # between the last point and the end the family may have further special points
+            if beside is not None:
                 run.take(beside)
             run.points.append(last or parent.point)
             run.special.append(parent)
@@ -153,11 +174,16 @@ class BranchEvents(OrbitEvents):
 
     def outside(self, point: OrbitPoint) -> int | None:
         """The number of multipliers outside the unit circle; None at a grazing."""
-        return None if point.orbit.grazes else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + TOLERANCES.on_circle))
+        return (
+            None
+            if point.orbit.grazes
+            else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + TOLERANCES.on_circle))
+        )
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """The special points, without crossings of branches that are only folds, and without the zeros of `torus` at which no
-        complex pair of multipliers has the modulus 1 or that lie where areas of states never grow."""
+        """The special points, without crossings of branches that are only folds, and without the
+        zeros of `torus` at which no complex pair of multipliers has the modulus 1 or that lie where
+        areas of states never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 
         def is_fold(zero: Zero) -> bool:
@@ -173,22 +199,34 @@ class BranchEvents(OrbitEvents):
 
     def last(self, special: Zero) -> End | None:
         """The end at the first special point of the kind that is looked for."""
-        return End(OrbitEnd.FIRST, special.parameter, special.kind) if special.kind == self.until else None
+        return (
+            End(OrbitEnd.FIRST, special.parameter, special.kind)
+            if special.kind == self.until
+            else None
+        )
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
-        """The end of an orbit that has shrunk to rest, has lost its stability, or has others beside it at the same parameters."""
+        """The end of an orbit that has shrunk to rest, has lost its stability, or has others beside
+        it at the same parameters.
+        """
         largest = complex_pairs(ahead.orbit).max(initial=0.0)
         if largest > 1.0 + SETTINGS.impossible_pair and never_torus(ahead.orbit):
-            where, modulus = ahead.parameters, f"{largest:.9g}"
-            run.missed.append(Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus))
+            where = ahead.parameters
+            modulus = f"{largest:.9g}"
+            run.missed.append(
+                Missed(OrbitMissed.IMPOSSIBLE_PAIR, SpecialKind.NS, where, where, modulus)
+            )
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
-        if not any(point.orbit.isolated for point in run.points[-2:]):  # one point alone may be where branches cross
+        # one point alone may be where branches cross
+        if not any(point.orbit.isolated for point in run.points[-2:]):
             return End(OrbitEnd.NOT_ISOLATED, run.points[-2:][0].parameter)
         return super().ended(run, ahead, cut)
 
     def across(self, run: Run, cut: Cut) -> OrbitPoint | End:
-        """The point with the signature of the other side of a grazing, at which the branch goes on; or why it ends."""
+        """The point with the signature of the other side of a grazing, at which the branch goes on;
+        or why it ends.
+        """
         graze = cut.special
         if graze is not None and any(_same_place(graze, earlier) for earlier in run.special[:-1]):
             run.special.pop()
@@ -204,21 +242,27 @@ class BranchEvents(OrbitEvents):
             return following
         if (further := equations.also_at(cut, following)) is not None:
             run.special.append(further)
-        count, value = following.orbit.counted_impacts, following.parameter
+        count = following.orbit.counted_impacts
+        value = following.parameter
         if (shorter := repetition(following)) is not None:
             return End(OrbitEnd.GRAZES_ANOTHER, value, detail=shorter)
         if not following.orbit.isolated:
             return End(OrbitEnd.NOT_ISOLATED, value)
         if count > SETTINGS.most_impacts:
             return End(OrbitEnd.MANY_IMPACTS, value, detail=str(SETTINGS.most_impacts))
-        return End(OrbitEnd.ACCUMULATES, value, detail=str(count)) if _accumulate(run, following) else following
+        return (
+            End(OrbitEnd.ACCUMULATES, value, detail=str(count))
+            if _accumulate(run, following)
+            else following
+        )
 
     def first_step(self, points: Sequence[OrbitPoint]) -> float:
         before, ahead = points[-2:]
         return ahead.orbit.equations.first_step(before, ahead)
 
     def stalled(self, run: Run, point: OrbitPoint, step: float) -> Cut | End:
-        """The end where even the shortest step fails: because the orbit repels too strongly, or for a reason that is not known.
+        """The end where even the shortest step fails: because the orbit repels too strongly, or for
+        a reason that is not known.
 
         A whole motion may stall where its events change; there the branch may turn round: a cut.
         """
@@ -232,58 +276,80 @@ class BranchEvents(OrbitEvents):
 
 
 def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
-    """The point with which a branch goes on beyond a point, found from a motion that settles there; or why it ends."""
-    equations, period = point.orbit.equations, point.orbit.period
+    """The point with which a branch goes on beyond a point, found from a motion that settles there;
+    or why it ends.
+    """
+    equations = point.orbit.equations
+    period = point.orbit.period
     for values in restart.values:
         try:
             system = equations.given_at(values)
-            motion = simulate(system, **restart.state, periods=SETTINGS.settling * period, dense=False)
+            motion = simulate(
+                system, **restart.state, periods=SETTINGS.settling * period, dense=False
+            )
             state = arguments_of(system, motion.final_state)
             base = equations_of(system, Signature((), 1), equations.paths, equations.tol)
             orbit = orbit_from(base, state, period)
-            # once more from its own motion, which may have other events than one that has not settled
-            orbit = None if orbit is None else orbit_from(base, arguments_of(system, orbit.section_state), orbit.period)
+            # once more from its own motion, which may have other events than one that has not
+            # settled
+            orbit = (
+                None
+                if orbit is None
+                else orbit_from(base, arguments_of(system, orbit.section_state), orbit.period)
+            )
         except SaltusError:
             continue
         if orbit is None or not orbit.admissible:
             continue
-        solution, ahead = orbit.solution, np.append(np.zeros(orbit.equations.size), values - point.parameters)
-        found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
-        there: OrbitPoint | None = point.curve.with_equations(orbit.equations).with_tangent(found, ahead)
+        solution = orbit.solution
+        ahead = np.append(np.zeros(orbit.equations.size), values - point.parameters)
+        found = Corrected(
+            np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations
+        )
+        there: OrbitPoint | None = point.curve.with_equations(orbit.equations).with_tangent(
+            found, ahead
+        )
         if there is not None:
             return there
     return restart.end
 
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:
-    """Whether grazings accumulate: the last ones have all added impacts, close to one value of the parameter or on the way to
-    rest."""
+    """Whether grazings accumulate: the last ones have all added impacts, close to one value of the
+    parameter or on the way to rest."""
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
     counts = [point.orbit.counted_impacts for point in (*grazings, following)]
     if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
         return False
     span = float(np.ptp([point.parameter for point in grazings]))
-    small = following.orbit.amplitude < SETTINGS.shrunk * max(point.orbit.amplitude for point in run.points)
+    small = following.orbit.amplitude < SETTINGS.shrunk * max(
+        point.orbit.amplitude for point in run.points
+    )
     return bool(
-        span < SETTINGS.accumulation_width * following.curve.scales[0] or (small and counts[-1] > SETTINGS.shrunk_impacts)
+        span < SETTINGS.accumulation_width * following.curve.scales[0]
+        or (small and counts[-1] > SETTINGS.shrunk_impacts)
     )
 
 
 def _same_place(a: Zero, b: Zero) -> bool:
     """Whether two grazings are one and the same, met from the same side."""
-    one, other = a.point, b.point
+    one = a.point
+    other = b.point
     same = (a.kind, one.orbit.signature) == (b.kind, other.orbit.signature)
     near = math.isclose(one.parameter, other.parameter, rel_tol=1e-10)
     return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
 
 
 def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
-    """The special point of the parent's branch at which a family is born, from a step a-b of the family that passes through it.
+    """The special point of the parent's branch at which a family is born, from a step a-b of the
+    family that passes through it.
 
-    The orbit there is its own image. The family's equations are singular at it; those of the parent, over half of the period, are
-    not.
+    The orbit there is its own image. The family's equations are singular at it; those of the
+    parent, over half of the period, are not.
     """
-    equations, first, last = a.curve.equations.halved, a.halves, b.halves
+    equations = a.curve.equations.halved
+    first = a.halves
+    last = b.halves
     assert first is not None
     assert last is not None
     lengths = [float(np.linalg.norm(both[1] - both[0])) for both in (first, last)]
@@ -294,7 +360,8 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     middle = curve.solve_at(guess, np.append(np.zeros(curve.equations.size), 1.0))
     if middle is None:
         return None
-    test, least = FLIP[equations.signature.symmetric], 0.0
+    test = FLIP[equations.signature.symmetric]
+    least = 0.0
     for reach in (reach for reach in SETTINGS.reaches if reach > least):
         ends = [middle.beside(sign * reach) for sign in (-1.0, 1.0)]
         if ends[0] is None or ends[1] is None:

@@ -1,5 +1,5 @@
-"""The curve of the orbits of one signature along parameters, as a problem of the room `continuation`, and its test
-functions, each of which vanishes at one kind of special point."""
+"""The curve of the orbits of one signature along parameters, as a problem of the room
+`continuation`, and its test functions, each of which vanishes at one kind of special point."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint, User
 from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 
-# With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved for.
+# With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved
+# for.
 STEEPEST = 1e8
 SHRUNK_TO_REST = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
 
@@ -56,8 +57,8 @@ class OrbitPoint(Point):
 
 @dataclass(frozen=True, eq=False)
 class OrbitCurve(EquationCurve[OrbitPoint]):
-    """The orbits of one problem along its parameters, measured by a norm that depends neither on the number of impacts nor on
-    the units of the parameters."""
+    """The orbits of one problem along its parameters, measured by a norm that depends neither on
+    the number of impacts nor on the units of the parameters."""
 
     equations: OrbitEquations
     scales: tuple[float, ...]  # of the parameters
@@ -91,7 +92,8 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
 
     def residual(self, place: np.ndarray) -> np.ndarray | None:
         n = self.equations.size
-        return self.equations.residual(place[:n], place[n:]) if n > self.iterations else None  # derivatives take some n motions
+        # derivatives take some n motions
+        return self.equations.residual(place[:n], place[n:]) if n > self.iterations else None
 
     def derivatives_at(self, point: OrbitPoint) -> np.ndarray:
         return point.evaluation.derivatives()
@@ -99,16 +101,22 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> OrbitPoint:
         return OrbitPoint(self, found.place, tangent, found.iterations, found.evaluation)
 
-    def advance(self, before: OrbitPoint | None, point: OrbitPoint, step: float) -> OrbitPoint | None:
-        """The point a step further. A short step may go round a corner of the curve, where the state at phase 0 passes the
-        contact (see `_seen_from`)."""
+    def advance(
+        self, before: OrbitPoint | None, point: OrbitPoint, step: float
+    ) -> OrbitPoint | None:
+        """The point a step further. A short step may go round a corner of the curve, where the
+        state at phase 0 passes the contact (see `_seen_from`)."""
         ahead = super().advance(before, point, step)
         if ahead is not None or step > STEPS.restart or not self.equations.passes_contact:
             return ahead
         ahead = self.solve(point.place + step * point.tangent, point.tangent)
         if ahead is None or self.norm(ahead.place - point.place) > 2.0 * step:
             return None
-        return ahead if self.norm(_seen_from(point, ahead).tangent - point.tangent) < STEPS.off else None
+        return (
+            ahead
+            if self.norm(_seen_from(point, ahead).tangent - point.tangent) < STEPS.off
+            else None
+        )
 
     def turn(self, a: OrbitPoint, b: OrbitPoint) -> float:
         """The angle between the tangents, without the part that such a corner makes."""
@@ -122,21 +130,27 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
         return OrbitCurve(equations, self.scales, self.symmetric)
 
     def known(self, unknowns: np.ndarray, values: np.ndarray) -> Corrected[OrbitEvaluation] | None:
-        """An orbit whose unknowns are known, with its equations evaluated there; None where its motion cannot be followed."""
+        """An orbit whose unknowns are known, with its equations evaluated there; None where its
+        motion cannot be followed.
+        """
         place = np.concatenate([unknowns, values])
         evaluation = self.evaluate(place, thorough=True)
         return None if evaluation is None else Corrected(place, evaluation, 0)
 
 
 def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
-    """The point b with the tangent that it would have if its orbit were, at phase 0, on the same side of the contact as a's.
+    """The point b with the tangent that it would have if its orbit were, at phase 0, on the same
+    side of the contact as a's.
 
-    Where an orbit passes the contact just at phase 0, its curve has a corner if the acceleration jumps there, as by a damper on
-    one side: the instant of the passage moves by -dx/v, and the velocity at phase 0 by that times the jump. The corner is in the
-    unknowns alone, not in the orbit.
+    Where an orbit passes the contact just at phase 0, its curve has a corner if the acceleration
+    jumps there, as by a damper on one side: the instant of the passage moves by -dx/v, and the
+    velocity at phase 0 by that times the jump. The corner is in the unknowns alone, not in the
+    orbit.
     """
     own = a.curve.equations.own
-    first, second = (point.evaluation.ends[0, SegmentValue.FIRST_STATE + 3 * own :] for point in (a, b))
+    first, second = (
+        point.evaluation.ends[0, SegmentValue.FIRST_STATE + 3 * own :] for point in (a, b)
+    )
     if own > 1 or second[1] == 0.0:
         return b
     tangent = b.tangent.copy()
@@ -148,7 +162,9 @@ def start(orbit: PeriodicOrbit, symmetric: bool, scale: float) -> OrbitPoint:
     """A known orbit as the first point of its curve, to be followed towards larger parameters."""
     curve = OrbitCurve(orbit.equations, (scale,), symmetric)
     solution = orbit.solution
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations)
+    found = Corrected(
+        np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations
+    )
     upwards = np.append(np.zeros(orbit.equations.size), scale)
     return curve.with_tangent(found, upwards) or curve.along_kernel(found)
 
@@ -169,25 +185,34 @@ def flip(point: OrbitPoint) -> float:
 
 @lru_cache(maxsize=4)
 def crossing(point: OrbitPoint) -> float:
-    """The determinant of the equations with the tangent below them: it changes its sign where two branches cross."""
-    return scaled_determinant(np.vstack([point.evaluation.derivatives(), point.tangent * point.curve.weights**2]))
+    """The determinant of the equations with the tangent below them: it changes its sign where two
+    branches cross.
+    """
+    return scaled_determinant(
+        np.vstack([point.evaluation.derivatives(), point.tangent * point.curve.weights**2])
+    )
 
 
 def scaled_determinant(matrix: np.ndarray) -> float:
-    """The determinant of the matrix with its rows scaled to length 1: the same sign, with rounding errors of one size."""
+    """The determinant of the matrix with its rows scaled to length 1: the same sign, with rounding
+    errors of one size.
+    """
     lengths = np.linalg.norm(matrix, axis=1)
     return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
 
 
 def torus(point: OrbitPoint) -> float:
-    """The product of (a b - 1) over all pairs (a, b) of multipliers: smooth, and 0 where a complex pair has the modulus 1.
+    """The product of (a b - 1) over all pairs (a, b) of multipliers: smooth, and 0 where a complex
+    pair has the modulus 1.
 
-    It is 0 at a real pair with a b = 1 as well, which is no special point; `BranchEvents.distinct` removes these zeros. A value
-    within rounding of 0 is given as 0, as all along a branch of a system without loss. At a grazing the multipliers jump, and its
-    sign may, so that it is nan there. For two multipliers a b comes from the determinants of the segments' maps: their product
+    It is 0 at a real pair with a b = 1 as well, which is no special point; `BranchEvents.distinct`
+    removes these zeros. A value within rounding of 0 is given as 0, as all along a branch of a
+    system without loss. At a grazing the multipliers jump, and its sign may, so that it is nan
+    there. For two multipliers a b comes from the determinants of the segments' maps: their product
     keeps its digits where one multiplier is large.
     """
-    values, evaluation = point.orbit.multipliers, point.evaluation
+    values = point.orbit.multipliers
+    evaluation = point.evaluation
     if point.orbit.grazes:
         return math.nan
     with np.errstate(all="ignore"):
@@ -195,10 +220,18 @@ def torus(point: OrbitPoint) -> float:
             half = float(np.prod(_areas(evaluation.here) / _areas(evaluation.there)))
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
-            values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0)
+            values = np.where(
+                np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0
+            )
             first, second = np.triu_indices(len(values), 1)
             product = float(np.prod(values[first] * values[second] - 1.0).real)
-    return 0.0 if abs(product) <= MULTIPLIER_ROUNDING else product if math.isfinite(product) else math.nan
+    return (
+        0.0
+        if abs(product) <= MULTIPLIER_ROUNDING
+        else product
+        if math.isfinite(product)
+        else math.nan
+    )
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
@@ -211,51 +244,70 @@ def _areas(maps: np.ndarray) -> np.ndarray:
 def complex_pairs(orbit: PeriodicOrbit) -> np.ndarray:
     """The moduli of the complex pairs of multipliers, (n,).
 
-    Closed contacts make multipliers 0, and rounding turns these into small complex pairs, which do not count.
+    Closed contacts make multipliers 0, and rounding turns these into small complex pairs, which do
+    not count.
     """
     values = orbit.multipliers
     return np.asarray(np.abs(values[(values.imag > 1e-9) & (np.abs(values) > VANISHING)]))
 
 
 def never_torus(orbit: PeriodicOrbit) -> bool:
-    """Whether the flow never enlarges areas of the state plane, so that no complex pair can leave the unit circle (errata 22)."""
+    """Whether the flow never enlarges areas of the state plane, so that no complex pair can leave
+    the unit circle (errata 22).
+    """
     return area_contraction(orbit.system) is not None
 
 
 def grazing(point: OrbitPoint) -> float:
-    """The least of the impacts' speeds, of the gap's minima between impacts, and of `pressing`: where it is negative the solution
-    of the equations is no motion.
+    """The least of the impacts' speeds, of the gap's minima between impacts, and of `pressing`:
+    where it is negative the solution of the equations is no motion.
 
-    Where the contact is no singularity, orbits exist on both sides of a grazing and a branch need not stop there: inf.
+    Where the contact is no singularity, orbits exist on both sides of a grazing and a branch need
+    not stop there: inf.
     """
     orbit = point.orbit
-    return math.inf if orbit.equations.passes_contact else min(orbit.slowest, orbit.clearance, orbit.pressing)
+    return (
+        math.inf
+        if orbit.equations.passes_contact
+        else min(orbit.slowest, orbit.clearance, orbit.pressing)
+    )
 
 
 def touching(point: OrbitPoint) -> float:
-    """How far an orbit is from touching a contact that is no singularity; the sign changes with each additional pair of passages
-    through the contact."""
-    orbit, extremes = point.orbit, point.evaluation.extremes
+    """How far an orbit is from touching a contact that is no singularity; the sign changes with
+    each additional pair of passages through the contact."""
+    orbit = point.orbit
+    extremes = point.evaluation.extremes
     pairs = int(extremes[:, SegmentColumn.CROSSINGS].sum()) // 2
     return float((-1) ** pairs * min(FARTHEST, orbit.clearance, orbit.shallowest))
 
 
-# Multipliers smaller than the largest one by this factor are rounding errors of 0: their products with it have no meaning. In a
-# system without loss rounding makes this difference of a product of multipliers from 1.
+# Multipliers smaller than the largest one by this factor are rounding errors of 0: their products
+# with it have no meaning. In a system without loss rounding makes this difference of a product of
+# multipliers from 1.
 MULTIPLIER_ROUNDING = 1e-12
-VANISHING = 1e-4  # a complex pair of smaller modulus is a double multiplier 0: rounding moves it by the root of its size
+# a complex pair of smaller modulus is a double multiplier 0: rounding moves it by the root of its
+# size
+VANISHING = 1e-4
 
 
 CHANGES = {"decisive": True, "guides": True}  # tests whose zeros are smooth changes of stability
-FLIP = {symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, **CHANGES) for symmetric in (True, False)}
-FOLD, CROSSING = Test(SpecialKind.LP, fold, **CHANGES), Test(SpecialKind.BPC, crossing, singular=True, **CHANGES)
+FLIP = {
+    symmetric: Test(SpecialKind.BPC if symmetric else SpecialKind.PD, flip, **CHANGES)
+    for symmetric in (True, False)
+}
+FOLD = Test(SpecialKind.LP, fold, **CHANGES)
+CROSSING = Test(SpecialKind.BPC, crossing, singular=True, **CHANGES)
 TORUS = Test(SpecialKind.NS, torus, decisive=True)
 TOUCHING = Test(SpecialKind.GR, touching)
-GRAZING = Test(SpecialKind.GR, grazing, 1e-15)  # narrower than others: beside a grazing an error grows to its square root
+# narrower than others: beside a grazing an error grows to its square root
+GRAZING = Test(SpecialKind.GR, grazing, 1e-15)
 
 
 def branch_tests(point: OrbitPoint, functions: dict[str, UserFunction]) -> Iterator[Test]:
-    """All test functions of a branch at a point, but that of grazings at a contact that is a singularity (`GRAZING`)."""
+    """All test functions of a branch at a point, but that of grazings at a contact that is a
+    singularity (`GRAZING`).
+    """
     yield from (FOLD, FLIP[point.orbit.symmetric], CROSSING, TORUS)
     if point.orbit.equations.passes_contact:
         yield TOUCHING

@@ -1,4 +1,6 @@
-"""A curve of special points in two parameters: its equations, its points, its ends, and its dataset."""
+"""A curve of special points in two parameters: its equations, its points, its ends, and its
+dataset.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,10 @@ class Conditioned:
 
 @dataclass(frozen=True, eq=False)
 class SpecialCurvePoint(OrbitPoint):
-    """A point of a curve of special points. On a curve of grazings, the orbit's signature has the impacts without speed."""
+    """A point of a curve of special points.
+
+    On a curve of grazings, the orbit's signature has the impacts without speed.
+    """
 
     condition_value: ConditionValue
 
@@ -57,24 +62,32 @@ class SpecialCurvePoint(OrbitPoint):
 
     @property
     def touching(self) -> list[int]:
-        """The impacts without speed of a grazing: a pair that coincides, or, at a wall, a single one."""
+        """The impacts without speed of a grazing: a pair that coincides, or, at a wall, a single
+        one.
+        """
         if not isinstance(self.condition, Slow):
             return []
-        i, sides = self.condition.index, self.orbit.signature.sides
+        i = self.condition.index
+        sides = self.orbit.signature.sides
         return [i] if self.orbit.signature.along()[i] == sides[i] else [i, (i + 1) % len(sides)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ConditionedCurve(OrbitCurve):
-    """The orbits at which a condition holds, along two parameters. At each point the vectors that border the condition are
-    renewed."""
+    """The orbits at which a condition holds, along two parameters. At each point the vectors that
+    border the condition are renewed."""
 
     condition: Condition
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Conditioned | None:
         """The orbit's equations and the condition."""
-        n, evaluation = self.equations.size, super().evaluate(place, thorough)
-        value = None if evaluation is None else self.condition.evaluate(Solution(place[:n], place[n:], evaluation, 0))
+        n = self.equations.size
+        evaluation = super().evaluate(place, thorough)
+        value = (
+            None
+            if evaluation is None
+            else self.condition.evaluate(Solution(place[:n], place[n:], evaluation, 0))
+        )
         return None if value is None else Conditioned(evaluation, value)
 
     def residual(self, place: np.ndarray) -> np.ndarray | None:
@@ -82,20 +95,28 @@ class ConditionedCurve(OrbitCurve):
         return None
 
     def solve(self, guess: np.ndarray, direction: np.ndarray) -> Any:
-        """The point near a guess in the hyperplane through it normal to a direction, which may be of any length."""
+        """The point near a guess in the hyperplane through it normal to a direction, which may be
+        of any length.
+        """
         return super().solve(guess, direction / self.norm(direction))
 
     def point_at(self, found: Corrected[Any], tangent: np.ndarray) -> SpecialCurvePoint:
         value = found.evaluation.condition_value
         curve = replace(self, condition=self.condition.moved(value))
-        return SpecialCurvePoint(curve, found.place, tangent, found.iterations, found.evaluation.evaluation, value)
+        return SpecialCurvePoint(
+            curve, found.place, tangent, found.iterations, found.evaluation.evaluation, value
+        )
 
     def joins(self, other: Any) -> bool:
-        """Whether two points lie on one curve: always, as the condition is the same whatever vectors border it."""
+        """Whether two points lie on one curve: always, as the condition is the same whatever
+        vectors border it.
+        """
         return True
 
     def along_condition(self, orbit: PeriodicOrbit) -> SpecialCurvePoint | None:
-        """The point of the curve near an orbit that nearly fulfils the condition; None if Newton's method does not find it."""
+        """The point of the curve near an orbit that nearly fulfils the condition; None if Newton's
+        method does not find it.
+        """
         known = self.known(orbit.solution.unknowns, orbit.solution.values)
         if known is None:
             return None
@@ -107,13 +128,18 @@ class ConditionedCurve(OrbitCurve):
 def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
     """A point as an orbit alone, on the surface of orbits along both parameters."""
     return OrbitPoint(
-        point.curve.with_equations(point.orbit.equations), point.place, point.tangent, point.iterations, point.evaluation
+        point.curve.with_equations(point.orbit.equations),
+        point.place,
+        point.tangent,
+        point.iterations,
+        point.evaluation,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
-    """A curve of special points in two parameters: its points in order, its codimension-two points, and why it ends.
+    """A curve of special points in two parameters: its points in order, its codimension-two points,
+    and why it ends.
 
     Attributes
     ----------
@@ -163,18 +189,21 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         """
         if path not in self.paths:
             raise ParameterError(
-                f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}", "path"
+                f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}",
+                "path",
             )
         return [point.orbit for point in self.solved_at(value, self.paths.index(path) - 2)]
 
     def to_xarray(self) -> xarray.Dataset:
         """The curve along `point`, its codimension-two points along `special`.
 
-        `parameter` is (point, path); the signature and the `unknowns` of each orbit are as in `Branch.to_xarray`.
+        `parameter` is (point, path); the signature and the `unknowns` of each orbit are as in
+        `Branch.to_xarray`.
         """
         import xarray
 
-        orbits, equations = self.orbits, self.orbits[0].equations
+        orbits = self.orbits
+        equations = self.orbits[0].equations
         model = equations.given.model
         name = model.coordinates[0]
         angle = {"units": model.unit_of(name), "long_name": f"max abs({name})"}
@@ -185,8 +214,14 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
             **multiplier_columns(orbits),
             **solution_columns(orbits),
             "special_kind": ("special", np.array([s.kind for s in self.special], dtype="U8")),
-            "special_parameter": (("special", "path"), np.array([s.parameters for s in self.special]).reshape(-1, 2)),
-            "special_bracket": (("special", "path"), np.array([s.evidence.brackets for s in self.special]).reshape(-1, 2)),
+            "special_parameter": (
+                ("special", "path"),
+                np.array([s.parameters for s in self.special]).reshape(-1, 2),
+            ),
+            "special_bracket": (
+                ("special", "path"),
+                np.array([s.evidence.brackets for s in self.special]).reshape(-1, 2),
+            ),
             "special_residual": ("special", np.array([s.evidence.residual for s in self.special])),
         }
         attributes: dict[str, Any] = {
@@ -199,8 +234,11 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         return xarray.Dataset(data, coords={"path": list(self.paths)}, attrs=known)
 
     def __repr__(self) -> str:
-        (low, bottom), (high, top) = self.parameters.min(axis=0), self.parameters.max(axis=0)
-        kinds = ", ".join(f"{s.kind} ({s.parameters[0]:.6g}, {s.parameters[1]:.6g})" for s in self.special)
+        (low, bottom) = self.parameters.min(axis=0)
+        (high, top) = self.parameters.max(axis=0)
+        kinds = ", ".join(
+            f"{s.kind} ({s.parameters[0]:.6g}, {s.parameters[1]:.6g})" for s in self.special
+        )
         return (
             f"SpecialCurve({self.kind}, {self.paths[0]} {low:.6g} to {high:.6g}, {self.paths[1]} {bottom:.6g} to {top:.6g}, "
             f"{len(self.points)} points, special: {kinds or 'none'}; ends: {self.ends[0]} | {self.ends[1]})"

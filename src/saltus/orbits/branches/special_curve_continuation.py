@@ -1,4 +1,6 @@
-"""Curves of special points in two parameters: borders at which the number of orbits, or the stability of orbits, changes."""
+"""Curves of special points in two parameters: borders at which the number of orbits, or the
+stability of orbits, changes.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,12 @@ from saltus.errors import ParameterError
 from saltus.orbits.branches.branch_continuation import STEP
 from saltus.orbits.branches.branch_events import OrbitEvents
 from saltus.orbits.branches.conditions import Condition, Singular, Slow, curve_tests
-from saltus.orbits.branches.special_curve import ConditionedCurve, SpecialCurve, SpecialCurvePoint, without_condition
+from saltus.orbits.branches.special_curve import (
+    ConditionedCurve,
+    SpecialCurve,
+    SpecialCurvePoint,
+    without_condition,
+)
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import divide, half, keeps_symmetry
 from saltus.orbits.equations.contract import OrbitEquations
@@ -25,7 +32,9 @@ from saltus.progress import Progress, silent
 from saltus.systems import check_path, check_system
 
 FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
-TENFOLD = 10.0  # a parameter without bounds is followed up to its value times this, and down to its value divided by this
+# a parameter without bounds is followed up to its value times this, and down to its value divided
+# by this
+TENFOLD = 10.0
 
 
 @dataclass
@@ -34,7 +43,9 @@ class CurveEvents(OrbitEvents):
 
     kind: str
 
-    def interrupted(self, run: Continuation, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> End | None:
+    def interrupted(
+        self, run: Continuation, point: SpecialCurvePoint, ahead: SpecialCurvePoint
+    ) -> End | None:
         """The end where the system refuses the parameters."""
         try:
             ahead.curve.equations.system_at(ahead.parameters)
@@ -43,17 +54,20 @@ class CurveEvents(OrbitEvents):
         return None
 
     def barrier(self, point: Any) -> TestFunction:
-        """Another grazing, or another change of the events of an orbit with several contacts or friction."""
+        """Another grazing, or another change of the events of an orbit with several contacts or
+        friction.
+        """
         barrier: TestFunction = point.orbit.equations.curve_barrier(self.kind, point)
         return barrier
 
     def cut(self, point: SpecialCurvePoint, ahead: SpecialCurvePoint) -> Cut | End | None:
-        """The cut where the orbit's events change, with the codimension-two point there; without a special point where only an
-        event comes to its section."""
+        """The cut where the orbit's events change, with the codimension-two point there; without a
+        special point where only an event comes to its section."""
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
             return found
-        zero, before = replace(found.special, point=without_condition(found.point)), without_condition(point)
+        zero = replace(found.special, point=without_condition(found.point))
+        before = without_condition(point)
         there = point.orbit.equations.change(zero, before)
         if isinstance(there, End):
             return there
@@ -64,11 +78,13 @@ class CurveEvents(OrbitEvents):
         return Cut(found.point, replace(found.special, kind=kind))
 
     def across(self, run: Continuation, cut: Cut) -> SpecialCurvePoint | End:
-        """The end at another change of events; or, where an event comes to the section, the same point at another section, from
-        which the curve goes on."""
+        """The end at another change of events; or, where an event comes to the section, the same
+        point at another section, from which the curve goes on."""
         if cut.special is None:
             return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
-        reason = OrbitEnd.MEETS_CHANGE if cut.special.kind.endswith("SW") else OrbitEnd.MEETS_GRAZING
+        reason = (
+            OrbitEnd.MEETS_CHANGE if cut.special.kind.endswith("SW") else OrbitEnd.MEETS_GRAZING
+        )
         return End(reason, cut.point.parameter, cut.special.kind)
 
     def ended(self, run: Continuation, ahead: Any, cut: Cut | None) -> End | None:
@@ -89,10 +105,12 @@ def continue_special(
     most_points: int = STEPS.most_points,
     progress: Progress = silent,
 ) -> SpecialCurve:
-    """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter and a second one.
+    """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter
+    and a second one.
 
-    It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing or cannot go on. At a PD or
-    BPC the curve has the orbits that lose their stability, not those that are born there.
+    It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing
+    or cannot go on. At a PD or BPC the curve has the orbits that lose their stability, not those
+    that are born there.
 
     Parameters
     ----------
@@ -101,22 +119,25 @@ def continue_special(
     path
         Dotted path of the second parameter, such as "load.horizontal.amplitude".
     bounds
-        Its least and largest value; by default from a tenth to ten times its present value (from -1 to 1 if that is 0).
+        Its least and largest value; by default from a tenth to ten times its present value (from -1
+        to 1 if that is 0).
     first_bounds
-        The bounds of the branch's own parameter; by default as far to both sides as the branch's range was wide, but not below a
-        tenth of its present value.
+        The bounds of the branch's own parameter; by default as far to both sides as the branch's
+        range was wide, but not below a tenth of its present value.
     step
         The longest step, in the norm of `OrbitCurve`.
     most_points
         The number of points in each direction after which the curve ends, with this as its reason.
     progress
-        Called with the share of the first range that has been seen and the values of both parameters.
+        Called with the share of the first range that has been seen and the values of both
+        parameters.
 
     Raises
     ------
     ParameterError
-        The special point is of another kind; the parameter is unknown, or the branch's own; the bounds exclude the point; or
-        the second parameter breaks the symmetry that a BPC, a PD or a grazing of a symmetric orbit needs.
+        The special point is of another kind; the parameter is unknown, or the branch's own; the
+        bounds exclude the point; or the second parameter breaks the symmetry that a BPC, a PD or a
+        grazing of a symmetric orbit needs.
 
     Examples
     --------
@@ -128,7 +149,9 @@ def continue_special(
     check_step(step)
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
-        raise ParameterError(f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special")
+        raise ParameterError(
+            f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special"
+        )
     if special.kind == SpecialKind.GR and special.orbit.equations.touched(special) is None:
         raise ParameterError(
             "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
@@ -141,11 +164,13 @@ def continue_special(
             "ends there, and no curve of such points is followed; choose an LP, PD or BPC",
             "special",
         )
-    first_path, system = special.orbit.equations.paths[0], special.orbit.system
+    first_path = special.orbit.equations.paths[0]
+    system = special.orbit.system
     check_system(system, "continue_special", several_contacts=True)
     if path == first_path:
         raise ParameterError(
-            f"the branch already runs along {path}; name another parameter to follow its {special.kind} in", "path"
+            f"the branch already runs along {path}; name another parameter to follow its {special.kind} in",
+            "path",
         )
     check_path(system, path)
     limits = _limits(special, system.parameters[path], bounds, first_bounds)
@@ -156,12 +181,20 @@ def continue_special(
     return SpecialCurve(**vars(course), kind=special.kind, paths=(first_path, path))
 
 
-def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any) -> list[tuple[float, float]]:
+def _limits(
+    special: SpecialPoint, value: float, bounds: Any, first_bounds: Any
+) -> list[tuple[float, float]]:
     """The bounds of both parameters, which must include the point."""
-    own, width = special.parameter, 3.0 * special.point.curve.scales[0]
-    low, high = own - width, own + width
+    own = special.parameter
+    width = 3.0 * special.point.curve.scales[0]
+    low = own - width
+    high = own + width
     if first_bounds is None:
-        first_bounds = (max(low, own / TENFOLD), high) if own > 0 else (low, min(high, own / TENFOLD) if own < 0 else high)
+        first_bounds = (
+            (max(low, own / TENFOLD), high)
+            if own > 0
+            else (low, min(high, own / TENFOLD) if own < 0 else high)
+        )
     if bounds is None:
         bounds = sorted((value / TENFOLD, value * TENFOLD)) if value else (-1.0, 1.0)
     limits = [check_bounds(first_bounds, "first_bounds"), check_bounds(bounds)]
@@ -173,7 +206,9 @@ def _limits(special: SpecialPoint, value: float, bounds: Any, first_bounds: Any)
     return limits
 
 
-def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[float, float]]) -> SpecialCurvePoint:
+def _start(
+    special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[float, float]]
+) -> SpecialCurvePoint:
     """The special point as a point of its curve."""
     orbit, condition = _defined(special, paths)
     scales = tuple((high - low) / 3.0 for low, high in limits)
@@ -188,14 +223,20 @@ def _start(special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[flo
 
 
 def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
-    """The same point with the section at a phase farther from all events, to be followed in the same direction as before."""
-    condition, equations = point.condition, point.orbit.equations
+    """The same point with the section at a phase farther from all events, to be followed in the
+    same direction as before.
+    """
+    condition = point.condition
+    equations = point.orbit.equations
     assert isinstance(condition, Singular)
     orbit = equations.at_another_section(point.orbit)
     if orbit is None:
         return None
-    curve = ConditionedCurve(orbit.equations, point.curve.scales, condition=Singular.near(orbit, condition.closing))
-    there, k = curve.along_condition(orbit), len(point.parameters)
+    curve = ConditionedCurve(
+        orbit.equations, point.curve.scales, condition=Singular.near(orbit, condition.closing)
+    )
+    there = curve.along_condition(orbit)
+    k = len(point.parameters)
     if there is None:
         return None
     ahead = float(there.tangent[-k:] @ (curve.weights[-k:] ** 2 * point.tangent[-k:])) > 0.0
@@ -204,9 +245,14 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
 
 
 def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
-    """The orbit as a solution of the problem along both parameters, and the condition of its special point."""
-    kind, old, unknowns = special.kind, special.orbit.equations, special.orbit.solution.unknowns
-    system, values = special.orbit.system, np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
+    """The orbit as a solution of the problem along both parameters, and the condition of its
+    special point.
+    """
+    kind = special.kind
+    old = special.orbit.equations
+    unknowns = special.orbit.solution.unknowns
+    system = special.orbit.system
+    values = np.array([special.parameter, special.orbit.system.parameters[paths[1]]])
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
     if old.signature.symmetric and not symmetric and kind != SpecialKind.LP:
         raise ParameterError(
@@ -233,21 +279,28 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
     elif kind == SpecialKind.BPC and not old.signature.symmetric:
         halved = half(orbit) if symmetric else None
         if halved is None:
-            raise ParameterError("this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve")
+            raise ParameterError(
+                "this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve"
+            )
         orbit = halved
     return orbit, Singular.near(orbit, 1.0 if kind == SpecialKind.LP else -1.0)
 
 
-def _evaluated(equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray) -> PeriodicOrbit:
+def _evaluated(
+    equations: OrbitEquations, unknowns: np.ndarray, values: np.ndarray
+) -> PeriodicOrbit:
     orbit = PeriodicOrbit.known(equations, unknowns, values)
     if orbit is None:
-        raise ParameterError("the motion of the special point cannot be followed; locate it again on its branch")
+        raise ParameterError(
+            "the motion of the special point cannot be followed; locate it again on its branch"
+        )
     return orbit
 
 
 def _first_without_speed(equations: OrbitEquations, unknowns: np.ndarray) -> int:
     """The number of the impact without speed; of a pair, the first one."""
-    phases, speeds = unknowns[::2], unknowns[1::2]
+    phases = unknowns[::2]
+    speeds = unknowns[1::2]
     slow = int(np.argmin(np.abs(speeds)))
     before = phases[slow] - phases[slow - 1] + (equations.closing if slow == 0 else 0.0)
     is_second = len(speeds) > 1 and max(abs(before), abs(speeds[slow - 1])) < TOLERANCES.pair

@@ -1,4 +1,6 @@
-"""Special points: of branches, where the number or stability of orbits changes, and of curves of such points (codimension 2)."""
+"""Special points: of branches, where the number or stability of orbits changes, and of curves of
+such points (codimension 2).
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,11 @@ UserFunction = Callable[[PeriodicOrbit], float]
 
 
 class SpecialKind(StrEnum):
-    """The kinds of special points. The zero of a model's margin or of a user's function has the name of this function as its
-    kind.
+    """The kinds of special points. The zero of a model's margin or of a user's function has the
+    name of this function as its kind.
 
-    Points of codimension 1 lie on branches, points of codimension 2 on curves of special points in two parameters.
+    Points of codimension 1 lie on branches, points of codimension 2 on curves of special points in
+    two parameters.
 
     Examples
     --------
@@ -33,35 +36,69 @@ class SpecialKind(StrEnum):
     BPC = "BPC", "branch point: symmetry breaking, or a crossing of branches"
     NS = "NS", "Neimark-Sacker"
     GR = "GR", "grazing"
-    RL = "RL", "a release at which the load just reaches what holds the contact closed: the excursion after it shrinks to rest"
-    CH = "CH", "the impacts die away just at the instant of the next release: the rest between them has no duration"
+    RL = (
+        "RL",
+        "a release at which the load just reaches what holds the contact closed: the excursion after it shrinks to rest",
+    )
+    CH = (
+        "CH",
+        "the impacts die away just at the instant of the next release: the rest between them has no duration",
+    )
     SW = "SW", "switching: a contact's release, or its closing, appears or is lost"
-    GS = "GS", "grazing-sliding: the sliding velocity touches 0; beyond, the mass sticks for a while"
-    CS = "CS", "crossing-sliding: at a reversal of the sliding direction a phase of sticking appears or is lost"
-    SS = "SS", "switching-sliding: before a phase of sticking a reversal of the sliding direction appears or is lost"
+    GS = (
+        "GS",
+        "grazing-sliding: the sliding velocity touches 0; beyond, the mass sticks for a while",
+    )
+    CS = (
+        "CS",
+        "crossing-sliding: at a reversal of the sliding direction a phase of sticking appears or is lost",
+    )
+    SS = (
+        "SS",
+        "switching-sliding: before a phase of sticking a reversal of the sliding direction appears or is lost",
+    )
     AS = "AS", "adding-sliding: within a phase of sticking a phase of sliding appears or is lost"
     CP = "CP", "cusp: two folds meet", 2
-    GPD = "GPD", "degenerate period doubling: the doubled orbit changes the side on which it lies", 2
-    DBPC = "DBPC", "degenerate symmetry breaking: the unsymmetric orbits change the side on which they lie", 2
+    GPD = (
+        "GPD",
+        "degenerate period doubling: the doubled orbit changes the side on which it lies",
+        2,
+    )
+    DBPC = (
+        "DBPC",
+        "degenerate symmetry breaking: the unsymmetric orbits change the side on which they lie",
+        2,
+    )
     LP_GR = "LP-GR", "fold and grazing at once", 2
     PD_GR = "PD-GR", "period doubling and grazing at once", 2
     BPC_GR = "BPC-GR", "symmetry breaking and grazing at once", 2
-    LP_PD_GR = "LP-PD-GR", "a grazing at which folds and period doublings of the orbits with more impacts both end", 2
+    LP_PD_GR = (
+        "LP-PD-GR",
+        "a grazing at which folds and period doublings of the orbits with more impacts both end",
+        2,
+    )
     LP_BPC_GR = "LP-BPC-GR", "the same, with symmetry breakings of symmetric orbits", 2
     GR_GR = "GR-GR", "two grazings at once", 2
-    LP_SW = "LP-SW", "fold where the events of the orbit change, as a contact's release appears or is lost", 2
+    LP_SW = (
+        "LP-SW",
+        "fold where the events of the orbit change, as a contact's release appears or is lost",
+        2,
+    )
     PD_SW = "PD-SW", "period doubling where they change", 2
     BPC_SW = "BPC-SW", "symmetry breaking where they change", 2
 
     def __new__(cls, code: str, description: str, codimension: int = 1) -> SpecialKind:
         """A kind is equal to its code, a string."""
         kind = str.__new__(cls, code)
-        kind._value_, kind.description, kind.codimension = code, description, codimension
+        kind._value_ = code
+        kind.description = description
+        kind.codimension = codimension
         return kind
 
 
 class OrbitEnd(EndReason):
-    """The reasons why branches of orbits and curves of special points end, in addition to those of any curve (`CurveEnd`).
+    """The reasons why branches of orbits and curves of special points end, in addition to those of
+    any curve (`CurveEnd`).
 
     Examples
     --------
@@ -85,15 +122,13 @@ class OrbitEnd(EndReason):
     MANY_IMPACTS = "more than {detail} impacts a period"
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
-    TWO_AT_ONCE = (
-        "several contacts act at one instant, or impacts at a contact begin to die away: motions beside it have other equations"
+    TWO_AT_ONCE = "several contacts act at one instant, or impacts at a contact begin to die away: motions beside it have other equations"
+    NOT_UNIQUE = (
+        "an impact loses its speed while both sides push outward: the motion is not unique there"
     )
-    NOT_UNIQUE = "an impact loses its speed while both sides push outward: the motion is not unique there"
     GRAZES_INTO_REST = "the orbit shrinks to rest"
     NO_OTHER_EVENTS = "at {parameter:.10g} the events of the motion change, and no orbits with other events continue the branch"
-    NOT_CONTINUOUS = (
-        "at {parameter:.10g} an event appears or is lost at which the motion is not continuous: neighbours end up {detail} apart"
-    )
+    NOT_CONTINUOUS = "at {parameter:.10g} an event appears or is lost at which the motion is not continuous: neighbours end up {detail} apart"
     TURNS = (
         "at {parameter:.10g} the sliding in a contact stops just at an impact: beyond, it turns round before this impact, where "
         "impacts die away before ever earlier ones, and the multipliers jump at each of them"
@@ -117,7 +152,9 @@ class OrbitEnd(EndReason):
 
 
 class OrbitMissed(MissedReason):
-    """What may go wrong along a branch of orbits, in addition to what may be missed along any curve (`CurveMissed`)."""
+    """What may go wrong along a branch of orbits, in addition to what may be missed along any curve
+    (`CurveMissed`).
+    """
 
     IMPOSSIBLE_PAIR = (
         "{kind} near {first}: a complex pair of multipliers has the modulus {detail}, although areas of states never grow "
@@ -181,6 +218,9 @@ class SpecialPoints(RowTable, tuple[SpecialPoint, ...]):
         count = max((len(point.parameters) for point in self), default=1)
         names = ["parameter"] if count == 1 else [f"parameter_{i}" for i in range(count)]
         columns |= {name: [point.parameters[i] for point in self] for i, name in enumerate(names)}
-        columns |= {"amplitude": [point.amplitude for point in self], "period": [point.orbit.period for point in self]}
+        columns |= {
+            "amplitude": [point.amplitude for point in self],
+            "period": [point.orbit.period for point in self],
+        }
         columns |= {"impacts": [point.orbit.impact_count for point in self]}
         return columns | {"bracket": [point.evidence.bracket for point in self]}

@@ -1,7 +1,9 @@
-"""The mirror symmetry of a forced system: the mirror image of every motion, half a forcing period later, is a motion too.
+"""The mirror symmetry of a forced system: the mirror image of every motion, half a forcing period
+later, is a motion too.
 
-The image of an orbit is the same orbit half a period later and, if its period q is odd, mirrored. An orbit that is its own image
-is symmetric (q odd), or a shorter one that is gone round twice (q even).
+The image of an orbit is the same orbit half a period later and, if its period q is odd, mirrored.
+An orbit that is its own image is symmetric (q odd), or a shorter one that is gone round twice (q
+even).
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ from saltus.systems import Constant, Harmonic, Load, Signal, System, check_syste
 
 @answered
 def is_symmetric(system: System) -> bool:
-    """Whether the mirror image of every motion, half a forcing period later, is a motion too: -theta(t + T/2) for theta(t).
+    """Whether the mirror image of every motion, half a forcing period later, is a motion too:
+    -theta(t + T/2) for theta(t).
 
-    It is if the model has a mirror symmetry and the mirrored load is the load half a period later (errata 18).
+    It is if the model has a mirror symmetry and the mirrored load is the load half a period later
+    (errata 18).
 
     Parameters
     ----------
@@ -39,12 +43,17 @@ def is_symmetric(system: System) -> bool:
     mirrored = system.mirrored()
     if mirrored is None or system.load.period is None:
         return False
-    return all(_half_a_period_later(mirrored.load, system.load, name) for name in system.load.channels)
+    return all(
+        _half_a_period_later(mirrored.load, system.load, name) for name in system.load.channels
+    )
 
 
 def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
-    """Whether a channel of one load is that of the other half a period later, up to a constant position of the ground."""
-    first, second = _harmonics(one.channels[name]), _harmonics(other.channels[name])
+    """Whether a channel of one load is that of the other half a period later, up to a constant
+    position of the ground.
+    """
+    first = _harmonics(one.channels[name])
+    second = _harmonics(other.channels[name])
     if first is None or second is None:
         return False
     orders = {*first, *second} - ({0} if name.startswith("ground") else set())
@@ -53,7 +62,9 @@ def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
 
 
 def _harmonics(signal: Signal) -> dict[int, complex] | None:
-    """The complex amplitudes of a signal, by the order of the harmonic; None for signals that are not harmonic."""
+    """The complex amplitudes of a signal, by the order of the harmonic; None for signals that are
+    not harmonic.
+    """
     if isinstance(signal, Constant):
         return {0: signal.value}
     if isinstance(signal, Harmonic):
@@ -83,30 +94,36 @@ def keeps_symmetry(system: System, path: str) -> bool:
     return False
 
 
-NEAR_THE_END = (0.99, 0.95, 0.9)  # Shares of the last step: at the end itself the equations are singular.
+# Shares of the last step: at the end itself the equations are singular.
+NEAR_THE_END = (0.99, 0.95, 0.9)
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
     """The difference of an orbit's image from the orbit itself.
 
-    None where the signature rules out that the orbit is its own image, or its equations imply it (a symmetric signature).
+    None where the signature rules out that the orbit is its own image, or its equations imply it (a
+    symmetric signature).
     """
     return None if point.halves is None else np.asarray(point.halves[1] - point.halves[0])
 
 
 def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
-    """The parent's orbit at which a family ends, as a solution of the family's own equations, in which both its halves are alike.
+    """The parent's orbit at which a family ends, as a solution of the family's own equations, in
+    which both its halves are alike.
 
-    There the family turns back along its images: the tangent leads from the family's `point` beside it to that point's image.
+    There the family turns back along its images: the tangent leads from the family's `point` beside
+    it to that point's image.
 
     Returns
     -------
     OrbitPoint | None
         The last point of the family's branch; None where the motion cannot be followed.
     """
-    difference, equations = asymmetry(point), parent.orbit.equations
+    difference = asymmetry(point)
+    equations = parent.orbit.equations
     assert difference is not None
-    unknowns, tangent = equations.repeated(parent.solution.unknowns), equations.alternating(difference)
+    unknowns = equations.repeated(parent.solution.unknowns)
+    tangent = equations.alternating(difference)
     found = point.curve.known(unknowns, parent.solution.values)
     if found is None:
         return None
@@ -116,10 +133,14 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
 
 
 def beside_image(point: OrbitPoint, last: OrbitPoint) -> OrbitPoint | None:
-    """A point of a family between `point` and its end `last`, as near to the end as the equations can be solved."""
+    """A point of a family between `point` and its end `last`, as near to the end as the equations
+    can be solved.
+    """
     chord = last.place - point.place
     for share in NEAR_THE_END:
-        beside: OrbitPoint | None = point.curve.solve(between(point, last, share), chord / point.curve.norm(chord))
+        beside: OrbitPoint | None = point.curve.solve(
+            between(point, last, share), chord / point.curve.norm(chord)
+        )
         if beside is not None and not falls_onto_image(point, beside):
             return beside
     return None
@@ -127,15 +148,26 @@ def beside_image(point: OrbitPoint, last: OrbitPoint) -> OrbitPoint | None:
 
 def passes_image(a: OrbitPoint, b: OrbitPoint) -> bool:
     """Whether a step goes through an orbit that is its own image."""
-    before, after = asymmetry(a), asymmetry(b)
-    return before is not None and after is not None and bool(before @ after < 0.0) and np.abs(before).max() > TOLERANCES.image
+    before = asymmetry(a)
+    after = asymmetry(b)
+    return (
+        before is not None
+        and after is not None
+        and bool(before @ after < 0.0)
+        and np.abs(before).max() > TOLERANCES.image
+    )
 
 
 def falls_onto_image(a: OrbitPoint, b: OrbitPoint) -> bool:
-    """Whether a step has jumped from an orbit that is not its own image onto the branch of orbits that are."""
-    before, after = asymmetry(a), asymmetry(b)
+    """Whether a step has jumped from an orbit that is not its own image onto the branch of orbits
+    that are.
+    """
+    before = asymmetry(a)
+    after = asymmetry(b)
     return (
-        before is not None and after is not None and bool(np.abs(before).max() > TOLERANCES.image > 100.0 * np.abs(after).max())
+        before is not None
+        and after is not None
+        and bool(np.abs(before).max() > TOLERANCES.image > 100.0 * np.abs(after).max())
     )
 
 
@@ -146,35 +178,49 @@ def is_image(point: OrbitPoint, within: float = 1e-2 * TOLERANCES.image) -> bool
 
 
 def parent_of(point: OrbitPoint, within: float = TOLERANCES.grazing_orbits) -> OrbitPoint | None:
-    """The orbit of the parent, over half of the period, of an orbit that is its own image up to `within`; None for other
-    orbits."""
+    """The orbit of the parent, over half of the period, of an orbit that is its own image up to
+    `within`; None for other orbits."""
     if not is_image(point, within):
         return None
     equations = point.curve.equations.halved
     curve = point.curve.with_equations(equations)
-    parent: OrbitPoint | None = curve.solve_at(point.place, np.append(np.zeros(equations.size), 1.0))
+    parent: OrbitPoint | None = curve.solve_at(
+        point.place, np.append(np.zeros(equations.size), 1.0)
+    )
     return parent
 
 
 def repetition(point: OrbitPoint) -> str | None:
-    """Which other orbit an orbit repeats, in words: a symmetric one, or one of a shorter period; None if it repeats none."""
+    """Which other orbit an orbit repeats, in words: a symmetric one, or one of a shorter period;
+    None if it repeats none.
+    """
     difference = asymmetry(point)
-    if point.orbit.period % 2 and difference is not None and np.abs(difference).max() < TOLERANCES.grazing_orbits:
+    if (
+        point.orbit.period % 2
+        and difference is not None
+        and np.abs(difference).max() < TOLERANCES.grazing_orbits
+    ):
         return "symmetric orbit"
     periods = point.orbit.equations.shorter_period(point.solution, TOLERANCES.grazing_orbits)
     return None if periods is None else f"orbit of period {periods}"
 
 
 def nearest(point: OrbitPoint, place: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
-    """A place on the curve of `point`, in the unknowns nearest to those of `other`; None if they cannot be compared so."""
-    equations, n = point.curve.equations, point.curve.equations.size
+    """A place on the curve of `point`, in the unknowns nearest to those of `other`; None if they
+    cannot be compared so.
+    """
+    equations = point.curve.equations
+    n = point.curve.equations.size
     unknowns = equations.nearest(place[:n], place[n:], other)
     return None if unknowns is None else np.concatenate([unknowns, place[n:]])
 
 
 def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that is its own mirror image, as a solution of the equations over half its period; None for other orbits."""
-    equations, solution = orbit.equations, orbit.solution
+    """An orbit that is its own mirror image, as a solution of the equations over half its period;
+    None for other orbits.
+    """
+    equations = orbit.equations
+    solution = orbit.solution
     both = equations.halves(solution, mirrored=True) if orbit.period % 2 else None
     if both is None or np.abs(both[1] - both[0]).max() > TOLERANCES.halves:
         return None
@@ -186,7 +232,9 @@ def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
 
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-    """An orbit that repeats after a divisor of its period, as an orbit of this shorter period; None for other orbits."""
+    """An orbit that repeats after a divisor of its period, as an orbit of this shorter period; None
+    for other orbits.
+    """
     unknowns = orbit.solution.unknowns
     for q in range(1, orbit.period):
         short = orbit.signature.part(q)
@@ -194,7 +242,10 @@ def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
             continue
         shorter = orbit.equations.with_signature(short)
         found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
-        if found is not None and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves:
+        if (
+            found is not None
+            and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves
+        ):
             return found
     return None
 
@@ -213,13 +264,20 @@ def full_point(point: OrbitPoint) -> OrbitPoint:
 
 
 def half_point(point: OrbitPoint) -> OrbitPoint:
-    """A point on the curve of the equations over half its period, if its orbit and the system are symmetric; else the point."""
+    """A point on the curve of the equations over half its period, if its orbit and the system are
+    symmetric; else the point.
+    """
     orbit = half(point.orbit) if point.curve.symmetric else None
     if orbit is None:
         return point
-    curve, solution = point.curve.with_equations(orbit.equations), orbit.solution
-    found = Corrected(np.append(solution.unknowns, solution.values), solution.evaluation, point.iterations)
-    tangent = np.append(point.tangent[: orbit.equations.size], point.tangent[point.orbit.equations.size :])
+    curve = point.curve.with_equations(orbit.equations)
+    solution = orbit.solution
+    found = Corrected(
+        np.append(solution.unknowns, solution.values), solution.evaluation, point.iterations
+    )
+    tangent = np.append(
+        point.tangent[: orbit.equations.size], point.tangent[point.orbit.equations.size :]
+    )
     there: OrbitPoint = curve.point_at(found, tangent / curve.norm(tangent))
     return there
 
@@ -227,6 +285,8 @@ def half_point(point: OrbitPoint) -> OrbitPoint:
 def full_period(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """A symmetric orbit as a solution of the equations over its full period."""
     # Newton's method is not used: where the symmetry breaks these equations are singular.
-    found = PeriodicOrbit.known(*orbit.equations.over_full_period(orbit.solution.unknowns), orbit.solution.values)
+    found = PeriodicOrbit.known(
+        *orbit.equations.over_full_period(orbit.solution.unknowns), orbit.solution.values
+    )
     assert found is not None, "a symmetric orbit can be followed over its full period"
     return found

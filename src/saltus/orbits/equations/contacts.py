@@ -1,11 +1,12 @@
 """The boundary-value problem of a periodic orbit with several contacts, and its derivatives.
 
-Its events are impacts of single contacts and releases. The unknowns are the state just after the first event, without the
-coordinates that contacts then hold, and the phase of every event. The equations say that each event's guard (the gap of an
-impact, the reaction of a release) is 0 at its phase, and that the state after the first event of the next period is the one of
-the start. Between events the signature says which contacts are closed, whatever the signs of gaps and reactions. An orbit without
-events has the free coordinates and velocities at phase 0 as its unknowns. A symmetric orbit is closed after half a period by its
-mirror image.
+Its events are impacts of single contacts and releases. The unknowns are the state just after the
+first event, without the coordinates that contacts then hold, and the phase of every event. The
+equations say that each event's guard (the gap of an impact, the reaction of a release) is 0 at its
+phase, and that the state after the first event of the next period is the one of the start. Between
+events the signature says which contacts are closed, whatever the signs of gaps and reactions. An
+orbit without events has the free coordinates and velocities at phase 0 as its unknowns. A symmetric
+orbit is closed after half a period by its mirror image.
 """
 
 from __future__ import annotations
@@ -27,7 +28,12 @@ from saltus.flow import (
     SegmentExtremes,
     SegmentPlan,
 )
-from saltus.orbits.branches.beyond_switching import AFTER_RELEASE, bounces, contact_change, other_events_side
+from saltus.orbits.branches.beyond_switching import (
+    AFTER_RELEASE,
+    bounces,
+    contact_change,
+    other_events_side,
+)
 from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, grazing
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.branches.symmetry import full_point
@@ -37,32 +43,45 @@ from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System, arguments_of, held_values, image_of, mass_rows
 from saltus.taylor import FREQUENCY
 
-AFTER_IMPACT = 2  # power of the time with which the gap grows after an impact with e = 0; after a release it is `AFTER_RELEASE`
-START_SHARE = 0.4  # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a contact
+# power of the time with which the gap grows after an impact with e = 0; after a release it is
+# `AFTER_RELEASE`
+AFTER_IMPACT = 2
+# where in a segment a motion is started; not in its middle, where symmetric orbits may touch a
+# contact
+START_SHARE = 0.4
 
 
 @dataclass(frozen=True)
 class ContactsEvaluation(OrbitEvaluation):
-    """The equations at one point; their derivatives are `here`, to the unknowns, and `there`, to the unknowns a period later."""
+    """The equations at one point; their derivatives are `here`, to the unknowns, and `there`, to
+    the unknowns a period later.
+    """
 
-    seen: np.ndarray  # (n, ...): the extremes along each segment, in the columns of `SegmentExtremes`; empty if not asked for
+    # (n, ...): the extremes along each segment, in the columns of `SegmentExtremes`; empty if not
+    # asked for
+    seen: np.ndarray
     state_count: int  # how many of the unknowns are the state; the others are phases
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
         matrix[:, : len(matrix)] = self.here + closing * self.there
 
     def monodromy(self) -> np.ndarray:
-        """The derivative of the map of the first event's phase, and the state after it, over a period; inf at a grazing."""
+        """The derivative of the map of the first event's phase, and the state after it, over a
+        period; inf at a grazing.
+        """
         count = self.state_count
         state = [*range(count + 1)] if self.here.shape[0] > count else [*range(count)]
         later = [*range(count + 1, self.here.shape[0])]
-        rows = [*range(len(later), self.here.shape[0])]  # the first rows are the guards of the later events
+        # the first rows are the guards of the later events
+        rows = [*range(len(later), self.here.shape[0])]
         with np.errstate(all="ignore"):
             try:
                 chain = self.here[np.ix_(rows, state)]
                 if later:
                     inner = self.here[: len(later)]
-                    chain = chain - self.here[np.ix_(rows, later)] @ np.linalg.solve(inner[:, later], inner[:, state])
+                    chain = chain - self.here[np.ix_(rows, later)] @ np.linalg.solve(
+                        inner[:, later], inner[:, state]
+                    )
                 return np.asarray(-np.linalg.solve(self.there[np.ix_(rows, state)], chain))
             except np.linalg.LinAlgError:
                 return np.full((len(state), len(state)), np.inf)
@@ -76,15 +95,25 @@ class ContactsEquations(OrbitEquations):
         return signature.section is None and system.model.holds_coordinates
 
     @classmethod
-    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
-        """None with frictions, dependent sums or accumulations of impacts, or with walls that move the mass matrix, for which
-        there are no equations from event to event."""
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
+        """None with frictions, dependent sums or accumulations of impacts, or with walls that move
+        the mass matrix, for which there are no equations from event to event."""
         known: Any = base.system.contact_model if isinstance(base, cls) else None
-        if known is None or known.frictions or known.surfaces or base.system.dependent or _has_moving_mass(known):
+        if (
+            known is None
+            or known.frictions
+            or known.surfaces
+            or base.system.dependent
+            or _has_moving_mass(known)
+        ):
             return None
         if motion.twice.limit is not None or len(motion.twice.events.of(EventKind.HELD)):
             return None
-        signature, first, phases = read_signature(motion.twice, motion.periods, base.frequency(base.values))
+        signature, first, phases = read_signature(
+            motion.twice, motion.periods, base.frequency(base.values)
+        )
         found = cls(base.given, signature, base.paths, base.tol)
         if not found.size:
             raise MotionError(STAYS)
@@ -92,20 +121,32 @@ class ContactsEquations(OrbitEquations):
 
     @cached_property
     def plan(self) -> np.ndarray:
-        """The segments (see `SegmentPlan`): from each event to the next one, the last event's to the first of the next period."""
+        """The segments (see `SegmentPlan`): from each event to the next one, the last event's to
+        the first of the next period.
+        """
         events = self.signature.events
         if not events:
             return no_event(self.signature.closed)
-        following = (*events[1:], events[0].image(self.images) if self.signature.symmetric else events[0])
+        following = (
+            *events[1:],
+            events[0].image(self.images) if self.signature.symmetric else events[0],
+        )
         rows = [
-            [e.closed, f.kind, f.contact, f.closed, self._power(e, f), e.contact if e.is_impact else -1]
+            [
+                e.closed,
+                f.kind,
+                f.contact,
+                f.closed,
+                self._power(e, f),
+                e.contact if e.is_impact else -1,
+            ]
             for e, f in zip(events, following, strict=True)
         ]
         return np.array(rows, dtype=np.int64)
 
     def _power(self, begin: ModeChange, end: ModeChange) -> int:
-        """The power of the time with which a contact opens, of a segment that begins with an event of this contact without speed
-        afterwards and ends with an impact on it; else 0."""
+        """The power of the time with which a contact opens, of a segment that begins with an event
+        of this contact without speed afterwards and ends with an impact on it; else 0."""
         if begin.contact != end.contact or not end.is_impact:
             return 0
         if not begin.is_impact:
@@ -133,13 +174,17 @@ class ContactsEquations(OrbitEquations):
         return np.zeros(0, dtype=int)  # they are no unknowns
 
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The state at the start, with 0 for coordinates and velocities that are held, and the phases of the events."""
+        """The state at the start, with 0 for coordinates and velocities that are held, and the
+        phases of the events.
+        """
         state = np.zeros(2 * self.own)
         state[self._free] = unknowns[: len(self._free)]
         return state, unknowns[len(self._free) :]
 
     def joined(self, state: np.ndarray, phases: np.ndarray) -> np.ndarray:
-        """The unknowns made of a state (just after the first event, or at phase 0) and the events' phases."""
+        """The unknowns made of a state (just after the first event, or at phase 0) and the events'
+        phases.
+        """
         return np.append(state[self._free], phases)
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
@@ -154,20 +199,35 @@ class ContactsEquations(OrbitEquations):
         return self.split(solution.unknowns)[1][chosen], speeds[chosen]
 
     def touching_speed(self, solution: Solution) -> float:
-        rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (self.plan[:, SegmentPlan.POWER] == 0)
+        rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (
+            self.plan[:, SegmentPlan.POWER] == 0
+        )
         return float((-solution.evaluation.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
 
     def pressing(self, solution: Solution) -> float:
-        """The least of the reactions of closed contacts, the times between events, and the gaps of other contacts at impacts."""
+        """The least of the reactions of closed contacts, the times between events, and the gaps of
+        other contacts at impacts.
+        """
         phases = self.split(solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL, SegmentExtremes.BESIDE]
+        columns = [
+            SegmentExtremes.FORCE,
+            SegmentExtremes.PULL,
+            SegmentExtremes.TAIL,
+            SegmentExtremes.BESIDE,
+        ]
         evaluation: Any = solution.evaluation
         return float(min(evaluation.seen[:, columns].min(), apart.min(initial=math.inf)))
 
-    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    def nearest(
+        self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
+    ) -> np.ndarray | None:
         """Unchanged: events are not renumbered."""
-        return unknowns if not self.signature.events and self.signature == other.orbit.signature else None
+        return (
+            unknowns
+            if not self.signature.events and self.signature == other.orbit.signature
+            else None
+        )
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
         return GRAZING
@@ -179,7 +239,9 @@ class ContactsEquations(OrbitEquations):
     def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
         return other_events_side(cut.point)
 
-    def stalled(self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds) -> Cut | End | None:
+    def stalled(
+        self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds
+    ) -> Cut | End | None:
         limit = point.orbit.motion().limit
         return None if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
 
@@ -187,25 +249,48 @@ class ContactsEquations(OrbitEquations):
         return curve_test(SpecialKind[f"{kind}_GR"], grazing)
 
     def evaluate(
-        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+        self,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool = False,
+        *,
+        later: np.ndarray | None = None,
     ) -> ContactsEvaluation | None:
         frequency, later = self.frequency(values), unknowns if later is None else later
-        if not (frequency > 0.0 and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))):
+        if not (
+            frequency > 0.0
+            and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))
+        ):
             return None
         state, phases = self.split(unknowns)
         end, last = self.split(later)
-        times = (np.append(phases, last[0] + self.closing) if phases.size else np.array([0.0, self.closing])) / frequency
+        times = (
+            np.append(phases, last[0] + self.closing)
+            if phases.size
+            else np.array([0.0, self.closing])
+        ) / frequency
         followed = self._followed(self.plan, times, state, values, with_extremes)
         return None if followed is None else self._assembled(end, times, frequency, *followed)
 
-    def carried_along(self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-        """The state at the second of two times, of the smooth motion from a state at the first, with these contacts closed."""
+    def carried_along(
+        self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray
+    ) -> np.ndarray | None:
+        """The state at the second of two times, of the smooth motion from a state at the first,
+        with these contacts closed.
+        """
         followed = self._followed(no_event(closed), times, state, values, False)
         begin = SegmentEnd.NUMBERS + 4 * self.own
-        return None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
+        return (
+            None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
+        )
 
     def _followed(
-        self, plan: np.ndarray, times: np.ndarray, state: np.ndarray, values: np.ndarray, with_extremes: bool
+        self,
+        plan: np.ndarray,
+        times: np.ndarray,
+        state: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
         """The arrays that `follow_contact_segments` fills; None where a segment cannot be followed."""
         parameters = self._values.copy()
@@ -223,24 +308,34 @@ class ContactsEquations(OrbitEquations):
         maps: np.ndarray,
         seen: np.ndarray,
     ) -> ContactsEvaluation:
-        """The residual and its derivatives, by the chain rule from segment to segment; `end` is the state asked for at the end.
+        """The residual and its derivatives, by the chain rule from segment to segment; `end` is the
+        state asked for at the end.
 
-        Columns are the state at the start, the phases, the phase of the first event a period later, and the parameters.
+        Columns are the state at the start, the phases, the phase of the first event a period later,
+        and the parameters.
         """
-        own, free, events = self.own, self._free, len(self.signature.events)
-        first, count = len(free), len(self.paths)
-        end_phase, parameters = first + events, first + events + 1
+        own = self.own
+        free = self._free
+        events = len(self.signature.events)
+        first = len(free)
+        count = len(self.paths)
+        end_phase = first + events
+        parameters = first + events + 1
         slope = np.zeros((2 * own, parameters + count))
         slope[free, np.arange(first)] = 1.0
-        guards, rows = np.zeros(events), np.zeros((events, slope.shape[1]))
+        guards = np.zeros(events)
+        rows = np.zeros((events, slope.shape[1]))
         place = parameters + self.paths.index(FREQUENCY) if FREQUENCY in self.paths else None
-        moved, rates = np.empty(2 * own + 1), np.empty(2 * own + 1)
+        moved = np.empty(2 * own + 1)
+        rates = np.empty(2 * own + 1)
         for s in range(len(ends)):
             before = columns[s, :, : 2 * own] @ slope
             before[:, parameters:] += columns[s, :, 2 * own :]
             numbers = ends[s, SegmentEnd.NUMBERS :]
-            moved[:-1], moved[-1] = -columns[s, :-1, : 2 * own] @ numbers[2 * own : 4 * own], ends[s, SegmentEnd.BY_START]
-            rates[:-1], rates[-1] = numbers[6 * own : 8 * own], ends[s, SegmentEnd.BY_END]
+            moved[:-1] = -columns[s, :-1, : 2 * own] @ numbers[2 * own : 4 * own]
+            moved[-1] = ends[s, SegmentEnd.BY_START]
+            rates[:-1] = numbers[6 * own : 8 * own]
+            rates[-1] = ends[s, SegmentEnd.BY_END]
             if events:
                 before[:, first + s] += moved / frequency
                 before[:, first + s + 1] += rates / frequency
@@ -255,19 +350,31 @@ class ContactsEquations(OrbitEquations):
         last = SegmentEnd.NUMBERS + (8 if events else 4) * own
         after = ends[-1, last : last + 2 * own]
         if self.signature.symmetric:
-            slope, after = image_of(self.system.model, slope.T).T, image_of(self.system.model, after)
+            slope, after = (
+                image_of(self.system.model, slope.T).T,
+                image_of(self.system.model, after),
+            )
         total = np.vstack([rows, slope[free]])
-        here, there = total[:, :end_phase], np.zeros((first + events, first + events))
+        here = total[:, :end_phase]
+        there = np.zeros((first + events, first + events))
         there[events:, :first] = -np.eye(first)
         if events:
             there[:, first] = total[:, end_phase]
         residual = np.append(guards, (after - end)[free])
-        return ContactsEvaluation(residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first)
+        return ContactsEvaluation(
+            residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first
+        )
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
-        """The extremes along the segments, in the columns that orbits with one contact use (`flow/one_contact/segments.py`)."""
-        extremes = np.full((len(seen), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
-        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST]] = seen[:, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]]
+        """The extremes along the segments, in the columns that orbits with one contact use
+        (`flow/one_contact/segments.py`).
+        """
+        extremes = np.full(
+            (len(seen), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf
+        )
+        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST]] = seen[
+            :, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]
+        ]
         extremes[:, [SegmentColumn.LOWEST_GAP, SegmentColumn.LOWEST_GAP_TIME]] = seen[
             :, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]
         ]
@@ -278,20 +385,29 @@ class ContactsEquations(OrbitEquations):
     def start(self, solution: Solution) -> dict[str, Any]:
         """Within the longest segment; for an orbit without events, at phase 0."""
         state, phases = self.split(solution.unknowns)
-        values, system = solution.values, self.system_at(solution.values)
+        values = solution.values
+        system = self.system_at(solution.values)
         if not phases.size:
-            return {**arguments_of(system, self._with_held(state, self.signature.closed, values)), "time": 0.0}
+            return {
+                **arguments_of(system, self._with_held(state, self.signature.closed, values)),
+                "time": 0.0,
+            }
         times = np.append(phases, phases[0] + self.closing) / self.frequency(values)
         longest = int(np.argmax(np.diff(times)))
-        begin = solution.evaluation.ends[longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own]
+        begin = solution.evaluation.ends[
+            longest, SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + 2 * self.own
+        ]
         part = times[longest] + np.array([0.0, START_SHARE]) * (times[longest + 1] - times[longest])
         there = self.carried_along(begin, int(self.plan[longest, SegmentPlan.ALONG]), part, values)
         assert there is not None, "an orbit's own segments can be followed"
         return {**arguments_of(system, there), "time": float(part[1])}
 
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
-        signature, unknowns = self.signature, solution.unknowns
-        events, half, odd = signature.events, len(signature.events) // 2, signature.period % 2
+        signature = self.signature
+        unknowns = solution.unknowns
+        events = signature.events
+        half = len(signature.events) // 2
+        odd = signature.period % 2
         if signature.symmetric or signature.closed or (odd and not mirrored):
             return None
         if not events:
@@ -304,12 +420,17 @@ class ContactsEquations(OrbitEquations):
         place = SegmentEnd.NUMBERS + 8 * self.own
         later = solution.evaluation.ends[half - 1, place : place + 2 * self.own]
         later = image_of(self.system.model, later) if odd else later
-        first, second = self.joined(state, phases[:half]), self.joined(later, phases[half:] - np.pi * signature.period)
+        first = self.joined(state, phases[:half])
+        second = self.joined(later, phases[half:] - np.pi * signature.period)
         return np.stack([first, second])
 
     def _with_held(self, state: np.ndarray, closed: int, values: np.ndarray) -> np.ndarray:
-        """A state put exactly onto the contacts that are closed, and onto those that it touches without speed, up to rounding."""
-        for place, value in held_values(self.system_at(values), state, TOLERANCES.touch, closed).items():
+        """A state put exactly onto the contacts that are closed, and onto those that it touches
+        without speed, up to rounding.
+        """
+        for place, value in held_values(
+            self.system_at(values), state, TOLERANCES.touch, closed
+        ).items():
             state[place] = value
         return state
 
@@ -322,5 +443,9 @@ def no_event(closed: int) -> np.ndarray:
 def _has_moving_mass(model: Any) -> bool:
     """Whether the mass matrix depends on time, as a wall moves and M on what it moves."""
     size = len(model.coordinates)
-    one, other = (mass_rows(model, x if size == 1 else tuple(x / (1 + i) for i in range(size))) for x in (0.13, 0.21))  # any
+    # any
+    one, other = (
+        mass_rows(model, x if size == 1 else tuple(x / (1 + i) for i in range(size)))
+        for x in (0.13, 0.21)
+    )
     return getattr(model, "has_moving_walls", False) and bool(np.not_equal(one, other).any())

@@ -1,4 +1,6 @@
-"""The contract of the equations of a periodic orbit: what a kind of equations gives, and what follows from it."""
+"""The contract of the equations of a periodic orbit: what a kind of equations gives, and what
+follows from it.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +20,19 @@ from saltus.orbits.signature import Signature
 from saltus.systems import System, numbers
 from saltus.taylor import FREQUENCY, record_table
 
-FARTHEST = 1.0  # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to one
+# upper limit of distances of an orbit from a change, which are infinite where nothing comes near to
+# one
+FARTHEST = 1.0
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
 
 
 @dataclass(frozen=True)
 class OrbitEvaluation:
-    """The equations at one point: the residual and its derivatives, one block for each segment, and extremes along the segments.
+    """The equations at one point: the residual and its derivatives, one block for each segment, and
+    extremes along the segments.
 
-    Block row i of the Jacobian has `here[i]` in the columns of the unknowns of segment i, and `there[i]` in those of the next
-    one.
+    Block row i of the Jacobian has `here[i]` in the columns of the unknowns of segment i, and
+    `there[i]` in those of the next one.
     """
 
     residual: np.ndarray  # (n d,)
@@ -35,19 +40,25 @@ class OrbitEvaluation:
     there: np.ndarray  # (n, d, d)
     parameters: np.ndarray  # (n d, parameters)
     ends: np.ndarray
-    extremes: np.ndarray  # (n, 4 + margins): extrema within each segment, by `SegmentColumn`; empty if not asked for
+    # (n, 4 + margins): extrema within each segment, by `SegmentColumn`; empty if not asked for
+    extremes: np.ndarray
 
     def jacobian(self, closing: float = 1.0) -> np.ndarray:
-        """The derivatives to the unknowns; with `closing` -1 for perturbations that change their sign each (half) period."""
+        """The derivatives to the unknowns; with `closing` -1 for perturbations that change their
+        sign each (half) period.
+        """
         matrix = np.zeros((len(self.residual), len(self.residual)))
         self._fill(matrix, closing)
         return matrix
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
-        """Write the derivatives to the unknowns, block by block, into the first columns of a matrix of zeros."""
+        """Write the derivatives to the unknowns, block by block, into the first columns of a matrix
+        of zeros.
+        """
         n, d, _ = self.here.shape
         width = matrix.shape[1]
-        flat, step = matrix.reshape(-1), d * (width + 1)
+        flat = matrix.reshape(-1)
+        step = d * (width + 1)
         for i in range(d):
             for j in range(d):
                 flat[i * width + j :: step][:n] = self.here[:, i, j]
@@ -67,7 +78,9 @@ class OrbitEvaluation:
         return self._all
 
     def monodromy(self) -> np.ndarray:
-        """The product of the segments' maps: from the first unknowns to those a (half) period later; inf at a grazing."""
+        """The product of the segments' maps: from the first unknowns to those a (half) period
+        later; inf at a grazing.
+        """
         chain = np.eye(self.here.shape[1])
         with np.errstate(all="ignore"):
             try:
@@ -103,10 +116,14 @@ class Restart(NamedTuple):
 
 
 class MotionToRead:
-    """A motion over some forcing periods from a state at phase 0, from which orbits of that many periods are read."""
+    """A motion over some forcing periods from a state at phase 0, from which orbits of that many
+    periods are read.
+    """
 
     def __init__(self, system: System, state: dict[str, Any], periods: int) -> None:
-        self.system, self.state, self.periods = system, state, periods
+        self.system = system
+        self.state = state
+        self.periods = periods
 
     @property
     def duration(self) -> float:
@@ -122,72 +139,107 @@ class MotionToRead:
 
     @cached_property
     def twice(self) -> Motion:
-        """The motion over twice as many, so that its events can be counted from any of them on, at the tolerance of orbits."""
-        return simulate(self.system, **self.state, periods=2 * self.periods, tol=10.0 * ORBIT_TOLERANCE)
+        """The motion over twice as many, so that its events can be counted from any of them on, at
+        the tolerance of orbits.
+        """
+        return simulate(
+            self.system, **self.state, periods=2 * self.periods, tol=10.0 * ORBIT_TOLERANCE
+        )
 
 
 class OrbitEquations(ABC):
-    """The equations F(unknowns, parameters) = 0 of the orbits of one signature of a system, with the parameters at `paths`.
+    """The equations F(unknowns, parameters) = 0 of the orbits of one signature of a system, with
+    the parameters at `paths`.
 
-    They are those of `given.in_gap_coordinates`, the `system`, whose contacts hold single coordinates; so are `start` and all
-    states. `PeriodicOrbit` shows them in the coordinates of the system that was `given`.
+    They are those of `given.in_gap_coordinates`, the `system`, whose contacts hold single
+    coordinates; so are `start` and all states. `PeriodicOrbit` shows them in the coordinates of the
+    system that was `given`.
 
-    A new kind of equations is a subclass in a file of its own and one entry in `KINDS` (`kinds.py`). It gives
+    A new kind of equations is a subclass in a file of its own and one entry in `KINDS`
+    (`kinds.py`). It gives
 
-    1. **for which orbits it is**: `solves`, whether it has equations for a signature of a system; and `read`, the equations and
+    1. **for which orbits it is**: `solves`, whether it has equations for a signature of a system;
+       and `read`, the equations and
        a guess of their unknowns along a motion;
-    2. **the equations**: `size`, the number of unknowns, and `evaluate`, an `OrbitEvaluation` with the residual, its derivatives
+    2. **the equations**: `size`, the number of unknowns, and `evaluate`, an `OrbitEvaluation` with
+       the residual, its derivatives
        (from which multipliers follow) and the extremes along the orbit;
     3. **a state to start from**: `start`, as `simulate` takes it;
     4. **its impacts**: `impacts`, phases and speeds;
 
     and, where they differ from what stands here,
 
-    5. **F alone**: `residual`; **halving and repeating**: `halves` (both halves of a period as unknowns of the equations over one
-       half, by which orbits that are their own images are known), `repeated` and `alternating` (the unknowns, and a perturbation,
-       of an orbit that goes round twice);
-    6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one; `at_section_of` and
+    5. **F alone**: `residual`; **halving and repeating**: `halves` (both halves of a period as
+       unknowns of the equations over one
+       half, by which orbits that are their own images are known), `repeated` and `alternating` (the
+       unknowns, and a perturbation, of an orbit that goes round twice);
+    6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one;
+       `at_section_of` and
        `at_another_section`, if the state is given at a section that moves;
-    7. **what bounds a step**: `barrier`, a test function that is negative where the equations do not hold, and `accepts`;
-    8. **what lies beyond a change**: `change`, which special point the zero of the barrier is; `beyond`, the point with which
-       the branch goes on; `born_at`, whether it ends there because its parent bears it; `also_at`, a further special point
-       there; `first_step` after it, and `stalled`, what stops a branch where no step leads on;
-    9. **curves of special points**: `curve_barrier`, and `touched`, the equations with the impact that a grazing begins with.
+    7. **what bounds a step**: `barrier`, a test function that is negative where the equations do
+       not hold, and `accepts`;
+    8. **what lies beyond a change**: `change`, which special point the zero of the barrier is;
+       `beyond`, the point with which
+       the branch goes on; `born_at`, whether it ends there because its parent bears it; `also_at`,
+       a further special point there; `first_step` after it, and `stalled`, what stops a branch
+       where no step leads on;
+    9. **curves of special points**: `curve_barrier`, and `touched`, the equations with the impact
+       that a grazing begins with.
 
-    A kind whose orbits have more to tell than their signature and unknowns say adds fields to `Signature`, which has the columns
-    in datasets (`signature_columns`) and reads them back.
+    A kind whose orbits have more to tell than their signature and unknowns say adds fields to
+    `Signature`, which has the columns in datasets (`signature_columns`) and reads them back.
 
-    From these everything else follows: finding (`finding/`), branches, their special points and switching (`branches/`), curves
-    in two parameters, datasets and files, plots. Nobody asks of which kind an orbit's equations are.
+    From these everything else follows: finding (`finding/`), branches, their special points and
+    switching (`branches/`), curves in two parameters, datasets and files, plots. Nobody asks of
+    which kind an orbit's equations are.
     """
 
-    passes_contact: bool = False  # whether the contact is no singularity, so that orbits pass through it; see `ContactRegularity`
+    # whether the contact is no singularity, so that orbits pass through it; see `ContactRegularity`
+    passes_contact: bool = False
     corrector_radius: float = math.inf  # see `EquationCurve`
-    residual_floor: float = 0.0  # the largest residual that rounding may leave; above 0 where multipliers are very large
+    # the largest residual that rounding may leave; above 0 where multipliers are very large
+    residual_floor: float = 0.0
 
-    def __init__(self, system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE) -> None:
+    def __init__(
+        self,
+        system: System,
+        signature: Signature,
+        paths: tuple[str, ...] = (),
+        tol: float = ORBIT_TOLERANCE,
+    ) -> None:
         if system.load.frequency is None:
             raise ParameterError(
-                "a load without a frequency has no forcing period, so no periodic orbits to find; give one", "load.frequency"
+                (
+                    "a load without a frequency has no forcing period, so no periodic orbits to "
+                    "find; give one"
+                ),
+                "load.frequency",
             )
-        self.given, self.signature, self.paths, self.tol = system, signature, paths, tol
+        self.given = system
+        self.signature = signature
+        self.paths = paths
+        self.tol = tol
         self.system = system = system.in_gap_coordinates
         self._run: Any = program(system, system.model.margin_names(system.load), paths)
         if self._run.trace.records:
             raise ParameterError(
-                "a load with a Record or a pulse is not periodic, so it has no periodic orbits; use Harmonic signals"
+                "a load with a Record or a pulse is not periodic, so it has no periodic orbits; "
+                "use Harmonic signals"
             )
         names = [path for path, _ in numbers(system)]
         self._values = np.array([value for _, value in numbers(system)])
         self._places = [names.index(path) for path in paths]
         self._frequency = names.index(FREQUENCY)
-        self._follower, self._records = SegmentFollower(self._run, tol), record_table(system, [])
+        self._follower = SegmentFollower(self._run, tol)
+        self._records = record_table(system, [])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle and copy the arguments only: compiled code is loaded again in the process that reads them."""
+        """Pickle and copy the arguments only: compiled code is loaded again in the process that
+        reads them.
+        """
         return type(self), (self.given, self.signature, self.paths, self.tol)
 
-    # --- 1. for which orbits it is -------------------------------------------------------------------------------------------
+    # --- 1. for which orbits it is -------------------------------------------
 
     @classmethod
     @abstractmethod
@@ -196,9 +248,11 @@ class OrbitEquations(ABC):
 
     @classmethod
     @abstractmethod
-    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
-        """The equations with the signature of a motion that nearly repeats itself, along the paths of `base`, and their unknowns
-        along it; None if its orbit has equations of another kind.
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
+        """The equations with the signature of a motion that nearly repeats itself, along the paths
+        of `base`, and their unknowns along it; None if its orbit has equations of another kind.
 
         Raises
         ------
@@ -206,7 +260,7 @@ class OrbitEquations(ABC):
             The motion leads to no orbit.
         """
 
-    # --- 2. the equations ----------------------------------------------------------------------------------------------------
+    # --- 2. the equations ----------------------------------------------------
 
     @property
     @abstractmethod
@@ -214,83 +268,106 @@ class OrbitEquations(ABC):
         """The number of unknowns."""
 
     def residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-        """F alone, up to rounding, where that takes far less time than with its derivatives; else None, or without a motion."""
+        """F alone, up to rounding, where that takes far less time than with its derivatives; else
+        None, or without a motion.
+        """
         return None
 
     @abstractmethod
     def evaluate(
-        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+        self,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool = False,
+        *,
+        later: np.ndarray | None = None,
     ) -> OrbitEvaluation | None:
         """The equations at a point, or None where the motion cannot be followed.
 
-        `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
+        `later` are the unknowns asked for at the end of the period, if they differ from those at
+        its beginning.
         """
 
-    # --- 3. and 4. a state to start from, and the impacts --------------------------------------------------------------------
+    # --- 3. and 4. a state to start from, and the impacts --------------------
 
     @abstractmethod
     def start(self, solution: Solution) -> dict[str, Any]:
-        """The arguments of `simulate` that start a motion on the orbit; without `time`, or at time 0, they are its state at
-        phase 0."""
+        """The arguments of `simulate` that start a motion on the orbit; without `time`, or at time
+        0, they are its state at phase 0."""
 
     @abstractmethod
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-        """The phases of the impacts, and the speeds at which the gap closes before them; of an accumulation, those that are
-        resolved."""
+        """The phases of the impacts, and the speeds at which the gap closes before them; of an
+        accumulation, those that are resolved."""
 
     def counted_impacts(self, solution: Solution) -> int:
-        """The number of impacts in the time that the equations cover, without those of accumulations."""
+        """The number of impacts in the time that the equations cover, without those of
+        accumulations.
+        """
         return len(self.impacts(solution)[0])
 
     def rests(self, solution: Solution) -> np.ndarray:
-        """The times in one period of an orbit at which it leaves rest at a contact and comes to rest again, (n, 2)."""
+        """The times in one period of an orbit at which it leaves rest at a contact and comes to
+        rest again, (n, 2).
+        """
         return np.empty((0, 2))
 
     def touching_speed(self, solution: Solution) -> float:
-        """The least speed of the impacts at which the map loses its derivative if the speed vanishes; inf without such
-        impacts."""
+        """The least speed of the impacts at which the map loses its derivative if the speed
+        vanishes; inf without such impacts."""
         return float(self.impacts(solution)[1].min(initial=math.inf))
 
     def pressing(self, solution: Solution) -> float:
-        """A quantity that is negative if a contact that the equations take for closed would open, or one that they take for open
-        is passed at the section; inf without either."""
+        """A quantity that is negative if a contact that the equations take for closed would open,
+        or one that they take for open is passed at the section; inf without either."""
         return math.inf
 
-    # --- 5. halving and repeating --------------------------------------------------------------------------------------------
+    # --- 5. halving and repeating --------------------------------------------
 
     @abstractmethod
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
-        """The unknowns of both halves of a period, each as unknowns of the `halved` equations, (2, n); None where the signature
-        rules out that they are alike, or implies it. `mirrored` says whether the system has the mirror symmetry."""
+        """The unknowns of both halves of a period, each as unknowns of the `halved` equations, (2,
+        n); None where the signature rules out that they are alike, or implies it. `mirrored` says
+        whether the system has the mirror symmetry."""
 
     def repeated(self, unknowns: np.ndarray) -> np.ndarray:
-        """The unknowns of an orbit that goes round twice in the time that the equations of the doubled orbit cover."""
+        """The unknowns of an orbit that goes round twice in the time that the equations of the
+        doubled orbit cover.
+        """
         return unknowns
 
     def alternating(self, direction: np.ndarray) -> np.ndarray:
-        """A perturbation of the unknowns as one of the `repeated` unknowns, with the other sign in the second round."""
+        """A perturbation of the unknowns as one of the `repeated` unknowns, with the other sign in
+        the second round.
+        """
         return direction
 
     def shorter_period(self, solution: Solution, within: float) -> int | None:
-        """The forcing periods of a shorter orbit that this one repeats, up to `within`; None if the equations exclude it."""
+        """The forcing periods of a shorter orbit that this one repeats, up to `within`; None if the
+        equations exclude it.
+        """
         return None
 
-    # --- 6. renumbering ------------------------------------------------------------------------------------------------------
+    # --- 6. renumbering ------------------------------------------------------
 
     @abstractmethod
     def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: Any) -> np.ndarray | None:
-        """The unknowns of an orbit, counted such that they are nearest to those of the point `other` of a branch; None if the
-        two cannot be compared so."""
+        """The unknowns of an orbit, counted such that they are nearest to those of the point
+        `other` of a branch; None if the two cannot be compared so."""
 
     def at_section_of(self, point: Any, other: Any) -> Any:
-        """A point with its state given at the section of another point; unchanged if the equations have no section."""
+        """A point with its state given at the section of another point; unchanged if the equations
+        have no section.
+        """
         return point
 
     def at_another_section(self, orbit: Any) -> Any:
-        """An orbit with its section farther from all events; None if the equations have no section, or there is no better one."""
+        """An orbit with its section farther from all events; None if the equations have no section,
+        or there is no better one.
+        """
         return None
 
-    # --- 7. what bounds a step -----------------------------------------------------------------------------------------------
+    # --- 7. what bounds a step -----------------------------------------------
 
     @abstractmethod
     def barrier(self, point: Any) -> TestFunction:
@@ -300,20 +377,23 @@ class OrbitEquations(ABC):
         """Whether a step to a point, which may be cut, has stayed on its branch."""
         return True
 
-    # --- 8. what lies beyond a change ----------------------------------------------------------------------------------------
+    # --- 8. what lies beyond a change ----------------------------------------
 
     def change(self, zero: Zero, point: Any) -> Cut | End:
-        """The cut at a zero of the barrier ahead of a point, with its kind of special point, or without one if nothing changes
-        but how the orbit is given. An end if the orbits beyond belong to another branch."""
+        """The cut at a zero of the barrier ahead of a point, with its kind of special point, or
+        without one if nothing changes but how the orbit is given. An end if the orbits beyond
+        belong to another branch."""
         return Cut(zero.point, zero)
 
     @abstractmethod
     def beyond(self, cut: Cut, points: list[Any]) -> Any:
-        """The point with which the branch of `points` goes on beyond a cut, a `Restart` if it is to be found from a motion, or
-        the end."""
+        """The point with which the branch of `points` goes on beyond a cut, a `Restart` if it is to
+        be found from a motion, or the end."""
 
     def born_at(self, cut: Cut, points: list[Any]) -> Zero | None:
-        """The special point of the parent's branch if a family ends at a cut because it is born there; else None."""
+        """The special point of the parent's branch if a family ends at a cut because it is born
+        there; else None.
+        """
         return None
 
     def also_at(self, cut: Cut, following: Any) -> Zero | None:
@@ -321,29 +401,35 @@ class OrbitEquations(ABC):
         return None
 
     def lost_ahead(self, point: Any) -> Zero | None:
-        """The special point ahead at which an orbit that has nearly shrunk to rest is lost; None if it shrinks without one."""
+        """The special point ahead at which an orbit that has nearly shrunk to rest is lost; None if
+        it shrinks without one.
+        """
         return None
 
     def first_step(self, point: Any, ahead: Any) -> float:
         """The longest first step beyond a cut at `point`, from the first orbit `ahead` of it."""
         return math.inf
 
-    def stalled(self, point: Any, step: float, points: list[Any], bounds: Bounds) -> Cut | End | None:
-        """The cut or the end at a point from which no step leads on; None if the equations do not know why."""
+    def stalled(
+        self, point: Any, step: float, points: list[Any], bounds: Bounds
+    ) -> Cut | End | None:
+        """The cut or the end at a point from which no step leads on; None if the equations do not
+        know why.
+        """
         return None
 
-    # --- 9. curves of special points -----------------------------------------------------------------------------------------
+    # --- 9. curves of special points -----------------------------------------
 
     @abstractmethod
     def curve_barrier(self, kind: str, point: Any) -> TestFunction:
         """The barrier along a curve of special points of a kind."""
 
     def touched(self, special: Zero) -> tuple[Signature, np.ndarray] | None:
-        """Of the two signatures that meet at a grazing, the one with more impacts, and the orbit's unknowns in it; None if curves
-        of grazings are not followed."""
+        """Of the two signatures that meet at a grazing, the one with more impacts, and the orbit's
+        unknowns in it; None if curves of grazings are not followed."""
         return None
 
-    # --- what follows --------------------------------------------------------------------------------------------------------
+    # --- what follows --------------------------------------------------------
 
     @property
     def values(self) -> np.ndarray:
@@ -357,9 +443,14 @@ class OrbitEquations(ABC):
 
     @cached_property
     def following(self) -> np.ndarray:
-        """The places of unknowns that follow from the others, velocities of coordinates of first order and dependent sums: 0."""
-        moving, own = 2 * self.own - len(self.system.model.first_order), self.own
-        return np.array([*range(own - self.system.dependent, own), *range(moving, 2 * own)], dtype=int)
+        """The places of unknowns that follow from the others, velocities of coordinates of first
+        order and dependent sums: 0.
+        """
+        moving = 2 * self.own - len(self.system.model.first_order)
+        own = self.own
+        return np.array(
+            [*range(own - self.system.dependent, own), *range(moving, 2 * own)], dtype=int
+        )
 
     @property
     def margins(self) -> tuple[str, ...]:
@@ -373,7 +464,11 @@ class OrbitEquations(ABC):
 
     def frequency(self, values: np.ndarray) -> float:
         """The forcing frequency at the given parameters."""
-        return float(values[self.paths.index(FREQUENCY)] if FREQUENCY in self.paths else self._values[self._frequency])
+        return float(
+            values[self.paths.index(FREQUENCY)]
+            if FREQUENCY in self.paths
+            else self._values[self._frequency]
+        )
 
     def system_at(self, values: np.ndarray) -> System:
         """The system with the given parameters.
@@ -386,8 +481,12 @@ class OrbitEquations(ABC):
         return self.given_at(values).in_gap_coordinates
 
     def given_at(self, values: np.ndarray) -> System:
-        """The system as the user gave it, with the given parameters; an orbit's states are given in its coordinates."""
-        return self.given.with_({path: float(value) for path, value in zip(self.paths, values, strict=True)})
+        """The system as the user gave it, with the given parameters; an orbit's states are given in
+        its coordinates.
+        """
+        return self.given.with_(
+            {path: float(value) for path, value in zip(self.paths, values, strict=True)}
+        )
 
     def with_signature(self, signature: Signature) -> Self:
         """The equations of the same kind for another signature."""
@@ -395,15 +494,19 @@ class OrbitEquations(ABC):
 
     @cached_property
     def images(self) -> tuple[int, ...]:
-        """The number of the mirror image of each contact and friction; none where there is no such symmetry."""
+        """The number of the mirror image of each contact and friction; none where there is no such
+        symmetry.
+        """
         return self.system.contact_images or ()
 
     @cached_property
     def halved(self) -> Self:
-        """The equations of the orbits that are their own images, over half a period: symmetric orbits if the period is odd, else
-        orbits of half the period."""
+        """The equations of the orbits that are their own images, over half a period: symmetric
+        orbits if the period is odd, else orbits of half the period."""
         return self.with_signature(self.signature.halved())
 
     def over_full_period(self, unknowns: np.ndarray) -> tuple[Self, np.ndarray]:
         """The equations of the full period of a symmetric orbit, and the orbit's unknowns in them."""
-        return self.with_signature(self.signature.over_full_period(self.images)), self.repeated(unknowns)
+        return self.with_signature(self.signature.over_full_period(self.images)), self.repeated(
+            unknowns
+        )

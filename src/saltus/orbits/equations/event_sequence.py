@@ -1,5 +1,5 @@
-"""The events of an orbit that is followed through them: their order, how near the orbit is to having other events,
-and how they are read from a motion."""
+"""The events of an orbit that is followed through them: their order, how near the orbit is to
+having other events, and how they are read from a motion."""
 
 from __future__ import annotations
 
@@ -31,10 +31,15 @@ CHANGES = (
 
 @dataclass(frozen=True)
 class EventSettings:
-    """Which events happen at one instant, which impacts belong to an accumulation, and when a section has to be moved."""
+    """Which events happen at one instant, which impacts belong to an accumulation, and when a
+    section has to be moved.
+    """
 
-    grows: float = 1e-6  # Impacts have not begun to die away if one is faster than its predecessor by more than this share.
-    # The section is moved if it is nearer to an event than this share of the time between the events before and after it.
+    # Impacts have not begun to die away if one is faster than its predecessor by more than this
+    # share.
+    grows: float = 1e-6
+    # The section is moved if it is nearer to an event than this share of the time between the
+    # events before and after it.
     section_distance: float = 0.02
 
 
@@ -42,7 +47,9 @@ SETTINGS = EventSettings()
 
 
 class OrbitEvent(NamedTuple):
-    """An event: its kind as in `EventCode`, the contacts and frictions as bits, and the number of the mode after it."""
+    """An event: its kind as in `EventCode`, the contacts and frictions as bits, and the number of
+    the mode after it.
+    """
 
     kind: int
     parts: int
@@ -56,18 +63,26 @@ class EventSequence:
     events: tuple[OrbitEvent, ...]
     times: tuple[float, ...]
     period: float
-    distance: float  # the least of the gaps, speeds, reactions and durations that become 0 where an event appears or is lost
-    section_distance: float  # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
+    # the least of the gaps, speeds, reactions and durations that become 0 where an event appears or
+    # is lost
+    distance: float
+    # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
+    section_distance: float
 
     groups: tuple[Group, ...]  # the groups of contacts and frictions
 
     @property
     def sequence(self) -> tuple[OrbitEvent, ...]:
-        """The events of one group after the other, each begun with the same event wherever the section lies, so that the
-        sequences of two orbits can be compared. The order of events of different groups makes no difference and is left out."""
+        """The events of one group after the other, each begun with the same event wherever the
+        section lies, so that the sequences of two orbits can be compared. The order of events of
+        different groups makes no difference and is left out."""
         found: tuple[OrbitEvent, ...] = ()
         for parts, modes in self.groups:
-            events = tuple(event._replace(mode=event.mode - 1 & modes) for event in self.events if event.parts & parts)
+            events = tuple(
+                event._replace(mode=event.mode - 1 & modes)
+                for event in self.events
+                if event.parts & parts
+            )
             found += min((events[i:] + events[:i] for i in range(len(events))), default=())
         return found
 
@@ -77,51 +92,88 @@ class EventSequence:
         return sum(event.kind == EventCode.IMPACT for event in self.events)
 
     def until_next(self, kinds: tuple[int, int]) -> float:
-        """The least time between two successive events of one contact or friction that are of these two kinds; inf without
-        such."""
-        n, least = len(self.events), math.inf
+        """The least time between two successive events of one contact or friction that are of these
+        two kinds; inf without such."""
+        n = len(self.events)
+        least = math.inf
         for i, event in enumerate(self.events):
-            later = next(j for j in range(i + 1, i + n + 1) if self.events[j % n].parts & event.parts)
+            later = next(
+                j for j in range(i + 1, i + n + 1) if self.events[j % n].parts & event.parts
+            )
             if (event.kind, self.events[later % n].kind) == kinds:
-                least = min(least, self.times[later % n] - self.times[i] + (self.period if later >= n else 0.0))
+                least = min(
+                    least,
+                    self.times[later % n] - self.times[i] + (self.period if later >= n else 0.0),
+                )
         return least
 
 
-def sequence_of(motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None) -> EventSequence:
+def sequence_of(
+    motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None
+) -> EventSequence:
     """The events of one period of an orbit, whose motion begins at its section.
 
-    With `images`, the number of the mirror image of each contact and friction, the motion is half a period of a symmetric orbit:
-    the images of its events follow.
+    With `images`, the number of the mirror image of each contact and friction, the motion is half a
+    period of a symmetric orbit: the images of its events follow.
     """
-    period, modes = motion.time - motion.start, modes_in(motion.system)
+    period = motion.time - motion.start
+    modes = modes_in(motion.system)
     listed, when, all_speeds = _listed(motion)
-    events, times = tuple(listed), tuple(when.tolist())
-    speeds = [speed for event, speed in zip(events, all_speeds.tolist(), strict=True) if event.kind == EventCode.IMPACT]
+    events = tuple(listed)
+    times = tuple(when.tolist())
+    speeds = [
+        speed
+        for event, speed in zip(events, all_speeds.tolist(), strict=True)
+        if event.kind == EventCode.IMPACT
+    ]
     section_distance = _section_distance(motion, period)
     if images is not None:
-        events += tuple(OrbitEvent(event.kind, *modes.image(event.parts, event.mode, images)) for event in events)
+        events += tuple(
+            OrbitEvent(event.kind, *modes.image(event.parts, event.mode, images))
+            for event in events
+        )
         times, period = times + tuple(time + period for time in times), 2.0 * period
-    apart, groups = [FARTHEST], modes.groups(motion.position)
+    apart = [FARTHEST]
+    groups = modes.groups(motion.position)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
-    distance = float(min([sampled.nearest_touch(), *speeds, *(time for time in apart if time > ONE_INSTANT * period)]))
+    distance = float(
+        min(
+            [
+                sampled.nearest_touch(),
+                *speeds,
+                *(time for time in apart if time > ONE_INSTANT * period),
+            ]
+        )
+    )
     events, times = _in_order(events, times, ONE_INSTANT * period)
     return EventSequence(events, times, period, max(distance, 0.0), section_distance, groups)
 
 
 def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
-    """The events that change the mode, without the impacts of accumulations; their times; and how fast each closes a contact."""
-    found, dense, reading = motion.events, motion.dense, modes_in(motion.system)
-    times, codes, speeds = found.times, reading.codes(motion), np.full(len(found), math.inf)
+    """The events that change the mode, without the impacts of accumulations; their times; and how
+    fast each closes a contact.
+    """
+    found = motion.events
+    dense = motion.dense
+    reading = modes_in(motion.system)
+    times = found.times
+    codes = reading.codes(motion)
+    speeds = np.full(len(found), math.inf)
     speeds[codes[:, 0] == EventCode.IMPACT] = reading.impact_speeds(motion)
-    # a rest is recorded besides the event that brings it, and at the start of a motion: it counts only if it stands alone
-    alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (times > motion.start)
+    # a rest is recorded besides the event that brings it, and at the start of a motion: it counts
+    # only if it stands alone
+    alone = (np.searchsorted(times, times, side="right") - np.searchsorted(times, times) == 1) & (
+        times > motion.start
+    )
     chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.REST))
     kept = np.flatnonzero(chosen)
     for parts, _ in reading.groups(motion.position):
         own = kept[codes[kept, 1] & parts != 0]
-        chosen[own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]] = False
+        chosen[
+            own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]
+        ] = False
     times, codes = times[chosen], codes[chosen]
     if dense is None or not times.size:
         return [], times, speeds[chosen]
@@ -131,7 +183,8 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
 
 
 def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Which events of a group, (n, 2), belong to an accumulation: infinitely many impacts that die away until contacts are held.
+    """Which events of a group, (n, 2), belong to an accumulation: infinitely many impacts that die
+    away until contacts are held.
 
     The accumulation begins after the last impact that is slower than its successor.
     """
@@ -148,18 +201,28 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
 def _in_order(
     events: tuple[OrbitEvent, ...], times: tuple[float, ...], together: float
 ) -> tuple[tuple[OrbitEvent, ...], tuple[float, ...]]:
-    """Events in an order that does not depend on rounding: those of different contacts at one instant, as of cells that move
-    alike, are sorted by contact, and each has the mode after all of them.
+    """Events in an order that does not depend on rounding: those of different contacts at one
+    instant, as of cells that move alike, are sorted by contact, and each has the mode after all of
+    them.
 
-    Rounding decides which of them the motion records first, and which of them it records as one event.
+    Rounding decides which of them the motion records first, and which of them it records as one
+    event.
     """
-    found, begin = list[tuple[OrbitEvent, float]](), 0
+    found = list[tuple[OrbitEvent, float]]()
+    begin = 0
     for end in range(1, len(events) + 1):
         if end < len(events) and times[end] - times[begin] <= together:
             continue
         here = list(zip(events[begin:end], times[begin:end], strict=True))
-        parts = [1 << i for i in range(max(event.parts for event in events[begin:end]).bit_length())]
-        split = [(OrbitEvent(e.kind, part, events[end - 1].mode), t) for part in parts for e, t in here if e.parts & part]
+        parts = [
+            1 << i for i in range(max(event.parts for event in events[begin:end]).bit_length())
+        ]
+        split = [
+            (OrbitEvent(e.kind, part, events[end - 1].mode), t)
+            for part in parts
+            for e, t in here
+            if e.parts & part
+        ]
         found += split if len({event.parts for event, _ in split}) > 1 else here
         begin = end
     return tuple(event for event, _ in found), tuple(time for _, time in found)
@@ -169,26 +232,39 @@ def _section_distance(motion: Motion, period: float) -> float:
     times = motion.events.times[np.isin(motion.events.codes[:, 0], CHANGES)]
     if not times.size:
         return 0.5
-    after, before = times[0] - motion.start, motion.start + period - times[-1]
+    after = times[0] - motion.start
+    before = motion.start + period - times[-1]
     return float(min(after, before) / (after + before))
 
 
-STAYS = "the motion comes to rest with all coordinates held at contacts for good, which is no orbit to follow; start elsewhere"
+STAYS = (
+    "the motion comes to rest with all coordinates held at contacts for good, which is no "
+    "orbit to follow; start elsewhere"
+)
 
 
 def section_of(
     motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
 ) -> tuple[float, np.ndarray]:
-    """The phase and the state of a motion at a section: the middle of its longest smooth stretch within the first `duration` in
-    which not all coordinates are held; or the state at a phase that is given.
+    """The phase and the state of a motion at a section: the middle of its longest smooth stretch
+    within the first `duration` in which not all coordinates are held; or the state at a phase that
+    is given.
 
-    The longer that stretch, the longer a branch can be followed before an event comes to the section.
+    The longer that stretch, the longer a branch can be followed before an event comes to the
+    section.
     """
     assert motion.dense is not None
     end = motion.time if duration is None else motion.start + duration
     if phase is None:
-        bounds = np.unique([motion.start, *(event.time for event in motion.events if motion.start < event.time < end), end])
-        spans, middles = np.diff(bounds), 0.5 * (bounds[1:] + bounds[:-1])
+        bounds = np.unique(
+            [
+                motion.start,
+                *(event.time for event in motion.events if motion.start < event.time < end),
+                end,
+            ]
+        )
+        spans = np.diff(bounds)
+        middles = 0.5 * (bounds[1:] + bounds[:-1])
         moves = _moves(motion.system, motion.dense.states(middles)[2])
         time = float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
     else:
@@ -200,20 +276,32 @@ def section_of(
 def _moves(system: System, side: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
     modes = modes_in(system)
-    held = np.sum([np.zeros(np.shape(side)), *modes.closed(side), *(direction == 0 for direction in modes.slides(side))], axis=0)
+    held = np.sum(
+        [
+            np.zeros(np.shape(side)),
+            *modes.closed(side),
+            *(direction == 0 for direction in modes.slides(side)),
+        ],
+        axis=0,
+    )
     return np.asarray(held < len(system.model.coordinates) - system.dependent)
 
 
-def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Signature, np.ndarray, np.ndarray]:
-    """The signature of a motion that was followed for twice `periods`, the state after its first event, and the events' phases.
+def read_signature(
+    motion: Motion, periods: int, frequency: float
+) -> tuple[Signature, np.ndarray, np.ndarray]:
+    """The signature of a motion that was followed for twice `periods`, the state after its first
+    event, and the events' phases.
 
-    The events are those of a span of `periods` forcing periods that begins in the middle between two events.
+    The events are those of a span of `periods` forcing periods that begins in the middle between
+    two events.
     """
     period = motion.system.load.period
     assert period is not None
     changes = _mode_changes(motion, ONE_INSTANT * period)
     times = np.array([time for time, _ in changes])
-    start, length = motion.start, periods * period
+    start = motion.start
+    length = periods * period
     bounds = np.concatenate([[start], times[times < start + length], [start + length]])
     longest = int(np.argmax(np.diff(bounds)))
     begin = bounds[longest : longest + 2].mean()
@@ -226,24 +314,31 @@ def read_signature(motion: Motion, periods: int, frequency: float) -> tuple[Sign
 
 
 def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChange]]:
-    """The events at which contacts open or close, each with its time and the contacts that are closed after it.
+    """The events at which contacts open or close, each with its time and the contacts that are
+    closed after it.
 
-    Contacts of different groups, such as the cells of a chain that move alike, may act at one instant. These count as events one
-    after the other, in any order, as their impulses do not act on one another.
+    Contacts of different groups, such as the cells of a chain that move alike, may act at one
+    instant. These count as events one after the other, in any order, as their impulses do not act
+    on one another.
 
     Raises
     ------
     MotionError
         There are events for which orbits have no equations.
     """
-    contacts, last = motion.system.contact_model.contacts, motion.start
+    contacts = motion.system.contact_model.contacts
+    last = motion.start
     changes: list[tuple[float, ModeChange]] = []
     for time, acting in _instants(motion, together):
-        before, closed = int(motion.closed_at(0.5 * (last + time))), int(motion.closed_at(time))
+        before = int(motion.closed_at(0.5 * (last + time)))
+        closed = int(motion.closed_at(time))
         here = list[tuple[float, ModeChange]]()
-        for contact, is_impact in reversed(acting.items()):  # before its event all contacts of a group are as they were
+        # before its event all contacts of a group are as they were
+        for contact, is_impact in reversed(acting.items()):
             here.append((time, ModeChange(is_impact, contact, closed)))
-            group = sum(1 << i for i, other in enumerate(contacts) if other.group == contacts[contact].group)
+            group = sum(
+                1 << i for i, other in enumerate(contacts) if other.group == contacts[contact].group
+            )
             closed = closed & ~group | before & group
         changes += reversed(here)
         last = time
@@ -251,9 +346,12 @@ def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChan
 
 
 def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
-    """The instants at which contacts act: for each of them the contacts, and whether it is an impact (else a release)."""
+    """The instants at which contacts act: for each of them the contacts, and whether it is an
+    impact (else a release).
+    """
     contacts = motion.system.contact_model.contacts
-    names, instants = [contact.name for contact in contacts], list[tuple[float, dict[int, bool]]]()
+    names = [contact.name for contact in contacts]
+    instants = list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:
         if event.kind not in (EventKind.IMPACT, EventKind.RELEASE):
@@ -262,10 +360,16 @@ def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bo
             instants.append((event.time, {}))
         time, acting = instants[-1]
         instants[-1] = event.time, acting
-        for contact in range(len(names)) if event.contact == "both" else map(names.index, event.contact.split("+")):
+        for contact in (
+            range(len(names))
+            if event.contact == "both"
+            else map(names.index, event.contact.split("+"))
+        ):
             is_impact = event.kind is EventKind.IMPACT
             groups = {contacts[other].group for other in acting if other != contact}
             if contacts[contact].group in groups or (contact in acting and is_impact):
-                raise MotionError(f"two events at one instant, {time:.6g}: an orbit has no equations for that")
+                raise MotionError(
+                    f"two events at one instant, {time:.6g}: an orbit has no equations for that"
+                )
             acting.setdefault(contact, is_impact)
     return instants

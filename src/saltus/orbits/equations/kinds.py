@@ -9,8 +9,8 @@ from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 
-# The kinds, in the order in which a motion is read with them: the first admissible orbit is taken. The equations from impact to
-# impact are those of all systems that have no others.
+# The kinds, in the order in which a motion is read with them: the first admissible orbit is taken.
+# The equations from impact to impact are those of all systems that have no others.
 KINDS: list[type[OrbitEquations]] = [ContactsEquations, OneContactEquations, WholeMotionEquations]
 
 
@@ -18,4 +18,6 @@ def equations_of(
     system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
 ) -> OrbitEquations:
     """The equations of the orbits of a signature, along the parameters at `paths`."""
-    return next(kind for kind in KINDS if kind.solves(system, signature))(system, signature, paths, tol)
+    return next(kind for kind in KINDS if kind.solves(system, signature))(
+        system, signature, paths, tol
+    )

@@ -1,16 +1,18 @@
-"""The boundary-value problem of a periodic orbit with a given signature, and its derivatives (see docs/method.md).
+"""The boundary-value problem of a periodic orbit with a given signature, and its derivatives (see
+docs/method.md).
 
-The unknowns of an orbit with impacts are, for each impact i, its phase phi_i = Omega t_i and the speed v_i at which the gap
-closes. Segment i is the smooth motion on its side from impact i, with the velocity that the reset gives, to impact i+1, whatever
-the sign of the gap w between them; the last segment ends with the first impact of the next period. The equations of each segment
-are
+The unknowns of an orbit with impacts are, for each impact i, its phase phi_i = Omega t_i and the
+speed v_i at which the gap closes. Segment i is the smooth motion on its side from impact i, with
+the velocity that the reset gives, to impact i+1, whatever the sign of the gap w between them; the
+last segment ends with the first impact of the next period. The equations of each segment are
 
     w(t_{i+1}) / (t_{i+1} - t_i) = 0,        -w'(t_{i+1}) - v_{i+1} = 0,
 
-which are regular also at v_i = 0, where the signature changes. The unknowns of an orbit without impacts are its state at phase 0,
-and the equation says that the state a period later is the same. Orbits of a system whose contact is no singularity
-(`flow/one_contact/regularity.py`) have this equation too, whatever sides they pass through; grazing is then nothing special.
-The equations of a symmetric orbit cover half a period, after which it is its mirror image.
+which are regular also at v_i = 0, where the signature changes. The unknowns of an orbit without
+impacts are its state at phase 0, and the equation says that the state a period later is the same.
+Orbits of a system whose contact is no singularity (`flow/one_contact/regularity.py`) have this
+equation too, whatever sides they pass through; grazing is then nothing special. The equations of a
+symmetric orbit cover half a period, after which it is its mirror image.
 """
 
 from __future__ import annotations
@@ -22,7 +24,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.continuation import Cut, End, TestFunction, Zero
-from saltus.flow import ContactRegularity, EventKind, SegmentValue, contact_regularity, load_segments
+from saltus.flow import (
+    ContactRegularity,
+    EventKind,
+    SegmentValue,
+    contact_regularity,
+    load_segments,
+)
 from saltus.orbits.branches.beyond_grazing import inserted, other_side
 from saltus.orbits.branches.conditions import room
 from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test
@@ -36,8 +44,11 @@ from saltus.taylor import FREQUENCY
 class Segments(NamedTuple):
     """Smooth segments, in the form that the flow's `follow_segments` takes."""
 
-    spans: np.ndarray  # (n, 3): when each segment begins and ends, and the speed of the impact with which it begins
-    sides: np.ndarray  # (n, 2): the side before the impact with which it begins (0 without impact), and the side along it
+    # (n, 3): when each segment begins and ends, and the speed of the impact with which it begins
+    spans: np.ndarray
+    # (n, 2): the side before the impact with which it begins (0 without impact), and the side along
+    # it
+    sides: np.ndarray
     states: np.ndarray  # (n, 2 d): its first state, if it begins without an impact
 
 
@@ -58,23 +69,29 @@ class OneContactEquations(OrbitEquations):
         return signature.section is None
 
     @classmethod
-    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
         if not isinstance(base, cls):
             return None
-        once, periods = motion.once, motion.periods
+        once = motion.once
+        periods = motion.periods
         if once.side == 0 or len(once.events.of(EventKind.REST)) or not once.phase_known:
             return None
         if base.passes_contact:
             return base.with_signature(Signature((), periods)), state_of(base.system, motion.state)
         impacts = once.impacts
-        # with two sides the number of impacts is even: an impact near the section may have been counted twice, or not at all
+        # with two sides the number of impacts is even: an impact near the section may have been
+        # counted twice, or not at all
         count = len(impacts) - len(impacts) % len(base.system.model.every_side)
         if not count:
             signature = Signature((), periods, False, once.side)
             return base.with_signature(signature), state_of(base.system, motion.state)
         rate = np.abs(impacts.velocity_before[:count])
         sides = tuple(int(s) for s in impacts.side[:count])
-        unknowns = np.stack([impacts.time[:count] * base.frequency(base.values), rate], axis=1).ravel()
+        unknowns = np.stack(
+            [impacts.time[:count] * base.frequency(base.values), rate], axis=1
+        ).ravel()
         return base.with_signature(Signature(sides, periods)), unknowns
 
     @property
@@ -83,7 +100,9 @@ class OneContactEquations(OrbitEquations):
         return self._run.trace.gap is not None
 
     def pressing(self, solution: Solution) -> float:
-        """Without impacts the gap at the section: where nothing moves it has no minimum that could be negative."""
+        """Without impacts the gap at the section: where nothing moves it has no minimum that could
+        be negative.
+        """
         if self.signature.sides or not self.has_contact or self.passes_contact:
             return math.inf
         model: Any = self.system_at(solution.values).model
@@ -91,12 +110,17 @@ class OneContactEquations(OrbitEquations):
 
     @cached_property
     def passes_contact(self) -> bool:  # type: ignore[override]
-        """Whether the contact is no singularity for any values of the parameters at `paths`, so that orbits pass through it."""
+        """Whether the contact is no singularity for any values of the parameters at `paths`, so
+        that orbits pass through it.
+        """
         if self.signature.sides or not self.has_contact:
             return False
         values = self._values.copy()
         values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
-        return contact_regularity(self._run.trace, tuple(values), self.paths) is ContactRegularity.CONTINUOUS
+        return (
+            contact_regularity(self._run.trace, tuple(values), self.paths)
+            is ContactRegularity.CONTINUOUS
+        )
 
     @property
     def size(self) -> int:
@@ -107,18 +131,26 @@ class OneContactEquations(OrbitEquations):
         system = self.system_at(solution.values)
         if not self.signature.sides:
             return arguments_of(system, solution.unknowns)
-        model, side, frequency = system.one_contact, self.signature.sides[0], self.frequency(solution.values)
+        model = system.one_contact
+        side = self.signature.sides[0]
+        frequency = self.frequency(solution.values)
         phase, speed = solution.unknowns[:2]
         time = float((phase - 2.0 * math.pi * math.floor(phase / (2.0 * math.pi))) / frequency)
-        _, after = model.reset(time, -model.inward(side) * float(speed), side, system.load, system.impact)
+        _, after = model.reset(
+            time, -model.inward(side) * float(speed), side, system.load, system.impact
+        )
         return {model.coordinates[0]: float(model.contact), "velocity": float(after), "time": time}
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         unknowns = solution.unknowns
-        return (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
+        return (
+            (unknowns[::2], unknowns[1::2]) if self.signature.sides else (np.empty(0), np.empty(0))
+        )
 
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
-        signature, unknowns, n = self.signature, solution.unknowns, len(self.signature.sides)
+        signature = self.signature
+        unknowns = solution.unknowns
+        n = len(self.signature.sides)
         odd = signature.period % 2
         if signature.symmetric or n % 2 or (odd and not mirrored):
             return None
@@ -127,7 +159,8 @@ class OneContactEquations(OrbitEquations):
                 return None  # such an orbit stays on one side, and its image on the other one
             found = self.halved.evaluate(unknowns, solution.values)
             return None if found is None else np.stack([unknowns, unknowns + found.residual])
-        first, second = signature.sides[: n // 2], signature.sides[n // 2 :]
+        first = signature.sides[: n // 2]
+        second = signature.sides[n // 2 :]
         if second != (tuple(-s for s in first) if odd else first):
             return None
         both = unknowns.reshape(2, n // 2, 2).copy()
@@ -145,30 +178,51 @@ class OneContactEquations(OrbitEquations):
         return np.concatenate([direction, -direction]) if self.signature.sides else direction
 
     def shorter_period(self, solution: Solution, within: float) -> int | None:
-        signature, n = self.signature, len(self.signature.sides)
+        signature = self.signature
+        n = len(self.signature.sides)
         for periods in range(1, signature.period):
             part = n * periods // signature.period
-            if signature.period % periods or n * periods % signature.period or part == 0 or signature.symmetric:
+            if (
+                signature.period % periods
+                or n * periods % signature.period
+                or part == 0
+                or signature.symmetric
+            ):
                 continue
             pairs = solution.unknowns.reshape(-1, part, 2).copy()
             pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
-            if signature.sides == signature.sides[:part] * len(pairs) and np.ptp(pairs, axis=0).max() < within:
+            if (
+                signature.sides == signature.sides[:part] * len(pairs)
+                and np.ptp(pairs, axis=0).max() < within
+            ):
                 return periods
         return None
 
-    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    def nearest(
+        self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
+    ) -> np.ndarray | None:
         """Begun at another impact, and shifted by whole forcing periods."""
-        target, signature = other.orbit.signature, self.signature
+        target = other.orbit.signature
+        signature = self.signature
         n = len(signature.sides)
-        if (n, signature.period, signature.symmetric) != (len(target.sides), target.period, target.symmetric):
+        if (n, signature.period, signature.symmetric) != (
+            len(target.sides),
+            target.period,
+            target.symmetric,
+        ):
             return None
         if n == 0:
             return unknowns if signature == target else None
-        pairs, best, least = unknowns.reshape(n, 2), None, math.inf
+        pairs = unknowns.reshape(n, 2)
+        best = None
+        least = math.inf
         goal = other.solution.unknowns.reshape(n, 2)
         once = [np.array([turn * self.closing, 0.0]) for turn in range(3)]
-        later = np.concatenate([pairs + shift for shift in once])  # the impacts of three (half) periods
-        next_sides = tuple(-side for side in signature.sides) if signature.symmetric else signature.sides
+        # the impacts of three (half) periods
+        later = np.concatenate([pairs + shift for shift in once])
+        next_sides = (
+            tuple(-side for side in signature.sides) if signature.symmetric else signature.sides
+        )
         sides = signature.sides + next_sides + signature.sides
         for turn in range(n * (2 if signature.symmetric else 1)):
             if sides[turn : turn + n] != target.sides:
@@ -177,7 +231,8 @@ class OneContactEquations(OrbitEquations):
             rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
             distance = float(np.abs(rolled - goal).max())
             if distance < least:
-                best, least = rolled.ravel(), distance
+                best = rolled.ravel()
+                least = distance
         return best
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
@@ -191,17 +246,24 @@ class OneContactEquations(OrbitEquations):
 
     def touched(self, special: Zero) -> tuple[Signature, np.ndarray] | None:
         point = special.point
-        if point.orbit.slowest < TOLERANCES.touch:  # its own signature has the impact, and the gap has a minimum
+        # its own signature has the impact, and the gap has a minimum
+        if point.orbit.slowest < TOLERANCES.touch:
             return point.orbit.signature, point.solution.unknowns
         equations, unknowns = inserted(point)
         return equations.signature, unknowns
 
     def evaluate(
-        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+        self,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool = False,
+        *,
+        later: np.ndarray | None = None,
     ) -> OrbitEvaluation | None:
         """The equations at a point, or None where the motion cannot be followed.
 
-        `later` are the unknowns asked for at the end of the period, if they differ from those at its beginning.
+        `later` are the unknowns asked for at the end of the period, if they differ from those at
+        its beginning.
         """
         frequency, later = self.frequency(values), unknowns if later is None else later
         if not frequency > 0.0:
@@ -213,23 +275,43 @@ class OneContactEquations(OrbitEquations):
         if not self.signature.sides:
             return self._shooting(later, frequency, followed)
         following = np.empty(len(segments.spans))
-        following[:-1], following[-1] = unknowns[3::2], later[1]
+        following[:-1] = unknowns[3::2]
+        following[-1] = later[1]
         return self._crossing(following, frequency, segments, followed)
 
-    def carried(self, state: np.ndarray, begin: float, end: float, values: np.ndarray) -> np.ndarray | None:
-        """The state at phase `end` of the smooth motion without impacts from a state at phase `begin`."""
+    def carried(
+        self, state: np.ndarray, begin: float, end: float, values: np.ndarray
+    ) -> np.ndarray | None:
+        """The state at phase `end` of the smooth motion without impacts from a state at phase
+        `begin`.
+        """
         frequency = self.frequency(values)
-        spans, sides = np.array([[begin / frequency, end / frequency, 0.0]]), np.array([[0, *self._along()]])
+        spans = np.array([[begin / frequency, end / frequency, 0.0]])
+        sides = np.array([[0, *self._along()]])
         followed = self.follow_segments(Segments(spans, sides, state.reshape(1, -1)), values)
-        return None if followed is None else followed.ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * self.own]
+        return (
+            None
+            if followed is None
+            else followed.ends[
+                0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * self.own
+            ]
+        )
 
-    def follow_segments(self, segments: Segments, values: np.ndarray, with_extremes: bool = False) -> FollowedSegments | None:
-        """The smooth motion along segments, with its extremes if asked for; None where a segment cannot be followed."""
+    def follow_segments(
+        self, segments: Segments, values: np.ndarray, with_extremes: bool = False
+    ) -> FollowedSegments | None:
+        """The smooth motion along segments, with its extremes if asked for; None where a segment
+        cannot be followed.
+        """
         parameters = self._values.copy()
         parameters[self._places] = values
         env, functions = self._run.structure.prepare(parameters, self._records)
         followed = self._follower.follow_segments((env, functions), segments, with_extremes)
-        return None if followed is None else FollowedSegments(*followed, np.sign(functions.geometry[1:]))
+        return (
+            None
+            if followed is None
+            else FollowedSegments(*followed, np.sign(functions.geometry[1:]))
+        )
 
     def _segments(self, unknowns: np.ndarray, later: np.ndarray, frequency: float) -> Segments:
         """The segments between the impacts, the last one up to the first impact of the next period."""
@@ -239,7 +321,8 @@ class OneContactEquations(OrbitEquations):
             return Segments(spans, self._sides, unknowns.reshape(1, -1).copy())
         spans = np.empty((n, 3))
         spans[:, 0] = unknowns[::2]
-        spans[:-1, 1], spans[-1, 1] = unknowns[2::2], later[0] + self.closing
+        spans[:-1, 1] = unknowns[2::2]
+        spans[-1, 1] = later[0] + self.closing
         spans[:, :2] /= frequency
         spans[:, 2] = unknowns[1::2]
         return Segments(spans, self._sides, np.zeros((n, 2)))
@@ -247,7 +330,8 @@ class OneContactEquations(OrbitEquations):
     @cached_property
     def _sides(self) -> np.ndarray:
         """The sides before and along each segment, (n, 2)."""
-        sides, along = self.signature.sides, self._along()
+        sides = self.signature.sides
+        along = self._along()
         return np.array(list(zip(sides or (0,), along, strict=True)), dtype=np.int64)
 
     @cached_property
@@ -259,28 +343,45 @@ class OneContactEquations(OrbitEquations):
         """The side of each segment; 0 stands for all sides, where the contact is passed through."""
         return (0,) if self.passes_contact else self.signature.along()
 
-    def _shooting(self, later: np.ndarray, frequency: float, followed: FollowedSegments) -> OrbitEvaluation:
-        own, sign = self.own, -1.0 if self.signature.symmetric else 1.0
+    def _shooting(
+        self, later: np.ndarray, frequency: float, followed: FollowedSegments
+    ) -> OrbitEvaluation:
+        own = self.own
+        sign = -1.0 if self.signature.symmetric else 1.0
         ends, columns, extremes, _ = followed
         state = ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * own]
         rates = ends[0, SegmentValue.FIRST_STATE + own : SegmentValue.FIRST_STATE + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
         if FREQUENCY in self.paths:
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
-        here, there, end = sign * columns[:, : 2 * own, : 2 * own], -np.eye(2 * own)[None], sign * state
+        here = sign * columns[:, : 2 * own, : 2 * own]
+        there = -np.eye(2 * own)[None]
+        end = sign * state
         here[:, self.following] = parameters[self.following] = end[self.following] = 0.0
         return OrbitEvaluation(end - later, here, there, parameters, ends, extremes)
 
     def _crossing(
-        self, following: np.ndarray, frequency: float, segments: Segments, followed: FollowedSegments
+        self,
+        following: np.ndarray,
+        frequency: float,
+        segments: Segments,
+        followed: FollowedSegments,
     ) -> OrbitEvaluation:
-        """The equations of the impacts at the ends of the segments, at which the gap closes with the speeds `following`."""
-        spans, (ends, columns, extremes, rates) = segments.spans, followed
-        n, count = len(spans), len(self.paths)
+        """The equations of the impacts at the ends of the segments, at which the gap closes with
+        the speeds `following`.
+        """
+        spans = segments.spans
+        (ends, columns, extremes, rates) = followed
+        n = len(spans)
+        count = len(self.paths)
         sign = rates[self._rate_of]
-        residual, here, there = np.empty((n, 2)), np.empty((n, 2, 2)), np.empty((n, 2, 2))
+        residual = np.empty((n, 2))
+        here = np.empty((n, 2, 2))
+        there = np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
         place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
         request = (spans, sign, following, float(frequency), place)
         load_segments()[1](request, (ends, columns, extremes), (residual, here, there, parameters))
-        return OrbitEvaluation(residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes)
+        return OrbitEvaluation(
+            residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes
+        )

@@ -1,4 +1,6 @@
-"""What the modes of a motion are, and a motion sampled so densely in each of its steps that all extrema can be found."""
+"""What the modes of a motion are, and a motion sampled so densely in each of its steps that all
+extrema can be found.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,15 @@ import numpy as np
 from saltus.flow import EventCode, EventKind, Motion, contact_pull, modes_of
 from saltus.systems import System, reactions, stick_margins
 
-SAMPLES = 33  # in each step; minima of parabolas through them have errors of the fourth power of their distance
+# in each step; minima of parabolas through them have errors of the fourth power of their distance
+SAMPLES = 33
 NEWTON_STEPS = 4  # from the largest sample of a coordinate to its extremum; each squares the error
-NARROWER = (0.3, 1e-3)  # distances between the instants at which a force is evaluated near its least sample, in those of samples
+# distances between the instants at which a force is evaluated near its least sample, in those of
+# samples
+NARROWER = (0.3, 1e-3)
 MOST_ORDER = 24  # the highest order of a step's series
-# Events nearer to each other than this share of the period happen at one instant, and steps between them are left out.
+# Events nearer to each other than this share of the period happen at one instant, and steps between
+# them are left out.
 ONE_INSTANT = 1e-9
 DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
 
@@ -29,7 +35,9 @@ BENDS = (ORDERS * (ORDERS - 1))[:, None] * SHARES ** np.maximum(ORDERS - 2, 0)[:
 
 
 class Group(NamedTuple):
-    """Contacts and frictions that act on one another: their bits in an event's `parts`, and in its `mode` less 1."""
+    """Contacts and frictions that act on one another: their bits in an event's `parts`, and in its
+    `mode` less 1.
+    """
 
     parts: int
     modes: int
@@ -45,13 +53,17 @@ class GapAlong(NamedTuple):
 
 
 class SideModes:
-    """How motions on the sides of one contact, or without contacts, are read: their numbers `side`, their events and gaps."""
+    """How motions on the sides of one contact, or without contacts, are read: their numbers `side`,
+    their events and gaps.
+    """
 
     def __init__(self, system: System) -> None:
         self.system = system
 
     def needs_whole(self, motion: Motion) -> bool:
-        """Whether equations from event to event are not enough: where it rests, or where parts may hold single coordinates."""
+        """Whether equations from event to event are not enough: where it rests, or where parts may
+        hold single coordinates.
+        """
         return len(motion.events.of(EventKind.REST)) > 0
 
     def numbers(self, side: np.ndarray) -> np.ndarray:
@@ -71,8 +83,8 @@ class SideModes:
         return []
 
     def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
-        """The mirror images of the parts and the mode of an event; `images` are the numbers of the images of contacts and
-        frictions."""
+        """The mirror images of the parts and the mode of an event; `images` are the numbers of the
+        images of contacts and frictions."""
         return parts, 4 - mode
 
     def groups(self, position: Any) -> tuple[Group, ...]:
@@ -80,48 +92,72 @@ class SideModes:
         return (Group(1, 3),)
 
     def codes(self, motion: Motion) -> np.ndarray:
-        """The kinds of the events, and the contacts and frictions that act as bits, (n, 2). A single contact is the first bit,
-        and its rest is that of one that is held."""
+        """The kinds of the events, and the contacts and frictions that act as bits, (n, 2). A
+        single contact is the first bit, and its rest is that of one that is held."""
         kinds = motion.events.codes[:, 0]
-        return np.column_stack([np.where(kinds == EventCode.REST, EventCode.HELD, kinds), np.ones(len(kinds), int)])
+        return np.column_stack(
+            [np.where(kinds == EventCode.REST, EventCode.HELD, kinds), np.ones(len(kinds), int)]
+        )
 
     def impact_speeds(self, motion: Motion) -> np.ndarray:
         """The least speed at which each impact closes one of its contacts, (n,)."""
         return np.asarray(np.abs(motion.impacts.velocity_before))
 
     def listed(self, motion: Motion) -> np.ndarray:
-        """Times and speeds of the impacts, (n, 2); if several contacts close at one instant, each has its own row."""
+        """Times and speeds of the impacts, (n, 2); if several contacts close at one instant, each
+        has its own row.
+        """
         return np.column_stack([motion.impacts.time, np.abs(motion.impacts.velocity_before)])
 
-    def rests(self, events: Sequence[Any], times: Sequence[float], period: float) -> list[tuple[float, float]]:
-        """When a motion with these events, of a period, leaves each rest at a single contact, and when it comes to the next."""
-        landed, pairs = [time for event, time in zip(events, times, strict=True) if event.kind == EventCode.HELD], []
+    def rests(
+        self, events: Sequence[Any], times: Sequence[float], period: float
+    ) -> list[tuple[float, float]]:
+        """When a motion with these events, of a period, leaves each rest at a single contact, and
+        when it comes to the next.
+        """
+        landed = [
+            time for event, time in zip(events, times, strict=True) if event.kind == EventCode.HELD
+        ]
+        pairs = []
         for event, time in zip(events, times, strict=True):
             if event.kind == EventCode.RELEASE:
-                pairs.append((time, min(later if later > time else later + period for later in landed)))
+                pairs.append(
+                    (time, min(later if later > time else later + period for later in landed))
+                )
         return pairs
 
     def gaps(self, side: np.ndarray) -> list[GapAlong]:
         """The gaps of the contacts; that of a single contact on each side."""
         one = self.system.one_contact
-        return [GapAlong(0, one.inward(number), float(one.contact), side == number) for number in one.sides]
+        return [
+            GapAlong(0, one.inward(number), float(one.contact), side == number)
+            for number in one.sides
+        ]
 
     def grazed(self, side: np.ndarray) -> list[GapAlong]:
-        """The gaps whose least value is a quantity of an orbit; where one of several contacts closes, its events change."""
+        """The gaps whose least value is a quantity of an orbit; where one of several contacts
+        closes, its events change.
+        """
         return self.gaps(side)
 
     def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
-        """The place of the coordinate of each friction, the speed of its ground, and the direction in which it slides."""
+        """The place of the coordinate of each friction, the speed of its ground, and the direction
+        in which it slides.
+        """
         return []
 
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
-        """Where coordinates are held, and the function of (model, t, q, v, a, load) whose values then are positive."""
+        """Where coordinates are held, and the function of (model, t, q, v, a, load) whose values
+        then are positive.
+        """
         pulls = [contact_pull(self.system, one) for one in self.system.one_contact.sides]
         return [([side == 0 for _ in pulls], lambda model, t, *_: [-pull(t) for pull in pulls])]
 
 
 class ContactModes(SideModes):
-    """How motions with several contacts or frictions are read, whose modes are 1 plus the bits that `modes_of` reads."""
+    """How motions with several contacts or frictions are read, whose modes are 1 plus the bits that
+    `modes_of` reads.
+    """
 
     def needs_whole(self, motion: Motion) -> bool:
         return True
@@ -140,8 +176,10 @@ class ContactModes(SideModes):
         return modes_of(self.system.model, side)[1]
 
     def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
-        closed, slides = self.closed(np.array(mode)), self.slides(np.array(mode))
-        count, found = len(closed), 1
+        closed = self.closed(np.array(mode))
+        slides = self.slides(np.array(mode))
+        count = len(closed)
+        found = 1
         for is_closed, image in zip(closed, images[:count], strict=True):
             found += int(is_closed) << image
         for direction, image in zip(slides, images[count:], strict=True):
@@ -149,18 +187,30 @@ class ContactModes(SideModes):
         return sum(1 << image for i, image in enumerate(images) if parts >> i & 1), found
 
     def groups(self, position: Any) -> tuple[Group, ...]:
-        """The contacts of each group if the mass matrix couples no coordinates of different groups; else one group of all."""
-        model, known = self.system.contact_model, self.system.contact_model
-        contacts, frictions = known.contacts, len(known.frictions) + len(known.surfaces)
-        everything = (Group((1 << len(contacts) + frictions) - 1, (1 << len(contacts) + 2 * frictions) - 1),)
+        """The contacts of each group if the mass matrix couples no coordinates of different groups;
+        else one group of all.
+        """
+        model = self.system.contact_model
+        known = self.system.contact_model
+        contacts = known.contacts
+        frictions = len(known.frictions) + len(known.surfaces)
+        everything = (
+            Group((1 << len(contacts) + frictions) - 1, (1 << len(contacts) + 2 * frictions) - 1),
+        )
         names = dict.fromkeys(contact.group for contact in contacts)
         if len(names) < 2 or frictions:
             return everything
         mass = np.asarray(model.mass_matrix(position), dtype=float)
-        places = [[model.coordinates.index(c.coordinate) for c in contacts if c.group == name] for name in names]
+        places = [
+            [model.coordinates.index(c.coordinate) for c in contacts if c.group == name]
+            for name in names
+        ]
         if any(mass[np.ix_(own, other)].any() for own, other in combinations(places, 2)):
             return everything
-        bits = [sum(1 << i for i, contact in enumerate(contacts) if contact.group == name) for name in names]
+        bits = [
+            sum(1 << i for i, contact in enumerate(contacts) if contact.group == name)
+            for name in names
+        ]
         return tuple(Group(own, own) for own in bits)
 
     def codes(self, motion: Motion) -> np.ndarray:
@@ -171,29 +221,40 @@ class ContactModes(SideModes):
 
     def listed(self, motion: Motion) -> np.ndarray:
         """Without those of accumulations."""
-        impacts, speeds = motion.impacts, self._closing_speeds(motion.impacts)
+        impacts = motion.impacts
+        speeds = self._closing_speeds(motion.impacts)
         contact, impact = np.nonzero((speeds > DYING) & np.isfinite(speeds))
         found = np.column_stack([impacts.time[impact], speeds[contact, impact]])
         return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
     def _closing_speeds(self, impacts: Any) -> np.ndarray:
-        """The speed at which each contact is closed by each impact, (contacts, n); inf where it is not."""
-        names, contacts = self.system.model.coordinates, self.system.contact_model.contacts
+        """The speed at which each contact is closed by each impact, (contacts, n); inf where it is
+        not.
+        """
+        names = self.system.model.coordinates
+        contacts = self.system.contact_model.contacts
         speeds = np.full((len(contacts), len(impacts)), math.inf)
         for i, contact in enumerate(contacts):
             rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
             speeds[i] = np.where(impacts.side >> i & 1 == 1, rates, math.inf)
         return speeds
 
-    def rests(self, events: Sequence[Any], times: Sequence[float], period: float) -> list[tuple[float, float]]:
+    def rests(
+        self, events: Sequence[Any], times: Sequence[float], period: float
+    ) -> list[tuple[float, float]]:
         return []
 
     def gaps(self, side: np.ndarray) -> list[GapAlong]:
-        names, known = self.system.model.coordinates, self.system.contact_model
+        names = self.system.model.coordinates
+        known = self.system.contact_model
         found = zip(known.contacts, self.closed(side), strict=True)
-        gaps = [GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed) for c, closed in found]
+        gaps = [
+            GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed)
+            for c, closed in found
+        ]
         for surface, beside in zip(known.surfaces, modes_of(known, side)[2], strict=True):
-            place, position = names.index(surface.coordinate), float(surface.position)
+            place = names.index(surface.coordinate)
+            position = float(surface.position)
             gaps += [GapAlong(place, sign, position, beside == sign) for sign in (1.0, -1.0)]
         return gaps
 
@@ -201,15 +262,26 @@ class ContactModes(SideModes):
         return []
 
     def slidings(self, side: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
-        names, pairs = self.system.model.coordinates, zip(self.system.contact_model.frictions, self.slides(side), strict=True)
-        return [(names.index(f.coordinate), float(f.ground_speed), np.where(s == 2, 0, s)) for f, s in pairs]
+        names = self.system.model.coordinates
+        pairs = zip(self.system.contact_model.frictions, self.slides(side), strict=True)
+        return [
+            (names.index(f.coordinate), float(f.ground_speed), np.where(s == 2, 0, s))
+            for f, s in pairs
+        ]
 
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
-        known, closed = self.system.contact_model, self.closed(side)
+        known = self.system.contact_model
+        closed = self.closed(side)
         sticks = list[np.ndarray]()
         for friction, direction in zip(known.frictions, self.slides(side), strict=True):
-            leans = [own for c, own in zip(known.contacts, closed, strict=True) if c.coordinate == friction.coordinate]
-            sticks += [(direction == 0) & ~np.any([*leans, np.zeros_like(direction, dtype=bool)], axis=0)] * 2
+            leans = [
+                own
+                for c, own in zip(known.contacts, closed, strict=True)
+                if c.coordinate == friction.coordinate
+            ]
+            sticks += [
+                (direction == 0) & ~np.any([*leans, np.zeros_like(direction, dtype=bool)], axis=0)
+            ] * 2
         return [(closed, reactions), (sticks, stick_margins)]
 
 
@@ -220,8 +292,8 @@ def modes_in(system: System) -> SideModes:
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """The steps of a motion with the states at evenly spaced instants of each step, its ends included. `position`, `velocity` and
-    `acceleration` are (coordinates, steps, samples)."""
+    """The steps of a motion with the states at evenly spaced instants of each step, its ends
+    included. `position`, `velocity` and `acceleration` are (coordinates, steps, samples)."""
 
     motion: Motion
     series: np.ndarray
@@ -239,47 +311,91 @@ class SampledMotion:
         dense = motion.dense
         assert dense is not None
         steps = np.flatnonzero(dense.length > ONE_INSTANT * (motion.time - motion.start))
-        length, count = dense.length[steps, None, None], dense.series.shape[2]
+        length = dense.length[steps, None, None]
+        count = dense.series.shape[2]
         scaled = (dense.series[steps] * length ** ORDERS[:count]).transpose(1, 0, 2)
-        position, velocity, acceleration = (scaled @ table[:count] for table in (POWERS, SLOPES, BENDS))
-        tau, start, each = length[:, 0] * SHARES, dense.start[steps], length[:, 0]
+        position, velocity, acceleration = (
+            scaled @ table[:count] for table in (POWERS, SLOPES, BENDS)
+        )
+        tau = length[:, 0] * SHARES
+        start = dense.start[steps]
+        each = length[:, 0]
         begins = np.isin(start, motion.events.times)
         velocity, acceleration, time = velocity / each, acceleration / each**2, start[:, None] + tau
-        return cls(motion, dense.series[steps], tau, time, position, velocity, acceleration, dense.side[steps], begins)
+        return cls(
+            motion,
+            dense.series[steps],
+            tau,
+            time,
+            position,
+            velocity,
+            acceleration,
+            dense.side[steps],
+            begins,
+        )
 
     def only(self, steps: np.ndarray) -> SampledMotion:
         """The samples of some of the steps."""
-        position, velocity, acceleration = self.position[:, steps], self.velocity[:, steps], self.acceleration[:, steps]
-        series, tau, side = self.series[steps], self.tau[steps], self.side[steps]
+        position = self.position[:, steps]
+        velocity = self.velocity[:, steps]
+        acceleration = self.acceleration[:, steps]
+        series = self.series[steps]
+        tau = self.tau[steps]
+        side = self.side[steps]
         return SampledMotion(
-            self.motion, series, tau, self.time[steps], position, velocity, acceleration, side, self.begins[steps]
+            self.motion,
+            series,
+            tau,
+            self.time[steps],
+            position,
+            velocity,
+            acceleration,
+            side,
+            self.begins[steps],
         )
 
     def within_step(self, step: int, tau: np.ndarray) -> SampledMotion:
         """One step at other instants since its start."""
         c = self.series[step]
-        powers, orders = np.vander(tau, c.shape[1], increasing=True).T, ORDERS[: c.shape[1]]
-        position, velocity = (c @ powers)[:, None], ((c * orders)[:, 1:] @ powers[:-1])[:, None]
+        powers = np.vander(tau, c.shape[1], increasing=True).T
+        orders = ORDERS[: c.shape[1]]
+        position = (c @ powers)[:, None]
+        velocity = ((c * orders)[:, 1:] @ powers[:-1])[:, None]
         acceleration = ((c * orders * (orders - 1))[:, 2:] @ powers[:-2])[:, None]
-        time, one = (self.time[step, :1] - self.tau[step, :1] + tau)[None], [step]
-        side, begins = self.side[one], self.begins[one]
-        return SampledMotion(self.motion, c[None], tau[None], time, position, velocity, acceleration, side, begins)
+        time = (self.time[step, :1] - self.tau[step, :1] + tau)[None]
+        one = [step]
+        side = self.side[one]
+        begins = self.begins[one]
+        return SampledMotion(
+            self.motion, c[None], tau[None], time, position, velocity, acceleration, side, begins
+        )
 
     def _state(self) -> tuple[Any, Any, Any]:
         """Coordinates, velocities and accelerations as a model takes them."""
-        q, v, a = (x[0] if len(x) == 1 else tuple(x) for x in (self.position, self.velocity, self.acceleration))
+        q, v, a = (
+            x[0] if len(x) == 1 else tuple(x)
+            for x in (self.position, self.velocity, self.acceleration)
+        )
         return q, v, a
 
     def lowest(self) -> float:
         """The least value of any coordinate."""
-        coordinate, step, sample = np.unravel_index(int(np.argmin(self.position)), self.position.shape)
-        turned = _turned(self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step])
+        coordinate, step, sample = np.unravel_index(
+            int(np.argmin(self.position)), self.position.shape
+        )
+        turned = _turned(
+            self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step]
+        )
         return min(turned, float(self.position[coordinate, step, sample]))
 
     def highest(self) -> float:
         """The largest value of any coordinate."""
-        coordinate, step, sample = np.unravel_index(int(np.argmax(self.position)), self.position.shape)
-        turned = _turned(-self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step])
+        coordinate, step, sample = np.unravel_index(
+            int(np.argmax(self.position)), self.position.shape
+        )
+        turned = _turned(
+            -self.series[step, coordinate], float(self.tau[step, sample]), self.tau[step]
+        )
         return -min(turned, -float(self.position[coordinate, step, sample]))
 
     def margins(self) -> dict[str, float]:
@@ -289,7 +405,11 @@ class SampledMotion:
         sides = modes_in(system).equation_sides(self.side)
         for side in system.model.every_side:
             own = self.only(np.flatnonzero(sides == side))
-            values = system.model.margins(own.time, *own._state(), side, system.load) if own.time.size else {}
+            values = (
+                system.model.margins(own.time, *own._state(), side, system.load)
+                if own.time.size
+                else {}
+            )
             for name, value in values.items():
                 least[name] = min(least[name], _least(np.broadcast_to(value, own.time.shape)))
         return least
@@ -308,11 +428,13 @@ class SampledMotion:
         return float(min(least))
 
     def nearest_touch(self) -> float:
-        """How near the motion comes to a further change of its mode: the least of the inner minima of the gaps of open contacts
-        and of the distances from surfaces, the speeds of sliding frictions, the reactions of closed contacts, and the forces
-        that sticking frictions still lack to slip.
+        """How near the motion comes to a further change of its mode: the least of the inner minima
+        of the gaps of open contacts and of the distances from surfaces, the speeds of sliding
+        frictions, the reactions of closed contacts, and the forces that sticking frictions still
+        lack to slip.
 
-        For reactions and sticking frictions the value just after an event counts too. inf without such minima.
+        For reactions and sticking frictions the value just after an event counts too. inf without
+        such minima.
         """
         modes = modes_in(self.motion.system)
         least = [self._lowest_of(modes.gaps(self.side))]
@@ -327,24 +449,36 @@ class SampledMotion:
         return float(min(least))
 
     def _turning_of(self, course: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
-        """The least of the minima of series (steps, orders), where their rates turn from negative to positive in chosen steps."""
-        low, high = rates[:, :-1], rates[:, 1:]
+        """The least of the minima of series (steps, orders), where their rates turn from negative
+        to positive in chosen steps.
+        """
+        low = rates[:, :-1]
+        high = rates[:, 1:]
         turns = (low < 0.0) & (high >= 0.0) & chosen[:, None]
-        turns[self.begins, 0] = False  # after an event the value leaves 0, and the sign of its rate is rounding
+        # after an event the value leaves 0, and the sign of its rate is rounding
+        turns[self.begins, 0] = False
         step, sample = np.nonzero(turns)
         if not step.size:
             return np.inf
-        begin, end = self.tau[step, sample], self.tau[step, sample + 1]
+        begin = self.tau[step, sample]
+        end = self.tau[step, sample + 1]
         when = begin + low[step, sample] / (low[step, sample] - high[step, sample]) * (end - begin)
         powers = when[:, None] ** ORDERS[: course.shape[1]]
         least = int(np.argmin((course[step] * powers).sum(axis=1)))
-        return _turned(course[step[least]], float(when[least]), np.array([begin[least], end[least]]))
+        return _turned(
+            course[step[least]], float(when[least]), np.array([begin[least], end[least]])
+        )
 
-    def _dip(self, steps: np.ndarray, chosen: list[np.ndarray], forces: Callable[..., list[Any]]) -> float:
-        """The least inner minimum of any of several forces within stretches of successive chosen steps, or the force just after
-        the event with which a stretch begins, if that is less. `steps` are the numbers of the steps in the whole motion.
+    def _dip(
+        self, steps: np.ndarray, chosen: list[np.ndarray], forces: Callable[..., list[Any]]
+    ) -> float:
+        """The least inner minimum of any of several forces within stretches of successive chosen
+        steps, or the force just after the event with which a stretch begins, if that is less.
+        `steps` are the numbers of the steps in the whole motion.
         """
-        least, lowest, where = np.inf, np.inf, (0, 0, 0)
+        least = np.inf
+        lowest = np.inf
+        where = (0, 0, 0)
         for number, (values, mask) in enumerate(zip(self._forces(forces), chosen, strict=True)):
             follows = np.append(False, mask[:-1] & (np.diff(steps) == 1))
             stretch = np.cumsum(mask & ~follows)
@@ -352,49 +486,80 @@ class SampledMotion:
                 rows = np.flatnonzero(mask & (stretch == each))
                 course = np.append(values[rows, :-1].ravel(), values[rows[-1], -1])
                 least = min(least, float(course[0])) if self.begins[rows[0]] else least
-                inner = 1 + np.flatnonzero((course[1:-1] <= course[:-2]) & (course[1:-1] < course[2:]))
+                inner = 1 + np.flatnonzero(
+                    (course[1:-1] <= course[:-2]) & (course[1:-1] < course[2:])
+                )
                 if inner.size and course[inner].min() < lowest:
                     place = int(inner[np.argmin(course[inner])])
                     row, sample = divmod(place, SAMPLES - 1)
-                    lowest, where = float(course[place]), (number, int(rows[row]), sample)
+                    lowest = float(course[place])
+                    where = (number, int(rows[row]), sample)
         return min(least, lowest if lowest == np.inf else self._narrowed(*where, forces))
 
     def _forces(self, forces: Callable[..., list[Any]]) -> list[np.ndarray]:
         """The forces that the function `forces` gives along the samples, each (steps, samples)."""
-        system, given = self.motion.system, (self.time, *self._state()[:2])
+        system = self.motion.system
+        given = (self.time, *self._state()[:2])
         model: Any = system.model
-        more = ((), model.forces_along(*given, system.load, modes_in(system).closed(self.side))) if system.dependent else ()
+        more = (
+            ((), model.forces_along(*given, system.load, modes_in(system).closed(self.side)))
+            if system.dependent
+            else ()
+        )
         values = forces(model, *given, list(self.acceleration), system.load, *more)
-        return [np.broadcast_to(np.asarray(value, dtype=float), self.time.shape) for value in values]
+        return [
+            np.broadcast_to(np.asarray(value, dtype=float), self.time.shape) for value in values
+        ]
 
-    def _narrowed(self, number: int, step: int, sample: int, forces: Callable[..., list[Any]]) -> float:
-        """The minimum of a force near a sample, from parabolas through three instants that lie ever closer together."""
-        middle, apart, least = float(self.tau[step, sample]), float(self.tau[step, 1]), np.inf
+    def _narrowed(
+        self, number: int, step: int, sample: int, forces: Callable[..., list[Any]]
+    ) -> float:
+        """The minimum of a force near a sample, from parabolas through three instants that lie ever
+        closer together.
+        """
+        middle = float(self.tau[step, sample])
+        apart = float(self.tau[step, 1])
+        least = np.inf
         for share in NARROWER:
             offset = share * apart
             instants = self.within_step(step, middle + offset * np.array([-1.0, 0.0, 1.0]))
             low, here, high = instants._forces(forces)[number][0]
-            bend, slope = high - 2.0 * here + low, 0.5 * (high - low)
+            bend = high - 2.0 * here + low
+            slope = 0.5 * (high - low)
             ahead = float(np.clip(-slope / bend, -1.0 / share, 1.0 / share)) if bend > 0.0 else 0.0
             middle, least = middle + ahead * offset, here + 0.5 * slope * ahead
         return float(least)
 
 
 def _turned(c: np.ndarray, t: float, between: np.ndarray) -> float:
-    """The minimum of a series, by Newton's method on its slope from an instant nearby, within the times `between`."""
+    """The minimum of a series, by Newton's method on its slope from an instant nearby, within the
+    times `between`.
+    """
     orders = ORDERS[: len(c)]
-    slope, bend = (c * orders)[1:], (c * orders * (orders - 1))[2:]
+    slope = (c * orders)[1:]
+    bend = (c * orders * (orders - 1))[2:]
     for _ in range(NEWTON_STEPS):
         powers = t**orders
         curved = float(bend @ powers[:-2])
-        t = min(max(t - float(slope @ powers[:-1]) / curved, float(between[0])), float(between[-1])) if curved > 0.0 else t
+        t = (
+            min(max(t - float(slope @ powers[:-1]) / curved, float(between[0])), float(between[-1]))
+            if curved > 0.0
+            else t
+        )
     return float(c @ t**orders)
 
 
 def _least(values: np.ndarray) -> float:
-    """The least value along samples (..., samples), with the minima of the parabolas through each three of them."""
-    low, middle, high = values[..., :-2], values[..., 1:-1], values[..., 2:]
-    bend, slope = high - 2.0 * middle + low, 0.5 * (high - low)
+    """The least value along samples (..., samples), with the minima of the parabolas through each
+    three of them.
+    """
+    low = values[..., :-2]
+    middle = values[..., 1:-1]
+    high = values[..., 2:]
+    bend = high - 2.0 * middle + low
+    slope = 0.5 * (high - low)
     with np.errstate(divide="ignore", invalid="ignore"):
-        turned = np.where((bend > 0.0) & (np.abs(slope) < bend), middle - 0.5 * slope**2 / bend, middle)
+        turned = np.where(
+            (bend > 0.0) & (np.abs(slope) < bend), middle - 0.5 * slope**2 / bend, middle
+        )
     return float(min(values.min(), turned.min()))

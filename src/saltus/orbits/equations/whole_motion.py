@@ -1,9 +1,10 @@
-"""Orbits that are followed through all of their events, x = Phi(x): those with accumulations of impacts, or with dry friction.
+"""Orbits that are followed through all of their events, x = Phi(x): those with accumulations of
+impacts, or with dry friction.
 
-The unknowns are the state at a section, a phase of the load at which no event happens. The motion Phi has whatever events it
-has, and its derivatives are those of `sensitivities`, in which an accumulation of impacts is a single map with the derivatives of
-its end. Derivatives to coordinates that contacts hold at the section are 0, and so are those to the speed of a sticking
-coordinate.
+The unknowns are the state at a section, a phase of the load at which no event happens. The motion
+Phi has whatever events it has, and its derivatives are those of `sensitivities`, in which an
+accumulation of impacts is a single map with the derivatives of its end. Derivatives to coordinates
+that contacts hold at the section are 0, and so are those to the speed of a sticking coordinate.
 """
 
 from __future__ import annotations
@@ -43,7 +44,13 @@ from saltus.orbits.branches.beyond_rest import last_release
 from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd
 from saltus.orbits.branches.symmetry import nearest
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Restart, Solution
+from saltus.orbits.equations.contract import (
+    MotionToRead,
+    OrbitEquations,
+    OrbitEvaluation,
+    Restart,
+    Solution,
+)
 from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
 from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
@@ -52,7 +59,8 @@ from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, image_of, substitute
 from saltus.taylor import FREQUENCY
 
-CLOSED = 1e-9  # A contact is closed at the section if its gap and the gap's rate are smaller than this there.
+# A contact is closed at the section if its gap and the gap's rate are smaller than this there.
+CLOSED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -60,17 +68,23 @@ class WholeMotionEvaluation(OrbitEvaluation):
     """The equations at one point, with the events along the motion."""
 
     events: EventSequence | None  # None if extremes were not asked for
-    middle: np.ndarray | None  # the state after half of the time; None if extremes were not asked for
+    # the state after half of the time; None if extremes were not asked for
+    middle: np.ndarray | None
 
 
 class WholeMotionEquations(OrbitEquations):
-    """The equations x = Phi(x) of a whole motion; for a symmetric orbit x is the mirror image of Phi(x) over half a period."""
+    """The equations x = Phi(x) of a whole motion; for a symmetric orbit x is the mirror image of
+    Phi(x) over half a period.
+    """
 
-    # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the predicted point.
+    # Where the map jumps, the corrector wanders; this is ten times the accepted distance from the
+    # predicted point.
     corrector_radius = 0.5
-    # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of events.
+    # What rounding leaves where multipliers are 1e8 to 1e9, as they become towards some changes of
+    # events.
     residual_floor = 1e-7
-    # The last place at which the equations were evaluated, with the result: they are often asked for again with the extremes.
+    # The last place at which the equations were evaluated, with the result: they are often asked
+    # for again with the extremes.
     _latest: tuple[np.ndarray, tuple[Motion, WholeMotionEvaluation] | None] | None = None
 
     @classmethod
@@ -78,16 +92,27 @@ class WholeMotionEquations(OrbitEquations):
         return signature.section is not None
 
     @classmethod
-    def read(cls, base: OrbitEquations, motion: MotionToRead) -> tuple[OrbitEquations, np.ndarray] | None:
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
         """With a section chosen along the motion, and the motion's state there."""
-        system, twice, periods = base.system, motion.twice, motion.periods
-        if not (modes_in(system).needs_whole(twice) and twice.phase_known) or twice.limit is not None:
+        system = base.system
+        twice = motion.twice
+        periods = motion.periods
+        if (
+            not (modes_in(system).needs_whole(twice) and twice.phase_known)
+            or twice.limit is not None
+        ):
             return None
         end = twice.start + motion.duration
         within = (twice.start < twice.events.times) & (twice.events.times < end)
         if not within.any() and 0 in twice.sliding.values():
-            raise MotionError("the motion sticks for good, as it may anywhere near, which is no orbit to follow")
-        if twice.stop is Stop.REST and not (len(twice.events) and twice.events[-1].time > 0.5 * (twice.start + twice.time)):
+            raise MotionError(
+                "the motion sticks for good, as it may anywhere near, which is no orbit to follow"
+            )
+        if twice.stop is Stop.REST and not (
+            len(twice.events) and twice.events[-1].time > 0.5 * (twice.start + twice.time)
+        ):
             raise MotionError(STAYS)
         phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
         return cls(base.given, Signature((), periods, section=phase), base.paths, base.tol), state
@@ -103,12 +128,15 @@ class WholeMotionEquations(OrbitEquations):
         return {**arguments_of(system, self.start_state(solution.unknowns, system)), "time": time}
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-        times, speeds = solution.evaluation.ends[:, 0], solution.evaluation.ends[:, 1]
+        times = solution.evaluation.ends[:, 0]
+        speeds = solution.evaluation.ends[:, 1]
         return times * self.frequency(solution.values), speeds
 
     def rests(self, solution: Solution) -> np.ndarray:
         found = events_of(solution.evaluation)
-        return np.array(modes_in(self.system).rests(found.events, found.times, found.period)).reshape(-1, 2)
+        return np.array(
+            modes_in(self.system).rests(found.events, found.times, found.period)
+        ).reshape(-1, 2)
 
     def counted_impacts(self, solution: Solution) -> int:
         return events_of(solution.evaluation).impact_count // (2 if self.signature.symmetric else 1)
@@ -117,7 +145,8 @@ class WholeMotionEquations(OrbitEquations):
         return math.inf
 
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
-        odd, unknowns = self.signature.period % 2, solution.unknowns
+        odd = self.signature.period % 2
+        unknowns = solution.unknowns
         if self.signature.symmetric or (odd and not mirrored):
             return None
         evaluation: Any = solution.evaluation
@@ -127,16 +156,25 @@ class WholeMotionEquations(OrbitEquations):
             return None if found is None else np.stack([unknowns, unknowns + found.residual])
         return np.stack([unknowns, image_of(self.system.model, middle) if odd else middle])
 
-    def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint) -> np.ndarray | None:
+    def nearest(
+        self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
+    ) -> np.ndarray | None:
         """At the section of `other`, in the forcing period in which it is nearest to its state."""
         target = other.orbit.signature
-        if target.section is None or (target.period, target.symmetric) != (self.signature.period, self.signature.symmetric):
+        if target.section is None or (target.period, target.symmetric) != (
+            self.signature.period,
+            self.signature.symmetric,
+        ):
             return None
         return self.state_at(target.section, unknowns, values, other.solution.unknowns)
 
     def at_section_of(self, point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
         place = None if point.curve.joins(other.curve) else nearest(point, point.place, other)
-        found = None if place is None else other.curve.known(*np.split(place, [other.curve.equations.size]))
+        found = (
+            None
+            if place is None
+            else other.curve.known(*np.split(place, [other.curve.equations.size]))
+        )
         return point if found is None else other.curve.with_tangent(found, other.tangent) or point
 
     def at_another_section(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
@@ -148,8 +186,9 @@ class WholeMotionEquations(OrbitEquations):
         return same_events(point)
 
     def accepts(self, ahead: OrbitPoint, cut: Callable[[], Cut | End | None]) -> bool:
-        """Not where multipliers grow without bound, as they do towards some changes of events: further steps would be rounding.
-        Nor if no change of events leads to the orbits ahead, which then belong to another branch."""
+        """Not where multipliers grow without bound, as they do towards some changes of events:
+        further steps would be rounding. Nor if no change of events leads to the orbits ahead, which
+        then belong to another branch."""
         return abs(ahead.orbit.multipliers[0]) <= STEEPEST and not isinstance(cut(), End)
 
     def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
@@ -170,7 +209,9 @@ class WholeMotionEquations(OrbitEquations):
     def first_step(self, point: OrbitPoint, ahead: OrbitPoint) -> float:
         return first_step(point, ahead)
 
-    def stalled(self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds) -> Cut | End | None:
+    def stalled(
+        self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds
+    ) -> Cut | End | None:
         """Events may change there, so that the branch turns round; or the system ends."""
         found = refused_beyond(point, step, bounds) or stalled_at(point, step, points)
         limit = None if found is not None else point.orbit.motion().limit
@@ -184,28 +225,41 @@ class WholeMotionEquations(OrbitEquations):
         return held_values(system, self._completed(unknowns, system), CLOSED)
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
-        """The state at the section, in which contacts that are closed, and frictions that stick, up to rounding do so exactly."""
+        """The state at the section, in which contacts that are closed, and frictions that stick, up
+        to rounding do so exactly.
+        """
         held = self.held(unknowns, system)
         state = self._completed(unknowns, system, held)
         for place, value in held.items():
             state[place] = value
         return state
 
-    def _completed(self, unknowns: np.ndarray, system: System, held: Iterable[int] = ()) -> np.ndarray:
-        """The unknowns, or a copy of them with the dependent sums that follow from them at the section (`InGapCoordinates`)."""
-        state, twin = unknowns.copy(), cast("Any", system)
+    def _completed(
+        self, unknowns: np.ndarray, system: System, held: Iterable[int] = ()
+    ) -> np.ndarray:
+        """The unknowns, or a copy of them with the dependent sums that follow from them at the
+        section (`InGapCoordinates`).
+        """
+        state = unknowns.copy()
+        twin = cast("Any", system)
         if not self.system.dependent:
             return state
         time = float(self.signature.section or 0.0) / twin.load.frequency
-        return np.asarray(twin.model.completed(time, twin.load, state, [place for place in held if place < self.own]))
+        return np.asarray(
+            twin.model.completed(
+                time, twin.load, state, [place for place in held if place < self.own]
+            )
+        )
 
     def _start_slopes(self, unknowns: np.ndarray, system: System) -> tuple[np.ndarray, np.ndarray]:
-        """The derivatives of the start state to the unknowns and to the parameters, at complex numbers, where sums follow from
-        other coordinates; those to what is held are 0."""
-        held, step = self.held(unknowns, system), 1e-100
+        """The derivatives of the start state to the unknowns and to the parameters, at complex
+        numbers, where sums follow from other coordinates; those to what is held are 0."""
+        held = self.held(unknowns, system)
+        step = 1e-100
         found = []
         for j, path in enumerate([*range(len(unknowns)), *self.paths]):
-            beside, twin = unknowns.astype(complex), system
+            beside = unknowns.astype(complex)
+            twin = system
             if path in self.paths:
                 twin = substitute(system, partial(_raised, path, 1j * step))
             else:
@@ -215,11 +269,20 @@ class WholeMotionEquations(OrbitEquations):
         return columns[:, : len(unknowns)], columns[:, len(unknowns) :]
 
     def evaluate(
-        self, unknowns: np.ndarray, values: np.ndarray, with_extremes: bool = False, *, later: np.ndarray | None = None
+        self,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        with_extremes: bool = False,
+        *,
+        later: np.ndarray | None = None,
     ) -> WholeMotionEvaluation | None:
         if later is not None:
             evaluation = self.evaluate(unknowns, values, with_extremes)
-            return None if evaluation is None else replace(evaluation, residual=evaluation.residual + unknowns - later)
+            return (
+                None
+                if evaluation is None
+                else replace(evaluation, residual=evaluation.residual + unknowns - later)
+            )
         place = np.append(unknowns, values)
         if self._latest is None or not np.array_equal(self._latest[0], place):
             self._latest = place, self._evaluated(unknowns, values)
@@ -228,9 +291,11 @@ class WholeMotionEquations(OrbitEquations):
             return None if found is None else found[1]
         motion, evaluation = found
         if evaluation.events is None:
-            sampled, half = SampledMotion.of(motion), motion.at(0.5 * (motion.start + motion.time))
+            sampled = SampledMotion.of(motion)
+            half = motion.at(0.5 * (motion.start + motion.time))
             events = sequence_of(motion, sampled, self.images if self.signature.symmetric else None)
-            middle, extremes = np.concatenate([np.atleast_1d(part) for part in half]), self._extremes(sampled)
+            middle = np.concatenate([np.atleast_1d(part) for part in half])
+            extremes = self._extremes(sampled)
             middle[self.following] = 0.0
             evaluation = replace(evaluation, extremes=extremes, events=events, middle=middle)
             self._latest = place, (motion, evaluation)
@@ -243,7 +308,9 @@ class WholeMotionEquations(OrbitEquations):
         try:
             system = self.system_at(values)
             state = self.start_state(unknowns, system)
-            request, run = self._request(system, state, float(self.signature.section or 0.0) / frequency, values, None)
+            request, run = self._request(
+                system, state, float(self.signature.section or 0.0) / frequency, values, None
+            )
             motion = follow(request, silent, run).motion
         except SaltusError:
             return None
@@ -254,9 +321,11 @@ class WholeMotionEquations(OrbitEquations):
         after[self.following] = 0.0
         return np.asarray(after - unknowns)
 
-    def _evaluated(self, unknowns: np.ndarray, values: np.ndarray) -> tuple[Motion, WholeMotionEvaluation] | None:
-        """The motion over the time that the equations cover, and the equations without extremes; None where the motion cannot be
-        followed."""
+    def _evaluated(
+        self, unknowns: np.ndarray, values: np.ndarray
+    ) -> tuple[Motion, WholeMotionEvaluation] | None:
+        """The motion over the time that the equations cover, and the equations without extremes;
+        None where the motion cannot be followed."""
         frequency = self.frequency(values)
         if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
             return None
@@ -264,39 +333,70 @@ class WholeMotionEquations(OrbitEquations):
         try:
             system = self.system_at(values)
             state = self.start_state(unknowns, system)
-            found = derivatives_of(*self._request(system, state, phase / frequency, values, self.paths))
+            found = derivatives_of(
+                *self._request(system, state, phase / frequency, values, self.paths)
+            )
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
-        motion, parameters = found.motion, found.parameters.copy()
+        motion = found.motion
+        parameters = found.parameters.copy()
         if motion.limit is not None or found.undefined is not None:
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
             before = image_of(system.model, rates) if self.signature.symmetric else rates
-            parameters[:, self.paths.index(FREQUENCY)] -= (rates - found.state @ before) * phase / frequency**2
-        after, state = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)), found.state
+            parameters[:, self.paths.index(FREQUENCY)] -= (
+                (rates - found.state @ before) * phase / frequency**2
+            )
+        after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
+        state = found.state
         if self.system.dependent:
             by_unknowns, by_parameters = self._start_slopes(unknowns, system)
             state, parameters = state @ by_unknowns, parameters + state @ by_parameters
         if self.signature.symmetric:
-            after, state, parameters = (image_of(system.model, numbers.T).T for numbers in (after, state, parameters))
-        here, there = state[None].copy(), -np.eye(len(after))[None]
+            after, state, parameters = (
+                image_of(system.model, numbers.T).T for numbers in (after, state, parameters)
+            )
+        here = state[None].copy()
+        there = -np.eye(len(after))[None]
         here[:, self.following] = parameters[self.following] = after[self.following] = 0.0
-        residual, impacts = after - unknowns, modes_in(self.system).listed(motion)
-        return motion, WholeMotionEvaluation(residual, here, there, parameters, impacts, self._extremes(None), None, None)
+        residual = after - unknowns
+        impacts = modes_in(self.system).listed(motion)
+        return motion, WholeMotionEvaluation(
+            residual, here, there, parameters, impacts, self._extremes(None), None, None
+        )
 
-    def state_at(self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray) -> np.ndarray | None:
-        """The state of the orbit at a phase of the load: of one such state in each forcing period, the nearest to the state
-        `near`. None where the motion cannot be followed."""
-        if self.evaluate(unknowns, values) is None or self._latest is None or self._latest[1] is None:
+    def state_at(
+        self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray
+    ) -> np.ndarray | None:
+        """The state of the orbit at a phase of the load: of one such state in each forcing period,
+        the nearest to the state `near`. None where the motion cannot be followed."""
+        if (
+            self.evaluate(unknowns, values) is None
+            or self._latest is None
+            or self._latest[1] is None
+        ):
             return None
-        motion, signature = self._latest[1][0], self.signature
-        ahead = (phase - float(signature.section or 0.0)) % math.tau + math.tau * np.arange(signature.period)
-        later = ahead >= math.tau * signature.span  # in the second half of a symmetric orbit, the image of the first half
-        times = motion.start + np.where(later, ahead - math.tau * signature.span, ahead) / self.frequency(values)
-        states = np.array([np.concatenate([np.atleast_1d(part) for part in motion.at(time)]) for time in times.tolist()])
+        motion = self._latest[1][0]
+        signature = self.signature
+        ahead = (phase - float(signature.section or 0.0)) % math.tau + math.tau * np.arange(
+            signature.period
+        )
+        # in the second half of a symmetric orbit, the image of the first half
+        later = ahead >= math.tau * signature.span
+        times = motion.start + np.where(
+            later, ahead - math.tau * signature.span, ahead
+        ) / self.frequency(values)
+        states = np.array(
+            [
+                np.concatenate([np.atleast_1d(part) for part in motion.at(time)])
+                for time in times.tolist()
+            ]
+        )
         states[:, self.following] = 0.0
-        states = np.where(later[:, None], image_of(self.system.model, states) if later.any() else states, states)
+        states = np.where(
+            later[:, None], image_of(self.system.model, states) if later.any() else states, states
+        )
         return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
 
     @cached_property
@@ -309,10 +409,18 @@ class WholeMotionEquations(OrbitEquations):
         return program(self.system)
 
     def _request(
-        self, system: System, state: np.ndarray, time: float, values: np.ndarray, paths: tuple[str, ...] | None
+        self,
+        system: System,
+        state: np.ndarray,
+        time: float,
+        values: np.ndarray,
+        paths: tuple[str, ...] | None,
     ) -> tuple[MotionRequest, Any]:
-        """The motion over the time that the equations cover, dense if it has derivatives to `paths`, and its program."""
-        names, own = system.model.coordinates, self.own
+        """The motion over the time that the equations cover, dense if it has derivatives to
+        `paths`, and its program.
+        """
+        names = system.model.coordinates
+        own = self.own
         parameters = self._values.copy()
         parameters[self._places] = values
         request = MotionRequest(
@@ -333,16 +441,22 @@ class WholeMotionEquations(OrbitEquations):
         return request, run.with_numbers(parameters, self._records)
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
-        """The extrema of all coordinates and the least values of the margins, in the columns that other orbits use."""
-        extremes = np.full((int(sampled is not None), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf)
+        """The extrema of all coordinates and the least values of the margins, in the columns that
+        other orbits use.
+        """
+        extremes = np.full(
+            (int(sampled is not None), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))),
+            np.inf,
+        )
         if sampled is not None:
             extremes[:, SegmentColumn.CROSSINGS] = 0.0
             extremes[0, SegmentColumn.LOWEST_GAP] = sampled.lowest_gap()
-            extremes[0, SegmentColumn.HIGHEST], extremes[0, SegmentColumn.LOWEST] = sampled.highest(), sampled.lowest()
+            extremes[0, SegmentColumn.HIGHEST] = sampled.highest()
+            extremes[0, SegmentColumn.LOWEST] = sampled.lowest()
             least = sampled.margins() if self.margins else {}
-            extremes[0, SegmentColumn.LEAST_MARGIN : SegmentColumn.LEAST_MARGIN + len(self.margins)] = [
-                least[name] for name in self.margins
-            ]
+            extremes[
+                0, SegmentColumn.LEAST_MARGIN : SegmentColumn.LEAST_MARGIN + len(self.margins)
+            ] = [least[name] for name in self.margins]
         return extremes
 
 

@@ -1,4 +1,6 @@
-"""Finding periodic orbits from motions: one that settles, whose signature is read, and states that nearly return."""
+"""Finding periodic orbits from motions: one that settles, whose signature is read, and states that
+nearly return.
+"""
 
 from __future__ import annotations
 
@@ -47,8 +49,10 @@ from saltus.systems import (
 class FindOrbitSettings:
     """How long a motion is followed until it settles, and how its orbit is solved for."""
 
-    max_period: int = 12  # The longest period that is looked for if no limit is given, in forcing periods.
-    # Number of forcing periods for which a motion is followed in the first round to settle; each further round doubles it.
+    # The longest period that is looked for if no limit is given, in forcing periods.
+    max_period: int = 12
+    # Number of forcing periods for which a motion is followed in the first round to settle; each
+    # further round doubles it.
     settling: int = 160
     rounds: int = 5  # Number of such rounds.
     iterations: int = 25  # The largest number of Newton's iterations from a motion to its orbit.
@@ -68,9 +72,11 @@ def find_orbit(
     progress: Progress = silent,
     **coordinates: float,
 ) -> PeriodicOrbit:
-    """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it, stable or not.
+    """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it,
+    stable or not.
 
-    Where impacts have a loss and the load pulls the system off its contact in every period, the orbit may rest in between.
+    Where impacts have a loss and the load pulls the system off its contact in every period, the
+    orbit may rest in between.
 
     Parameters
     ----------
@@ -79,14 +85,16 @@ def find_orbit(
     velocity, coordinates
         The state at phase 0, by the model's names: theta=0.3.
     period
-        The period of the orbit in forcing periods; by default the shortest one, up to `max_period`, after which the motion
-        returns.
+        The period of the orbit in forcing periods; by default the shortest one, up to `max_period`,
+        after which the motion returns.
     settle
-        How many forcing periods the motion is followed first; by default until it has settled, up to 4960.
+        How many forcing periods the motion is followed first; by default until it has settled, up
+        to 4960.
     max_period
         The longest period that is looked for.
     parameters
-        Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which adds its own.
+        Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which
+        adds its own.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -95,7 +103,8 @@ def find_orbit(
     ParameterError
         An argument has no meaning.
     MotionError
-        The motion comes to rest for good, does not settle, or Newton's method does not converge; the message says what to do.
+        The motion comes to rest for good, does not settle, or Newton's method does not converge;
+        the message says what to do.
 
     Examples
     --------
@@ -104,15 +113,21 @@ def find_orbit(
     """
     counts = {"period": period, "max_period": max_period, "settle": settle}
     _check(system, parameters, counts)
-    state = arguments_of(system, read_start(system, velocity, coordinates, ("parameters", "progress", *counts)))
+    state = arguments_of(
+        system, read_start(system, velocity, coordinates, ("parameters", "progress", *counts))
+    )
     progress(0.0, "following the motion")
-    base = equations_of(system, Signature((), 1), tuple(parameters))  # refuses systems that have no orbits
+    # refuses systems that have no orbits
+    base = equations_of(system, Signature((), 1), tuple(parameters))
     if settle is not None:
         state = _after(system, state, settle)
         return _polish(base, state, _period_of(system, state, period, max_period), None, progress)
     passed = 0
     for attempt in range(SETTINGS.rounds):
-        progress(passed / sum(SETTINGS.settling * 2**k for k in range(SETTINGS.rounds)), "following the motion until it settles")
+        progress(
+            passed / sum(SETTINGS.settling * 2**k for k in range(SETTINGS.rounds)),
+            "following the motion until it settles",
+        )
         state = _after(system, state, wait := SETTINGS.settling * 2**attempt)
         passed += wait
         q = _returning(system, state, period, max_period)
@@ -143,9 +158,13 @@ def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
-    """Refuse a motion that stays at the contact for good, that has lost its phase there, or that ends at a margin."""
+    """Refuse a motion that stays at the contact for good, that has lost its phase there, or that
+    ends at a margin.
+    """
     if motion.limit is not None:
-        raise MotionError(f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there")
+        raise MotionError(
+            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there"
+        )
     if motion.side != 0 and motion.phase_known:
         return
     start = ", ".join(f"{name}={value!r}" for name, value in state.items())
@@ -180,7 +199,9 @@ def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> n
     return np.array(states)
 
 
-def _returning(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int | None:
+def _returning(
+    system: System, state: dict[str, Any], period: int | None, max_period: int
+) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
     states = _stroboscopic_states(system, state, period or max_period)[::-1]
     if period is None:
@@ -189,13 +210,21 @@ def _returning(system: System, state: dict[str, Any], period: int | None, max_pe
 
 
 def _period_of(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int:
-    """The number of forcing periods after which a motion comes nearest to where it was, if it is not given."""
+    """The number of forcing periods after which a motion comes nearest to where it was, if it is
+    not given.
+    """
     if period is not None:
         return period
     return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
 
 
-def _polish(base: OrbitEquations, state: dict[str, Any], periods: int, passed: int | None, progress: Progress) -> PeriodicOrbit:
+def _polish(
+    base: OrbitEquations,
+    state: dict[str, Any],
+    periods: int,
+    passed: int | None,
+    progress: Progress,
+) -> PeriodicOrbit:
     """Solve for the orbit near a motion over one of its periods."""
     progress(0.99, "solving for the orbit")
     orbit = orbit_from(base, state, periods)
@@ -210,8 +239,8 @@ def _polish(base: OrbitEquations, state: dict[str, Any], periods: int, passed: i
 
 
 def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
-    """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one that rests for a part of
-    them.
+    """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one
+    that rests for a part of them.
 
     Raises
     ------
@@ -222,18 +251,23 @@ def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
 
 
 def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
-    """The orbit with the signature of a motion over `periods` forcing periods from a state at phase 0, by Newton's method: the
-    first that is admissible of those of all kinds of equations.
+    """The orbit with the signature of a motion over `periods` forcing periods from a state at phase
+    0, by Newton's method: the first that is admissible of those of all kinds of equations.
 
     Raises
     ------
     MotionError
         It rests for good.
     """
-    motion, orbit = MotionToRead(base.system, state, periods), None
+    motion = MotionToRead(base.system, state, periods)
+    orbit = None
     for kind in KINDS:
         read = kind.read(base, motion)
-        found = None if read is None else PeriodicOrbit.near(*read, base.values, iterations=SETTINGS.iterations)
+        found = (
+            None
+            if read is None
+            else PeriodicOrbit.near(*read, base.values, iterations=SETTINGS.iterations)
+        )
         if found is not None:
             orbit = simplest(found)
         if orbit is not None and orbit.admissible:
@@ -244,7 +278,9 @@ def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """An orbit as a solution over its least period or, where it is its own mirror image, over half of that."""
+    """An orbit as a solution over its least period or, where it is its own mirror image, over half
+    of that.
+    """
     orbit = divide(orbit) or orbit
     return (half(orbit) if _is_symmetric(orbit.equations) else None) or orbit
 
@@ -260,15 +296,19 @@ class NearReturnSettings:
     """Which states may lead to orbits, and how they are improved."""
 
     near: float = 0.15  # Newton's method is tried from returns nearer than this.
-    guesses: int = 12  # The largest number of such returns for each period at each value; the nearest ones are taken.
+    # The largest number of such returns for each period at each value; the nearest ones are taken.
+    guesses: int = 12
     apart: float = 0.05  # The least distance between two of these returns.
     iterations: int = 8  # Steps of Newton's method on the section.
     longest: float = 0.3  # The longest of these steps: beyond it the map is far from linear.
-    converged: float = 1e-7  # Distance of a state from its image below which it is taken to be on an orbit.
+    # Distance of a state from its image below which it is taken to be on an orbit.
+    converged: float = 1e-7
     same_state: float = 1e-5  # States at one value are on the same orbit if they are this near.
-    still: float = 1e-6  # An orbit no larger than this, or a motion that stays this near to the contact, is at rest.
-    # With contacts or frictions and more state variables than this, derivatives are computed motion by motion, by the code that
-    # branches need as well. The code for lanes would take longer to compile (minutes for four cells).
+    # An orbit no larger than this, or a motion that stays this near to the contact, is at rest.
+    still: float = 1e-6
+    # With contacts or frictions and more state variables than this, derivatives are computed motion
+    # by motion, by the code that branches need as well. The code for lanes would take longer to
+    # compile (minutes for four cells).
     in_lanes: int = 4
 
 
@@ -276,9 +316,15 @@ NEAR_RETURNS = NearReturnSettings()
 
 
 def orbits_near_returns(
-    system: System, path: str, values: np.ndarray, states: np.ndarray, known: list[np.ndarray], max_period: int
+    system: System,
+    path: str,
+    values: np.ndarray,
+    states: np.ndarray,
+    known: list[np.ndarray],
+    max_period: int,
 ) -> list[PeriodicOrbit]:
-    """Orbits of up to `max_period` forcing periods near which motions nearly return; orbits of a continuum are left out.
+    """Orbits of up to `max_period` forcing periods near which motions nearly return; orbits of a
+    continuum are left out.
 
     Parameters
     ----------
@@ -287,9 +333,11 @@ def orbits_near_returns(
     values
         Its values, (n,).
     states
-        Successive stroboscopic states of motions at each value, (n, motions, kept, d); nan where there are fewer.
+        Successive stroboscopic states of motions at each value, (n, motions, kept, d); nan where
+        there are fewer.
     known
-        For each value the states (k, d) at phase 0 of orbits that are known there, which are not returned again.
+        For each value the states (k, d) at phase 0 of orbits that are known there, which are not
+        returned again.
     """
     found: list[tuple[int, PeriodicOrbit]] = []
     known = [other.reshape(-1, system.dimension) for other in known]
@@ -300,32 +348,47 @@ def orbits_near_returns(
         improved, good = _improved(system.in_gap_coordinates, path, values[rows], begin, period)
         improved = np.concatenate(system.from_gaps(0.0, *np.split(improved.T, 2))).T
         for row, state in zip(rows[good].tolist(), improved[good], strict=True):
-            if len(known[row]) and np.abs(known[row] - state).max(axis=1).min() < NEAR_RETURNS.same_state:
+            if (
+                len(known[row])
+                and np.abs(known[row] - state).max(axis=1).min() < NEAR_RETURNS.same_state
+            ):
                 continue
             known[row] = np.concatenate([known[row], state[None]])
             orbit = solved_near(system.with_({path: float(values[row])}), path, state, period)
-            if orbit is not None and orbit.isolated and not any(same_orbit(orbit, o) for place, o in found if place == row):
+            if (
+                orbit is not None
+                and orbit.isolated
+                and not any(same_orbit(orbit, o) for place, o in found if place == row)
+            ):
                 found.append((row, orbit))
     return [orbit for _, orbit in found]
 
 
 def solved_near(system: System, path: str, state: np.ndarray, period: int) -> PeriodicOrbit | None:
-    """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed along a parameter; or None."""
+    """The orbit of a system near a state at phase 0 that nearly repeats itself, to be followed
+    along a parameter; or None.
+    """
     try:
         start = arguments_of(system, on_this_side(system, state.copy()))
         orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start, period)
     except MotionError:
         return None
-    return orbit if orbit is not None and orbit.admissible and orbit.amplitude > NEAR_RETURNS.still else None
+    return (
+        orbit
+        if orbit is not None and orbit.admissible and orbit.amplitude > NEAR_RETURNS.still
+        else None
+    )
 
 
 def _guesses(states: np.ndarray, period: int) -> np.ndarray:
-    """The states (k, d) at which motions (n, kept, d) nearly return after `period`, without repeating themselves; nearest
-    first."""
+    """The states (k, d) at which motions (n, kept, d) nearly return after `period`, without
+    repeating themselves; nearest first."""
     distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
     begin = states[:, :-period].reshape(-1, states.shape[-1])
     chosen = begin[:0]
-    for i in np.flatnonzero(distance < NEAR_RETURNS.near)[np.argsort(distance[distance < NEAR_RETURNS.near])]:
+    for i in np.flatnonzero(distance < NEAR_RETURNS.near)[
+        np.argsort(distance[distance < NEAR_RETURNS.near])
+    ]:
         if len(chosen) >= NEAR_RETURNS.guesses:
             break
         again = len(chosen) and np.abs(begin[i] - chosen).max(axis=1).min() < NEAR_RETURNS.apart
@@ -334,8 +397,12 @@ def _guesses(states: np.ndarray, period: int) -> np.ndarray:
     return chosen
 
 
-def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
-    """The states (n, d) after Newton's method for x = Phi(x), and the numbers of those that have converged."""
+def _improved(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The states (n, d) after Newton's method for x = Phi(x), and the numbers of those that have
+    converged.
+    """
     states, active, good = states.copy(), np.arange(len(states)), np.zeros(len(states), dtype=bool)
     for _ in range(NEAR_RETURNS.iterations):
         if not active.size:
@@ -346,35 +413,58 @@ def _improved(system: System, path: str, values: np.ndarray, states: np.ndarray,
         good[active] = sound & (np.abs(apart).max(axis=1) < NEAR_RETURNS.converged)
         going = sound & ~good[active]
         active, apart, slope = active[going], apart[going], slope[going]
-        steps = [np.linalg.lstsq(np.eye(len(a)) - d, a, rcond=None)[0] for d, a in zip(slope, apart, strict=True)]
+        steps = [
+            np.linalg.lstsq(np.eye(len(a)) - d, a, rcond=None)[0]
+            for d, a in zip(slope, apart, strict=True)
+        ]
         step = np.array(steps).reshape(-1, states.shape[1])
-        step = step / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / NEAR_RETURNS.longest)[:, None]
+        step = (
+            step
+            / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / NEAR_RETURNS.longest)[:, None]
+        )
         states[active] = states_beside(system, states[active], step)
     return states, np.flatnonzero(good)
 
 
-def _mapped(system: System, path: str, values: np.ndarray, states: np.ndarray, period: int) -> tuple[np.ndarray, np.ndarray]:
-    """The states (n, d) `period` forcing periods later, and their derivatives to the states at the start, (n, d, d).
+def _mapped(
+    system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The states (n, d) `period` forcing periods later, and their derivatives to the states at the
+    start, (n, d, d).
 
-    A contact that is closed at the start stays closed: derivatives to its coordinate and velocity are 0.
+    A contact that is closed at the start stays closed: derivatives to its coordinate and velocity
+    are 0.
     """
     if system.model.holds_coordinates and system.dimension > NEAR_RETURNS.in_lanes:
         return _mapped_singly(system, path, values, states, period)
-    options: dict[str, Any] = {"periods": period, "sample": (), "tol": RECURRENCE.tol, "sensitivities": ()}
+    options: dict[str, Any] = {
+        "periods": period,
+        "sample": (),
+        "tol": RECURRENCE.tol,
+        "sensitivities": (),
+    }
     result = motions_from(system, states, parameters={path: values}, **options)
-    return last_states(system, result), np.where(held_by_contacts(system, states)[:, None], 0.0, result["derivative"].values)
+    return last_states(system, result), np.where(
+        held_by_contacts(system, states)[:, None], 0.0, result["derivative"].values
+    )
 
 
 def _mapped_singly(
     system: System, path: str, values: np.ndarray, states: np.ndarray, period: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `_mapped`, one motion after the other; nan where a motion cannot be followed or has no derivatives."""
+    """As `_mapped`, one motion after the other; nan where a motion cannot be followed or has no
+    derivatives.
+    """
     equations = equations_of(system, Signature((), period, section=0.0), (path,), RECURRENCE.tol)
     held = held_by_contacts(system, states)
-    ends, slopes = np.full(states.shape, np.nan), np.full((*states.shape, states.shape[1]), np.nan)
+    ends = np.full(states.shape, np.nan)
+    slopes = np.full((*states.shape, states.shape[1]), np.nan)
     for i, (value, state) in enumerate(zip(values, states, strict=True)):
         evaluation = equations.evaluate(state, np.array([value]))
         if evaluation is not None:
-            ends[i], slopes[i] = state + evaluation.residual, np.where(held[i], 0.0, evaluation.here[0])
+            ends[i], slopes[i] = (
+                state + evaluation.residual,
+                np.where(held[i], 0.0, evaluation.here[0]),
+            )
             ends[i, equations.following] = state[equations.following]
     return ends, slopes

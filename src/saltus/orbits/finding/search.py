@@ -1,4 +1,6 @@
-"""Searching for periodic orbits, stable and unstable, from many initial states at several values of a parameter."""
+"""Searching for periodic orbits, stable and unstable, from many initial states at several values of
+a parameter.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,17 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.verify import same_orbit
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import Box, System, Window, check_path, check_system, check_window, initial_states, is_still, rest_state
+from saltus.systems import (
+    Box,
+    System,
+    Window,
+    check_path,
+    check_system,
+    check_window,
+    initial_states,
+    is_still,
+    rest_state,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -27,7 +39,8 @@ class SearchSettings:
     """How long motions are followed, and which of their states may lead to orbits."""
 
     settling: int = 200  # Number of forcing periods for which motions are followed to settle.
-    # Number of forcing periods, at the beginning of each motion and at its end, in which near returns are looked for.
+    # Number of forcing periods, at the beginning of each motion and at its end, in which near
+    # returns are looked for.
     transient: int = 24
 
 
@@ -36,7 +49,9 @@ SETTINGS = SearchSettings()
 
 @dataclass(frozen=True)
 class Settled:
-    """The periodic motions on which direct simulation has settled, one entry of each array for each of them."""
+    """The periodic motions on which direct simulation has settled, one entry of each array for each
+    of them.
+    """
 
     value: np.ndarray  # of the parameter
     period: np.ndarray  # forcing periods after which the motion repeats itself
@@ -72,7 +87,8 @@ class Search(Result):
     seed
         The seed of the initial states.
     unsettled
-        How many motions did not settle on an orbit of up to `max_period`, as they are slow or chaotic, (values,).
+        How many motions did not settle on an orbit of up to `max_period`, as they are slow or
+        chaotic, (values,).
     at_rest
         How many motions came to rest, (values,).
     settled
@@ -98,23 +114,51 @@ class Search(Result):
     settled: Settled
 
     def to_xarray(self) -> xarray.Dataset:
-        """The orbits over `orbit`, the numbers of unsettled and of resting motions over `value`, settled motions over
-        `motion`."""
+        """The orbits over `orbit`, the numbers of unsettled and of resting motions over `value`,
+        settled motions over `motion`."""
         name = self.system.model.coordinates[0]
-        unit, text = self.system.model.unit_of(name), f"max abs({name})"
+        unit = self.system.model.unit_of(name)
+        text = f"max abs({name})"
         columns: dict[str, tuple[Any, ...]] = {
-            "parameter": ("orbit", [float(orbit.solution.values[0]) for orbit in self.orbits], "1", self.path),
+            "parameter": (
+                "orbit",
+                [float(orbit.solution.values[0]) for orbit in self.orbits],
+                "1",
+                self.path,
+            ),
             "amplitude": ("orbit", [orbit.amplitude for orbit in self.orbits], unit, text),
-            "period": ("orbit", np.array([orbit.period for orbit in self.orbits], dtype=int), "1", "forcing periods"),
-            "stable": ("orbit", np.array([orbit.stable for orbit in self.orbits], dtype=np.int8), "1", "1 where it is stable"),
+            "period": (
+                "orbit",
+                np.array([orbit.period for orbit in self.orbits], dtype=int),
+                "1",
+                "forcing periods",
+            ),
+            "stable": (
+                "orbit",
+                np.array([orbit.stable for orbit in self.orbits], dtype=np.int8),
+                "1",
+                "1 where it is stable",
+            ),
             "unsettled": ("value", self.unsettled, "1", "motions that did not settle on an orbit"),
             "at_rest": ("value", self.at_rest, "1", "motions that came to rest"),
             "settled_parameter": ("motion", self.settled.value, "1", self.path),
-            "settled_amplitude": ("motion", self.settled.amplitude, unit, f"{text} of what simulation has settled on"),
+            "settled_amplitude": (
+                "motion",
+                self.settled.amplitude,
+                unit,
+                f"{text} of what simulation has settled on",
+            ),
             "settled_period": ("motion", self.settled.period, "1", "its forcing periods"),
         }
-        facts = {"path": self.path, "starts": self.starts, "max_period": self.max_period, "coordinate": name}
-        return result_dataset("orbits", columns, {"value": self.values}, self.system, seed=self.seed, **facts)
+        facts = {
+            "path": self.path,
+            "starts": self.starts,
+            "max_period": self.max_period,
+            "coordinate": name,
+        }
+        return result_dataset(
+            "orbits", columns, {"value": self.values}, self.system, seed=self.seed, **facts
+        )
 
     def __repr__(self) -> str:
         kinds = sorted({orbit.period for orbit in self.orbits})
@@ -137,12 +181,14 @@ def search_orbits(
     repelling: int | None = None,
     progress: Progress = silent,
 ) -> Search:
-    """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each once for each value.
+    """Periodic orbits of up to `max_period` forcing periods at several values of a parameter, each
+    once for each value.
 
-    Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as in `find_attractors`; by
-    default the window has half widths of 1.5 around the contact, or around 0 for a model without one. Motions that settle lead to
-    the attracting orbits. Where motions in a transient or in chaos come back near to an earlier state, Newton's method begins
-    and finds repelling orbits of up to `repelling` forcing periods.
+    Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as
+    in `find_attractors`; by default the window has half widths of 1.5 around the contact, or around
+    0 for a model without one. Motions that settle lead to the attracting orbits. Where motions in a
+    transient or in chaos come back near to an earlier state, Newton's method begins and finds
+    repelling orbits of up to `repelling` forcing periods.
 
     Parameters
     ----------
@@ -157,7 +203,8 @@ def search_orbits(
     starts
         How many initial states there are at each value.
     window
-        A pair (low, high) for each coordinate, then for each velocity; by default half widths of 1.5 around the contact.
+        A pair (low, high) for each coordinate, then for each velocity; by default half widths of
+        1.5 around the contact.
     seed
         The seed of the initial states.
     repelling
@@ -184,19 +231,30 @@ def search_orbits(
     check_count("seed", seed, 0)
     check_path(system, path)
     area = check_window(window, system)
-    listed = list(values) if isinstance(values, Iterable) and not isinstance(values, np.ndarray) else values
+    listed = (
+        list(values)
+        if isinstance(values, Iterable) and not isinstance(values, np.ndarray)
+        else values
+    )
     grid = np.atleast_1d(np.asarray(listed, dtype=float))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
-        raise ParameterError(f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values")
-    early, late = _follow(system, path, grid, initial_states(system, starts, area, seed), max_period)
+        raise ParameterError(
+            f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values"
+        )
+    early, late = _follow(
+        system, path, grid, initial_states(system, starts, area, seed), max_period
+    )
     found: list[PeriodicOrbit] = []
     known: list[np.ndarray] = []
     returning = np.zeros((len(grid), starts), dtype=bool)
-    unsettled, at_rest = np.zeros(len(grid), dtype=int), np.zeros(len(grid), dtype=int)
+    unsettled = np.zeros(len(grid), dtype=int)
+    at_rest = np.zeros(len(grid), dtype=int)
     settled: list[tuple[float, int, float, float]] = []
     for i, value in enumerate(grid):
         moving, at_rest[i] = _moving(system, late, np.arange(i * starts, (i + 1) * starts))
-        here, seen, attracting, unsettled[i] = _attracting(system.with_({path: float(value)}), path, late.only(moving))
+        here, seen, attracting, unsettled[i] = _attracting(
+            system.with_({path: float(value)}), path, late.only(moving)
+        )
         settled += [(float(value), *row) for row in seen]
         found, known = found + here, [*known, attracting]
         returning[i, moving - i * starts] = True
@@ -204,19 +262,32 @@ def search_orbits(
     shape = (len(grid), starts, -1, system.dimension)
     states = np.concatenate([early.states.reshape(shape), late.states.reshape(shape)], axis=1)
     states[~np.tile(returning, (1, 2))] = np.nan
-    near = orbits_near_returns(system, path, grid, states, known, max_period if repelling is None else repelling)
+    near = orbits_near_returns(
+        system, path, grid, states, known, max_period if repelling is None else repelling
+    )
     found = sorted(found + near, key=lambda orbit: float(orbit.solution.values[0]))
     progress(1.0, "searching")
     columns = np.array(settled, dtype=float).reshape(-1, 4).T
     dots = Settled(columns[0], columns[1].astype(int), columns[2], columns[3])
-    return Search(system, path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots)
+    return Search(
+        system, path, tuple(found), grid, starts, max_period, area, seed, unsettled, at_rest, dots
+    )
 
 
-def _follow(system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int) -> tuple[Recurrence, Recurrence]:
-    """Motions from the same states at every value, one row for each: their first forcing periods, and those until they settle."""
+def _follow(
+    system: System, path: str, grid: np.ndarray, states: np.ndarray, max_period: int
+) -> tuple[Recurrence, Recurrence]:
+    """Motions from the same states at every value, one row for each: their first forcing periods,
+    and those until they settle.
+    """
     kept = max(SETTINGS.transient, max_period + 1)
     parameters = {path: np.repeat(grid, len(states))}
-    options: dict[str, Any] = {"parameters": parameters, "max_period": max_period, "kept": kept, "stop_early": False}
+    options: dict[str, Any] = {
+        "parameters": parameters,
+        "max_period": max_period,
+        "kept": kept,
+        "stop_early": False,
+    }
     early = find_recurrence(system, np.tile(states, (len(grid), 1)), kept, **options)
     begin = np.where(np.isfinite(early.states[:, -1]), early.states[:, -1], rest_state(system))
     return early, find_recurrence(system, begin, SETTINGS.settling, extrema=True, **options)
@@ -226,7 +297,8 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
     """Which of these motions go on without resting at the contact, and how many rest there."""
     assert late.extrema is not None
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
-    high, low = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf), late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
+    high = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf)
+    low = late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
     moving = alive[~is_still(system, high, low, NEAR_RETURNS.still)]
     return moving, len(alive) - len(moving)
 
@@ -234,13 +306,15 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
 def _attracting(
     system: System, path: str, late: Recurrence
 ) -> tuple[list[PeriodicOrbit], list[tuple[int, float, float]], np.ndarray, int]:
-    """The orbits of settled motions; period and extrema of each as simulated; their states at phase 0; and the number of motions
-    that have not settled."""
+    """The orbits of settled motions; period and extrema of each as simulated; their states at phase
+    0; and the number of motions that have not settled."""
     found: list[PeriodicOrbit] = []
     seen: list[tuple[int, float, float]] = []
     known = np.empty((0, system.dimension))
     unsettled = 0
-    for states, period, highest, lowest in zip(late.states, late.period.tolist(), late.highest, late.lowest, strict=True):
+    for states, period, highest, lowest in zip(
+        late.states, late.period.tolist(), late.highest, late.lowest, strict=True
+    ):
         if known.size and np.abs(known - states[-1]).max(axis=1).min() < NEAR_RETURNS.same_state:
             continue
         if not period:

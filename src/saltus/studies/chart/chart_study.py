@@ -1,5 +1,5 @@
-"""Stability charts: the stable motions beside rest, in the plane of two parameters, their borders, and checks
-of charts by other means."""
+"""Stability charts: the stable motions beside rest, in the plane of two parameters, their borders,
+and checks of charts by other means."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ from saltus.progress import Progress, part_of, silent
 from saltus.studies.chart.border_work import explained, special_point, unseen_folds
 from saltus.studies.chart.borders import Borders, with_borders
 from saltus.studies.chart.cells import computed
-from saltus.studies.chart.changes import COUNTS, ENDS, ChangeOutcome, ChartMotions, changes_of, read_chart
+from saltus.studies.chart.changes import (
+    COUNTS,
+    ENDS,
+    ChangeOutcome,
+    ChartMotions,
+    changes_of,
+    read_chart,
+)
 from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import ALIKE, KEPT, CellOutcome, has_alike, read_motions
 from saltus.systems import Box, System, check_system
@@ -25,28 +32,47 @@ from saltus.theory import quasi_static_border
 if TYPE_CHECKING:
     import xarray
 
-MARGIN = 0.02  # cells by which an end may lie outside its enclosure, as motions near their end settle slowly
+# cells by which an end may lie outside its enclosure, as motions near their end settle slowly
+MARGIN = 0.02
 
 
-def sampled_ends(system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = 60) -> np.ndarray:
-    """For a sample of the motions that end between two cells, (n,): 1 if continuation of the orbit from the middle of its cell
-    finds the special point where simulation has enclosed the end, 0 if elsewhere, nan if it finds none."""
+def sampled_ends(
+    system: System, paths: tuple[str, str], chart: ChartMotions, borders: Borders, count: int = 60
+) -> np.ndarray:
+    """For a sample of the motions that end between two cells, (n,): 1 if continuation of the orbit
+    from the middle of its cell finds the special point where simulation has enclosed the end, 0 if
+    elsewhere, nan if it finds none."""
     changes = changes_of(chart)
     found = borders.of(chart, changes)
     rows = np.flatnonzero(np.isin(found["outcome"], ENDS))
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int))] if len(rows) else rows
+    chosen = (
+        rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int))]
+        if len(rows)
+        else rows
+    )
     result = np.full(len(chosen), np.nan)
     axes = (chart.horizontal, chart.vertical)
     for i, k in enumerate(chosen):
-        source, target, motion = changes.source[k], changes.target[k], chart.motions[changes.motion[k]]
+        source = changes.source[k]
+        target = changes.target[k]
+        motion = chart.motions[changes.motion[k]]
         along = 0 if source[0] == target[0] else 1
-        axis, here, there = axes[along], source[1 - along], target[1 - along]
+        axis = axes[along]
+        here = source[1 - along]
+        there = target[1 - along]
         place = [float(axes[n][source[1 - n]]) for n in (0, 1)]
-        start = {"state": motion["state"], "period": motion["period"], "place": place, "along": along, "goal": axis[there]}
+        start = {
+            "state": motion["state"],
+            "period": motion["period"],
+            "place": place,
+            "along": along,
+            "goal": axis[there],
+        }
         special = special_point(system, paths, start)
         if special is not None:
             share = (special.parameter - axis[here]) / (axis[there] - axis[here])
-            low, high = found["settled"][k] - MARGIN, found["next"]["share"][k] + MARGIN
+            low = found["settled"][k] - MARGIN
+            high = found["next"]["share"][k] + MARGIN
             result[i] = low <= share <= high
     return result
 
@@ -65,15 +91,18 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     Returns
     -------
     xarray.Dataset
-        A Dataset. Along `change` it has the changes for which it is not known what becomes of the motion, and which no curve
-        explains: `horizontal` and `vertical` halfway between the cells, `amplitude` and `period` of the motion that ends, `cells`
-        (the number of motions in its family), and `beside_rest`, whether the neighbour has rest alone. Along `unseen` it has the
-        places on curves of folds beside which no cell has the motions that end there. Attributes: `changes` and
-        `changes_beside_rest` count all changes; `located` counts those with an enclosed end of the motion, `on_curves` those that
-        a curve explains, `harmless` those where the same motion goes on, with another amplitude than expected or too small to
-        count. `sampled` is the number of located ends that were also solved for by continuation, `sampled_agree` the number of
-        these that lie where simulation has enclosed them. `chaos_beside_rest` counts pairs of neighbouring cells, one with rest
-        alone and one with chaos alone, between which chaos ends but no stable motion.
+        A Dataset. Along `change` it has the changes for which it is not known what becomes of the
+        motion, and which no curve explains: `horizontal` and `vertical` halfway between the cells,
+        `amplitude` and `period` of the motion that ends, `cells` (the number of motions in its
+        family), and `beside_rest`, whether the neighbour has rest alone. Along `unseen` it has the
+        places on curves of folds beside which no cell has the motions that end there. Attributes:
+        `changes` and `changes_beside_rest` count all changes; `located` counts those with an
+        enclosed end of the motion, `on_curves` those that a curve explains, `harmless` those where
+        the same motion goes on, with another amplitude than expected or too small to count.
+        `sampled` is the number of located ends that were also solved for by continuation,
+        `sampled_agree` the number of these that lie where simulation has enclosed them.
+        `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with
+        chaos alone, between which chaos ends but no stable motion.
 
     Examples
     --------
@@ -84,15 +113,25 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     """
     import xarray as xr
 
-    check_dataset(chart, "stability_chart", ("vertical", "horizontal", "count", "amplitude"), ("least",), name="chart")
+    check_dataset(
+        chart,
+        "stability_chart",
+        ("vertical", "horizontal", "count", "amplitude"),
+        ("least",),
+        name="chart",
+    )
     cells = read_chart(chart)
     changes = changes_of(cells)
     found = borders.of(cells, changes)
     kinds = [ChangeOutcome(outcome) for outcome in found["outcome"]]
-    ends, harmless = (np.array([getattr(k, name) for k in kinds], dtype=bool) for name in ("is_end", "is_harmless"))
+    ends, harmless = (
+        np.array([getattr(k, name) for k in kinds], dtype=bool)
+        for name in ("is_end", "is_harmless")
+    )
     on_curves = explained(cells, changes, borders.curves) & ~harmless
     left = changes.only(~(on_curves | ends | harmless))
-    middle, unseen = (left.source + left.target) / 2, unseen_folds(cells, borders.curves)
+    middle = (left.source + left.target) / 2
+    unseen = unseen_folds(cells, borders.curves)
     columns = {
         "amplitude": cells.motions["amplitude"][left.motion],
         "period": cells.motions["period"][left.motion],
@@ -100,12 +139,16 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
         "beside_rest": cells.monostable[tuple(left.target.T)],
     }
     data = {name: ("change", values) for name, values in columns.items()}
-    for i, (name, axis) in enumerate((("vertical", cells.vertical), ("horizontal", cells.horizontal))):
+    for i, (name, axis) in enumerate(
+        (("vertical", cells.vertical), ("horizontal", cells.horizontal))
+    ):
         data[name] = ("change", np.interp(middle[:, i], np.arange(len(axis)), axis))
         data[f"unseen_{name}"] = ("unseen", np.interp(unseen[:, i], np.arange(len(axis)), axis))
     chaos = (chart["outcome"] == CellOutcome.CHAOS).transpose("vertical", "horizontal").values
     path = chart.attrs["path"]
-    sample = sampled_ends(System.from_json(chart.attrs["system"]), (str(path[0]), str(path[1])), cells, borders)
+    sample = sampled_ends(
+        System.from_json(chart.attrs["system"]), (str(path[0]), str(path[1])), cells, borders
+    )
     attrs = {
         "changes": len(changes),
         "changes_beside_rest": int(cells.monostable[tuple(changes.target.T)].sum()),
@@ -120,8 +163,15 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
 
 
 def _neighbours(some: np.ndarray, others: np.ndarray) -> int:
-    """The number of pairs of neighbouring cells of which one is among `some` and the other among `others`."""
-    pairs = ((some[1:], others[:-1]), (some[:-1], others[1:]), (some[:, 1:], others[:, :-1]), (some[:, :-1], others[:, 1:]))
+    """The number of pairs of neighbouring cells of which one is among `some` and the other among
+    `others`.
+    """
+    pairs = (
+        (some[1:], others[:-1]),
+        (some[:-1], others[1:]),
+        (some[:, 1:], others[:, :-1]),
+        (some[:, :-1], others[:, 1:]),
+    )
     return int(sum((a & b).sum() for a, b in pairs))
 
 
@@ -129,11 +179,14 @@ CHAOTIC = (CellOutcome.CHAOS, CellOutcome.MOTIONS_AND_CHAOS)
 
 
 @answered
-def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1) -> dict[str, float]:
+def wrong_cells(
+    system: System, chart: xarray.Dataset, *, cells: int = 100, seed: int = 1
+) -> dict[str, float]:
     """How many cells of a random sample are wrong.
 
-    Each cell is computed again with four times as many starts, which are others, and with eight cells around it at half the
-    distance of its neighbours, so that motions that begin at these are found as well.
+    Each cell is computed again with four times as many starts, which are others, and with eight
+    cells around it at half the distance of its neighbours, so that motions that begin at these are
+    found as well.
 
     Parameters
     ----------
@@ -149,9 +202,10 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
     Returns
     -------
     dict[str, float]
-        The number of `checked_cells` and of `wrong_cells` among them. The latter are `wrong_rest` where the chart has rest alone
-        and there is something else, `wrong_motions` where it lacks a stable motion, and `wrong_chaos` where either the chart or
-        the sample has chaos, but not both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to `wrong_share_high`
+        The number of `checked_cells` and of `wrong_cells` among them. The latter are `wrong_rest`
+        where the chart has rest alone and there is something else, `wrong_motions` where it lacks a
+        stable motion, and `wrong_chaos` where either the chart or the sample has chaos, but not
+        both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to `wrong_share_high`
         its 95 % interval.
 
     Examples
@@ -162,17 +216,24 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
     """
     check_count("cells", cells, 1)
     check_count("seed", seed, 0)
-    request, chart = ChartRequest.of_chart(system, chart), chart.transpose("vertical", "horizontal", ...)
+    request, chart = (
+        ChartRequest.of_chart(system, chart),
+        chart.transpose("vertical", "horizontal", ...),
+    )
     size = int(np.prod(request.shape))
     chosen = np.sort(np.random.default_rng(seed).choice(size, min(cells, size), replace=False))
-    finer = _Sample(**_numbers(request, seed), place=np.stack(np.unravel_index(chosen, request.shape), axis=1))
+    finer = _Sample(
+        **_numbers(request, seed), place=np.stack(np.unravel_index(chosen, request.shape), axis=1)
+    )
     columns, found = computed(finer)
     middle = 9 * np.arange(len(chosen)) + 4
     motions = found[(found["amplitude"] > COUNTS * request.least) & np.isin(found["cell"], middle)]
     motions["cell"] = chosen[motions["cell"] // 9]
-    known, full = read_motions(chart), chart["count"].values.ravel()[motions["cell"]] >= KEPT
+    known = read_motions(chart)
+    full = chart["count"].values.ravel()[motions["cell"]] >= KEPT
     lacking = motions["cell"][~full & ~has_alike(known, motions["cell"], motions, ALIKE.followed)]
-    before, after = chart["outcome"].values.ravel()[chosen], columns["outcome"][middle]
+    before = chart["outcome"].values.ravel()[chosen]
+    after = columns["outcome"][middle]
     wrong = {
         "wrong_rest": (before == CellOutcome.REST) & (after != CellOutcome.REST),
         "wrong_motions": np.isin(chosen, lacking),
@@ -180,8 +241,16 @@ def wrong_cells(system: System, chart: xarray.Dataset, *, cells: int = 100, seed
     }
     number = int(np.any(list(wrong.values()), axis=0).sum())
     low, high = share_interval(number, len(chosen))
-    counts = {"checked_cells": len(chosen), "wrong_cells": number, **{name: int(cells.sum()) for name, cells in wrong.items()}}
-    return counts | {"wrong_share": number / len(chosen), "wrong_share_low": low, "wrong_share_high": high}
+    counts = {
+        "checked_cells": len(chosen),
+        "wrong_cells": number,
+        **{name: int(cells.sum()) for name, cells in wrong.items()},
+    }
+    return counts | {
+        "wrong_share": number / len(chosen),
+        "wrong_share_low": low,
+        "wrong_share_high": high,
+    }
 
 
 def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
@@ -192,13 +261,17 @@ def _numbers(request: ChartRequest, seed: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Sample(ChartRequest):
-    """Some cells of a chart, each in the middle of a block of three by three cells half as far apart."""
+    """Some cells of a chart, each in the middle of a block of three by three cells half as far
+    apart.
+    """
 
     place: np.ndarray  # (n, 2): row and column in the chart
 
     @property
     def shape(self) -> tuple[int, int]:
-        """All blocks below one another; starts from a neighbour that belongs to another block do no harm."""
+        """All blocks below one another; starts from a neighbour that belongs to another block do no
+        harm.
+        """
         return 3 * len(self.place), 3
 
     @property
@@ -209,13 +282,20 @@ class _Sample(ChartRequest):
             np.interp(index[:, None] + steps, np.arange(len(axis)), axis)
             for index, axis in zip(self.place.T, (self.vertical, self.horizontal), strict=True)
         )
-        return {self.paths[1]: np.repeat(rows, 3, axis=1).ravel(), self.paths[0]: np.tile(columns, 3).ravel()}
+        return {
+            self.paths[1]: np.repeat(rows, 3, axis=1).ravel(),
+            self.paths[0]: np.tile(columns, 3).ravel(),
+        }
 
 
-HORIZONTAL, VERTICAL = np.linspace(0.0, 0.5, 101), np.linspace(-2.0, 0.0, 101)  # the axes where none are given
+# the axes where none are given
+HORIZONTAL = np.linspace(0.0, 0.5, 101)
+VERTICAL = np.linspace(-2.0, 0.0, 101)
 
 
-def _check(system: System, store: Any, workers: object, scheduler: object, progress: object, **options: Any) -> None:
+def _check(
+    system: System, store: Any, workers: object, scheduler: object, progress: object, **options: Any
+) -> None:
     from saltus.sweep import check_store
 
     plan = ChartRequest(system=system, **options).plan()
@@ -243,11 +323,13 @@ def stability_chart(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> xarray.Dataset:
-    """The largest amplitude of the stable motions beside rest, and their number, over the plane of two parameters (Figs. 14, 15).
+    """The largest amplitude of the stable motions beside rest, and their number, over the plane of
+    two parameters (Figs. 14, 15).
 
-    In every cell motions are followed from `starts` initial states, spread evenly over the window, every other one drawn in
-    towards the contact, and from every stable motion of the neighbouring cells of the same chunk, until this adds nothing new. So
-    a motion is followed to where its stability ends, even where its basin is tiny. Deformed equilibria, which exist without a
+    In every cell motions are followed from `starts` initial states, spread evenly over the window,
+    every other one drawn in towards the contact, and from every stable motion of the neighbouring
+    cells of the same chunk, until this adds nothing new. So a motion is followed to where its
+    stability ends, even where its basin is tiny. Deformed equilibria, which exist without a
     horizontal load, are motions too. docs/charts.md lists the variables of the result.
 
     Parameters
@@ -259,24 +341,30 @@ def stability_chart(
     paths
         The dotted paths of the parameters along them.
     max_period
-        The longest period of a motion, in forcing periods; motions of longer periods count as unsettled.
+        The longest period of a motion, in forcing periods; motions of longer periods count as
+        unsettled.
     starts, window, seed
         Initial states, as `search_orbits` takes them.
     least
-        The smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts accumulate towards rest.
+        The smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts
+        accumulate towards rest.
     periods
-        Forcing periods after which a motion that has not settled counts as unsettled; by default it follows from the damping.
+        Forcing periods after which a motion that has not settled counts as unsettled; by default it
+        follows from the damping.
     tol
-        The error of a step; with a larger one than 1e-10 motions beside an equilibrium do not come to a halt.
+        The error of a step; with a larger one than 1e-10 motions beside an equilibrium do not come
+        to a halt.
     rows
-        How many rows are one chunk; motions are carried on between neighbouring cells of one chunk only.
+        How many rows are one chunk; motions are carried on between neighbouring cells of one chunk
+        only.
     store, workers, scheduler, progress
         Where the chunks are kept and who computes them, see `saltus.sweep.run`.
 
     Returns
     -------
     xarray.Dataset
-        A Dataset over (vertical, horizontal), and for the up to 8 largest motions of each cell over `motion`.
+        A Dataset over (vertical, horizontal), and for the up to 8 largest motions of each cell over
+        `motion`.
 
     Raises
     ------
@@ -339,16 +427,19 @@ def bordered_chart(
         What moves, under a load with a frequency.
     curves
         The largest number of curves that are followed on which motions end, see `with_borders`.
-    horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows, store, workers, scheduler
+    horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows, store,
+    workers, scheduler
         As for `stability_chart`.
     progress
-        Called with the fraction done and what is being done, first when all arguments have been checked.
+        Called with the fraction done and what is being done, first when all arguments have been
+        checked.
 
     Returns
     -------
     xarray.DataTree
-        A DataTree of the groups `chart`, `borders` (see `Borders.to_xarray`), `disagreements` and, where theory knows it,
-        `static`, the quasi-static border (see `saltus.theory.quasi_static_border`).
+        A DataTree of the groups `chart`, `borders` (see `Borders.to_xarray`), `disagreements` and,
+        where theory knows it, `static`, the quasi-static border (see
+        `saltus.theory.quasi_static_border`).
 
     Raises
     ------
@@ -384,7 +475,15 @@ def bordered_chart(
         progress=part_of(progress, 0.0, 0.5),
     )
     rest = part_of(progress, 0.5, 1.0)
-    chart, borders = with_borders(system, chart, curves=curves, progress=rest, store=store, workers=workers, scheduler=scheduler)
+    chart, borders = with_borders(
+        system,
+        chart,
+        curves=curves,
+        progress=rest,
+        store=store,
+        workers=workers,
+        scheduler=scheduler,
+    )
     chart.attrs = {name: value for name, value in chart.attrs.items() if name != "plan"}
     groups = {"chart": chart, "disagreements": disagreements(chart, borders)}
     static = quasi_static_border(system, tuple(chart.attrs["path"]), float(chart["vertical"].min()))

@@ -1,4 +1,6 @@
-"""The stable motions of the cells of a chart: the record of a motion, when two are the same, and what there is in a cell."""
+"""The stable motions of the cells of a chart: the record of a motion, when two are the same, and
+what there is in a cell.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +29,15 @@ def motion_type(dimension: int) -> np.dtype[Any]:
         [
             ("cell", np.int64),  # the cell's number, row by row
             ("starts", np.int64),  # how many initial states have led to it
-            ("period", np.int64),  # forcing periods after which it repeats itself; 0 while it has not settled
+            # forcing periods after which it repeats itself; 0 while it has not settled
+            ("period", np.int64),
             ("impact_count", np.int64),  # impacts in a period
             ("amplitude", float),  # max abs of all coordinates
-            ("other", float),  # the extremum on the other side, counted positive there; the amplitude if the motion is symmetric
-            # The least speed of an impact for models with several contacts, else 0: between two stops all motions have the same
-            # extrema.
+            # the extremum on the other side, counted positive there; the amplitude if the motion is
+            # symmetric
+            ("other", float),
+            # The least speed of an impact for models with several contacts, else 0: between two
+            # stops all motions have the same extrema.
             ("slowest", float),
             ("state", float, (dimension,)),  # coordinates and velocities at phase 0
         ]
@@ -43,13 +48,24 @@ def motion_type(dimension: int) -> np.dtype[Any]:
 class MotionTolerances:
     """By how much of their amplitude motions may differ."""
 
-    same: float = 1e-4  # Settled motions of a cell are one motion if their extrema, or those of the mirror image, differ by less.
-    joined: float = 1e-2  # Motions of a cell end on the same motion if their states at the same phase differ by less.
-    alike: float = 0.2  # A neighbour's motion is not tried in a cell that has one whose extrema differ by less.
-    family: float = 0.35  # Motions of neighbouring cells whose amplitudes differ by less are one family: no motion ends there.
-    symmetric: float = 2e-4  # A motion whose two extrema differ by less in size is its own mirror image.
-    curve: float = 0.5  # A motion may end in an orbit on a curve if their amplitudes differ by less: these are steep near a fold.
-    followed: float = 1e-3  # A motion that was followed into a cell is the cell's motion if their amplitudes differ by less.
+    # Settled motions of a cell are one motion if their extrema, or those of the mirror image,
+    # differ by less.
+    same: float = 1e-4
+    # Motions of a cell end on the same motion if their states at the same phase differ by less.
+    joined: float = 1e-2
+    # A neighbour's motion is not tried in a cell that has one whose extrema differ by less.
+    alike: float = 0.2
+    # Motions of neighbouring cells whose amplitudes differ by less are one family: no motion ends
+    # there.
+    family: float = 0.35
+    # A motion whose two extrema differ by less in size is its own mirror image.
+    symmetric: float = 2e-4
+    # A motion may end in an orbit on a curve if their amplitudes differ by less: these are steep
+    # near a fold.
+    curve: float = 0.5
+    # A motion that was followed into a cell is the cell's motion if their amplitudes differ by
+    # less.
+    followed: float = 1e-3
 
 
 ALIKE = MotionTolerances()
@@ -67,11 +83,13 @@ def motions_later(
     captured: np.ndarray | None = None,
     slow: float = 0.0,
 ) -> tuple[np.ndarray, Recurrence]:
-    """The motions, records with the fields of `motion_type`, at most so many forcing periods later; and how they end.
+    """The motions, records with the fields of `motion_type`, at most so many forcing periods later;
+    and how they end.
 
-    Motions are followed so in stages by cells and between cells. If one is about to settle its state is the limit to which its
-    last states are extrapolated, so that the next stage begins there, and its extrema are those of the period with which it
-    seems to settle: the one of the extrapolation or, with `slow`, the one after which it returns within this share of its size.
+    Motions are followed so in stages by cells and between cells. If one is about to settle its
+    state is the limit to which its last states are extrapolated, so that the next stage begins
+    there, and its extrema are those of the period with which it seems to settle: the one of the
+    extrapolation or, with `slow`, the one after which it returns within this share of its size.
     """
     ends = find_recurrence(
         system,
@@ -86,7 +104,8 @@ def motions_later(
         speed=True,
         tol=tol,
     )
-    ahead, period = ends.last, np.zeros(len(ends), dtype=int)
+    ahead = ends.last
+    period = np.zeros(len(ends), dtype=int)
     if system.model.has_state_plane:  # else an extrapolated state may lie beyond a contact
         ahead, period = approached(ends.states, max_period)
     if slow:
@@ -94,15 +113,22 @@ def motions_later(
         size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
         period = return_period(ends.states, max_period, slow * size)
     seen = replace(ends, period=np.where(ends.unsettled, period, ends.period))
-    later, high, low = motions.copy(), seen.highest, -seen.lowest
-    later["state"], later["period"] = np.where(ends.unsettled[:, None], ahead, ends.last), seen.period
-    later["impact_count"], later["slowest"] = seen.impact_count, seen.slowest
-    later["amplitude"], later["other"] = np.maximum(high, low), np.minimum(high, low)
+    later = motions.copy()
+    high = seen.highest
+    low = -seen.lowest
+    later["state"] = np.where(ends.unsettled[:, None], ahead, ends.last)
+    later["period"] = seen.period
+    later["impact_count"] = seen.impact_count
+    later["slowest"] = seen.slowest
+    later["amplitude"] = np.maximum(high, low)
+    later["other"] = np.minimum(high, low)
     return later, ends
 
 
 def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The first motion of each of these cells, then the second, ...: whether there is one, and its index in `motions`."""
+    """The first motion of each of these cells, then the second, ...: whether there is one, and its
+    index in `motions`.
+    """
     first, last = (np.searchsorted(motions["cell"], cell, side=side) for side in ("left", "right"))
     for step in range(int((last - first).max(initial=0))):
         there = first + step < last
@@ -110,20 +136,28 @@ def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarr
 
 
 def is_same(one: np.ndarray, other: np.ndarray, tolerance: float = ALIKE.same) -> np.ndarray:
-    """Whether motions have the same period and the same extrema, so that they are one motion or mirror images."""
+    """Whether motions have the same period and the same extrema, so that they are one motion or
+    mirror images.
+    """
     same = one["period"] == other["period"]
     for name in ("amplitude", "other"):
         same &= np.abs(one[name] - other[name]) <= tolerance * other["amplitude"]
-    same &= np.abs(one["slowest"] - other["slowest"]) <= tolerance * (other["amplitude"] + other["slowest"])
+    same &= np.abs(one["slowest"] - other["slowest"]) <= tolerance * (
+        other["amplitude"] + other["slowest"]
+    )
     return np.asarray(same)
 
 
 def is_alike(one: np.ndarray, other: np.ndarray, tolerance: float) -> np.ndarray:
     """Whether motions have the same period and number of impacts, and about the same extrema."""
-    return np.asarray(is_same(one, other, tolerance) & (one["impact_count"] == other["impact_count"]))
+    return np.asarray(
+        is_same(one, other, tolerance) & (one["impact_count"] == other["impact_count"])
+    )
 
 
-def has_alike(known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float) -> np.ndarray:
+def has_alike(
+    known: np.ndarray, cell: np.ndarray, motions: np.ndarray, tolerance: float
+) -> np.ndarray:
     """Whether each of the cells (n,) has a motion similar to the motion of the same index."""
     result = np.zeros(len(cell), dtype=bool)
     for there, index in motions_in(known, cell):
@@ -136,7 +170,8 @@ def distinct(motions: np.ndarray) -> np.ndarray:
     motions = by_cell(motions)
     fresh = np.ones(len(motions), dtype=bool)
     for step in range(1, int(np.bincount(motions["cell"]).max(initial=0))):
-        one, other = motions[step:], motions[:-step]
+        one = motions[step:]
+        other = motions[:-step]
         fresh[step:] &= ~((one["cell"] == other["cell"]) & is_same(one, other))
     return motions[fresh]
 
@@ -146,10 +181,14 @@ def by_cell(motions: np.ndarray) -> np.ndarray:
     return motions[np.lexsort((-motions["amplitude"], motions["cell"]))]
 
 
-def table(motions: np.ndarray, size: int, names: Sequence[str], speeds: bool = False) -> dict[str, np.ndarray]:
-    """The variables of a chart of `size` cells that follow from its motions, which are given by cell and falling amplitude.
+def table(
+    motions: np.ndarray, size: int, names: Sequence[str], speeds: bool = False
+) -> dict[str, np.ndarray]:
+    """The variables of a chart of `size` cells that follow from its motions, which are given by
+    cell and falling amplitude.
 
-    `names` are those of the state variables; `speeds` says whether there is a variable for the least speed of an impact.
+    `names` are those of the state variables; `speeds` says whether there is a variable for the
+    least speed of an impact.
     """
     number = np.bincount(motions["cell"], minlength=size)
     rank = np.arange(len(motions)) - np.repeat(np.cumsum(number) - number, number)
@@ -157,23 +196,42 @@ def table(motions: np.ndarray, size: int, names: Sequence[str], speeds: bool = F
     place = motions["cell"][kept], rank[kept]
     fields = {"amplitude": np.nan, "other": np.nan, "period": 0, "impact_count": 0}
     fields |= {"slowest": np.nan} if speeds else {}
-    columns = {name: np.full((size, KEPT), empty) for name, empty in (fields | dict.fromkeys(names, np.nan)).items()}
+    columns = {
+        name: np.full((size, KEPT), empty)
+        for name, empty in (fields | dict.fromkeys(names, np.nan)).items()
+    }
     for name in fields:
         columns[name][place] = motions[name][kept]
     for i, name in enumerate(names):
         columns[name][place] = motions["state"][kept, i]
     smallest = np.full(size, np.nan)
     np.fmin.at(smallest, motions["cell"], motions["amplitude"])
-    summary = {"amplitude": columns["amplitude"][:, 0], "period": columns["period"][:, 0], "smallest_amplitude": smallest}
-    return {**summary, "count": number, **{f"motion_{name}": values for name, values in columns.items()}}
+    summary = {
+        "amplitude": columns["amplitude"][:, 0],
+        "period": columns["period"][:, 0],
+        "smallest_amplitude": smallest,
+    }
+    return {
+        **summary,
+        "count": number,
+        **{f"motion_{name}": values for name, values in columns.items()},
+    }
 
 
 def read_motions(chart: xarray.Dataset) -> np.ndarray:
     """The motions that a chart keeps, by cell and falling amplitude."""
     chart = chart.transpose("vertical", "horizontal", ...)
-    names = ["amplitude", "other", "period", "impact_count", *(["slowest"] if "motion_slowest" in chart else [])]
+    names = [
+        "amplitude",
+        "other",
+        "period",
+        "impact_count",
+        *(["slowest"] if "motion_slowest" in chart else []),
+    ]
     variables = state_names(tuple(str(chart.attrs["coordinate"]).split()))
-    columns: dict[str, Any] = {name: chart[f"motion_{name}"].values for name in (*names, *variables)}
+    columns: dict[str, Any] = {
+        name: chart[f"motion_{name}"].values for name in (*names, *variables)
+    }
     shape = columns["amplitude"].shape
     at = np.nonzero(np.isfinite(columns["amplitude"]))
     motions = np.zeros(len(at[0]), motion_type(len(variables)))
@@ -198,11 +256,19 @@ class CellOutcome(NumberedSentence):
 
 
 def outcomes(count: np.ndarray, unsettled: np.ndarray, verdict: np.ndarray) -> np.ndarray:
-    """The `CellOutcome` of cells, from their numbers of stable motions and of unsettled starts, and the verdict on the latter."""
-    outcome = np.where(count > 1, CellOutcome.SEVERAL_MOTIONS, np.where(count == 1, CellOutcome.ONE_MOTION, CellOutcome.REST))
+    """The `CellOutcome` of cells, from their numbers of stable motions and of unsettled starts, and
+    the verdict on the latter.
+    """
+    outcome = np.where(
+        count > 1,
+        CellOutcome.SEVERAL_MOTIONS,
+        np.where(count == 1, CellOutcome.ONE_MOTION, CellOutcome.REST),
+    )
     open_ = unsettled > 0
     chaotic = open_ & (verdict == Ending.CHAOTIC)
-    outcome[chaotic] = np.where(count[chaotic] > 0, CellOutcome.MOTIONS_AND_CHAOS, CellOutcome.CHAOS)
+    outcome[chaotic] = np.where(
+        count[chaotic] > 0, CellOutcome.MOTIONS_AND_CHAOS, CellOutcome.CHAOS
+    )
     left = open_ & ~chaotic & (count == 0)
     shown = {Ending.PERIODIC: CellOutcome.LONG, Ending.QUASI_PERIODIC: CellOutcome.QUASI_PERIODIC}
     outcome[left] = [shown.get(Ending(one), CellOutcome.UNDECIDED) for one in verdict[left]]

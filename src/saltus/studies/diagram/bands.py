@@ -1,4 +1,6 @@
-"""The bands of chaos along a parameter as a result: the verdict at each value, the bands, and what happens at their edges."""
+"""The bands of chaos along a parameter as a result: the verdict at each value, the bands, and what
+happens at their edges.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ class EdgeKind(StrEnum):
     description: str
 
     BOUND = "bound", "the range of the study ends"
-    CASCADE = "cascade", "period doublings accumulate: beyond, the motion has 2^k times the period of an orbit that doubles"
+    CASCADE = (
+        "cascade",
+        "period doublings accumulate: beyond, the motion has 2^k times the period of an orbit that doubles",
+    )
     FOLD = "fold", "a stable orbit ends in a fold: chaos begins with intermittency"
     GRAZING = "grazing", "a stable orbit touches the contact"
     CRISIS = "crisis", "the attractor touches an unstable orbit, and motions leave it"
@@ -36,7 +41,8 @@ class EdgeKind(StrEnum):
     def __new__(cls, word: str, description: str) -> EdgeKind:
         """A kind is its word."""
         kind = str.__new__(cls, word)
-        kind._value_, kind.description = word, description
+        kind._value_ = word
+        kind.description = description
         return kind
 
 
@@ -46,11 +52,16 @@ class TriedValues:
 
     values: np.ndarray  # (n,)
     verdict: np.ndarray  # (n,): an `Ending`; PERIODIC also where all motions settle or rest
-    exponent: np.ndarray  # (n,): largest Lyapunov exponent of the motions that have not settled, else nan
+    # (n,): largest Lyapunov exponent of the motions that have not settled, else nan
+    exponent: np.ndarray
     error: np.ndarray  # (n,): half width of its 95 % interval
-    mean_life: np.ndarray  # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded with 95 %
-    period: np.ndarray  # (n,): longest period of the motions that settle, in forcing periods; 0 where none settles
-    states: np.ndarray  # (n, k, d): stroboscopic states of the motions that have not settled, else nan
+    # (n,): mean life of a transient in forcing periods; of chaos the mean life that is excluded
+    # with 95 %
+    mean_life: np.ndarray
+    # (n,): longest period of the motions that settle, in forcing periods; 0 where none settles
+    period: np.ndarray
+    # (n, k, d): stroboscopic states of the motions that have not settled, else nan
+    states: np.ndarray
 
     @property
     def chaotic(self) -> np.ndarray:
@@ -73,13 +84,16 @@ class BandOrigin(NamedTuple):
 
 @dataclass(frozen=True)
 class Edge:
-    """The end of a band: the last value with chaos, the first one without, and what happens between them."""
+    """The end of a band: the last value with chaos, the first one without, and what happens between
+    them.
+    """
 
     inner: float
     outer: float
     kind: EdgeKind = EdgeKind.UNKNOWN
     special: float = np.nan  # the value of the special point that shows the kind
-    distance: float = np.nan  # of the attractor's states to the nearest unstable orbit, relative to the size of the attractor
+    # of the attractor's states to the nearest unstable orbit, relative to the size of the attractor
+    distance: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -119,7 +133,8 @@ class Bands(Result):
         """The tree of `to_datasets`, with the parameter's `path` and the range."""
         import xarray
 
-        low, high = float(self.tried.values.min()), float(self.tried.values.max())
+        low = float(self.tried.values.min())
+        high = float(self.tried.values.max())
         about = {"title": "bands of chaos computed by saltus", "kind": "chaotic_bands"}
         name = self.system.model.coordinates[0]
         where: dict[str, Any] = {"path": self.path, "bounds": [low, high], "coordinate": name}
@@ -127,23 +142,40 @@ class Bands(Result):
         return xarray.DataTree.from_dict({"/": root, **self.to_datasets()})
 
     def to_datasets(self) -> dict[str, xarray.Dataset]:
-        """`bands`, `exponents` (by value) and `stroboscopic` (a dot for each state of the motions, with the peak around it)."""
-        return {"bands": band_dataset(self.bands), "exponents": self._exponents(), "stroboscopic": self._stroboscopic()}
+        """`bands`, `exponents` (by value) and `stroboscopic` (a dot for each state of the motions,
+        with the peak around it).
+        """
+        return {
+            "bands": band_dataset(self.bands),
+            "exponents": self._exponents(),
+            "stroboscopic": self._stroboscopic(),
+        }
 
     def _exponents(self) -> xarray.Dataset:
         import xarray
 
         tried = self.tried
         columns = {
-            "exponent": ("value", tried.exponent, {"long_name": "largest Lyapunov exponent of motions that have not settled"}),
+            "exponent": (
+                "value",
+                tried.exponent,
+                {"long_name": "largest Lyapunov exponent of motions that have not settled"},
+            ),
             "error": ("value", tried.error, {"long_name": "half width of its 95 % interval"}),
             "verdict": ("value", tried.verdict.astype(np.int8), flags(Ending)),
             "life": (
                 "value",
                 tried.mean_life,
-                {"long_name": "mean life of transients; of chaos the life that is excluded", "units": "periods"},
+                {
+                    "long_name": "mean life of transients; of chaos the life that is excluded",
+                    "units": "periods",
+                },
             ),
-            "period": ("value", tried.period, {"long_name": "longest period of what settles", "units": "forcing periods"}),
+            "period": (
+                "value",
+                tried.period,
+                {"long_name": "longest period of what settles", "units": "forcing periods"},
+            ),
         }
         return xarray.Dataset(columns, {"value": ("value", tried.values, {"long_name": self.path})})
 
@@ -152,33 +184,49 @@ class Bands(Result):
 
         motions = self.motions
         shown = np.isfinite(motions.peaks)
-        value, model = np.broadcast_to(motions.value[:, None], shown.shape), self.system.model
+        value = np.broadcast_to(motions.value[:, None], shown.shape)
+        model = self.system.model
         unit = model.unit_of(model.coordinates[0])
         columns = {
-            "position": (motions.states[..., 0], unit, "first coordinate at phase 0, in the last forcing periods"),
-            "velocity": (motions.states[..., motions.states.shape[-1] // 2], unit, "its velocity there"),
+            "position": (
+                motions.states[..., 0],
+                unit,
+                "first coordinate at phase 0, in the last forcing periods",
+            ),
+            "velocity": (
+                motions.states[..., motions.states.shape[-1] // 2],
+                unit,
+                "its velocity there",
+            ),
             "peak": (motions.peaks, unit, "its largest absolute value in each of these periods"),
             "value": (value, "1", self.path),
         }
         return xarray.Dataset(
-            {name: ("dot", array[shown], {"units": units, "long_name": text}) for name, (array, units, text) in columns.items()}
+            {
+                name: ("dot", array[shown], {"units": units, "long_name": text})
+                for name, (array, units, text) in columns.items()
+            }
         )
 
 
 def bands_of(tried: TriedValues) -> tuple[Band, ...]:
     """The runs of successive values with chaos."""
     chaos = np.concatenate([[False], tried.chaotic, [False]]).astype(int)
-    first, last = np.flatnonzero(np.diff(chaos) == 1), np.flatnonzero(np.diff(chaos) == -1) - 1
+    first = np.flatnonzero(np.diff(chaos) == 1)
+    last = np.flatnonzero(np.diff(chaos) == -1) - 1
     bands = []
     for a, b in zip(first.tolist(), last.tolist(), strict=True):
-        low, high = _edge(tried, a, a - 1), _edge(tried, b, b + 1)
+        low = _edge(tried, a, a - 1)
+        high = _edge(tried, b, b + 1)
         top = a + int(np.nanargmax(tried.exponent[a : b + 1]))
         bands.append(Band(low, high, float(tried.exponent[top]), float(tried.error[top])))
     return tuple(bands)
 
 
 def _edge(tried: TriedValues, inner: int, outer: int) -> Edge:
-    """The edge between the last value with chaos and its neighbour without; the bound of the range if there is no neighbour."""
+    """The edge between the last value with chaos and its neighbour without; the bound of the range
+    if there is no neighbour.
+    """
     value = float(tried.values[inner])
     if not 0 <= outer < len(tried.values):
         return Edge(value, value, EdgeKind.BOUND)
@@ -187,26 +235,49 @@ def _edge(tried: TriedValues, inner: int, outer: int) -> Edge:
 
 
 def band_dataset(bands: tuple[Band, ...] = ()) -> xarray.Dataset:
-    """The bands, a row each, with both ends of the bracket of each edge and what happens at the edge."""
+    """The bands, a row each, with both ends of the bracket of each edge and what happens at the
+    edge.
+    """
     import xarray
 
     columns: dict[str, Any] = {"kind": ("band", np.full(len(bands), "CH", dtype="U2"))}
     numbers = {
         "low": ([band.low for band in bands], "least value with chaos"),
         "high": ([band.high for band in bands], "largest value with chaos"),
-        "before": ([band.lower.outer for band in bands], "next value below, at which no motion is shown to be chaotic"),
-        "after": ([band.upper.outer for band in bands], "next value above, at which no motion is shown to be chaotic"),
-        "exponent": ([band.exponent for band in bands], "largest Lyapunov exponent found in it, per unit of dimensionless time"),
-        "error": ([band.error for band in bands], "of that exponent, half width of its 95 % interval"),
+        "before": (
+            [band.lower.outer for band in bands],
+            "next value below, at which no motion is shown to be chaotic",
+        ),
+        "after": (
+            [band.upper.outer for band in bands],
+            "next value above, at which no motion is shown to be chaotic",
+        ),
+        "exponent": (
+            [band.exponent for band in bands],
+            "largest Lyapunov exponent found in it, per unit of dimensionless time",
+        ),
+        "error": (
+            [band.error for band in bands],
+            "of that exponent, half width of its 95 % interval",
+        ),
     }
     for name, (values, text) in numbers.items():
         columns[name] = ("band", np.array(values, dtype=float), {"long_name": text})
-    for side, edges in (("low", [band.lower for band in bands]), ("high", [band.upper for band in bands])):
+    for side, edges in (
+        ("low", [band.lower for band in bands]),
+        ("high", [band.upper for band in bands]),
+    ):
         columns[f"{side}_edge"] = (
             "band", np.array([str(edge.kind) for edge in edges], dtype="U16"), {"long_name": f"what happens at the {side} edge"},
         )  # fmt: skip
-        special, distance = ([getattr(edge, name) for edge in edges] for name in ("special", "distance"))
-        columns[f"{side}_special"] = ("band", np.array(special, dtype=float), {"long_name": "value of the special point there"})
+        special, distance = (
+            [getattr(edge, name) for edge in edges] for name in ("special", "distance")
+        )
+        columns[f"{side}_special"] = (
+            "band",
+            np.array(special, dtype=float),
+            {"long_name": "value of the special point there"},
+        )
         columns[f"{side}_distance"] = (
             "band", np.array(distance, dtype=float), {"long_name": "of the attractor to the nearest unstable orbit, by its size"},
         )  # fmt: skip
@@ -219,18 +290,26 @@ class EdgeSettings:
 
     # Largest distance of a fold or a grazing from the bracket of an edge, as a share of the range.
     beside: float = 1e-4
-    # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at which its cascade ends.
+    # Largest distance, as a share of the range, of the period doubling of an orbit from the edge at
+    # which its cascade ends.
     cascade: float = 0.03
-    nearest: int = 4  # The period of the motions beyond an edge is that at the first regular one of this many values next to it.
-    # The largest distance, as a share of the attractor's size, at which the attractor touches an unstable orbit: its states are
-    # no denser than that. Inside the band, at `depth` times the range from the edge or in the middle of a narrower band, it must
-    # be at least `grown` times as far away, as unstable orbits within the attractor are near to it everywhere.
+    # The period of the motions beyond an edge is that at the first regular one of this many values
+    # next to it.
+    nearest: int = 4
+    # The largest distance, as a share of the attractor's size, at which the attractor touches an
+    # unstable orbit: its states are no denser than that. Inside the band, at `depth` times the
+    # range from the edge or in the middle of a narrower band, it must be at least `grown` times as
+    # far away, as unstable orbits within the attractor are near to it everywhere.
     touch: float = 0.02
     grown: float = 3.0
     depth: float = 0.005
-    longest_period: int = 3  # The longest period of unstable orbits that are compared, in forcing periods.
-    same_place: float = 1e-9  # An orbit is that of a special point if their parameters differ by no more than this, relatively.
-    periods: int = 400  # Forcing periods for which chaotic motions are followed to sample the attractor's states.
+    # The longest period of unstable orbits that are compared, in forcing periods.
+    longest_period: int = 3
+    # An orbit is that of a special point if their parameters differ by no more than this,
+    # relatively.
+    same_place: float = 1e-9
+    # Forcing periods for which chaotic motions are followed to sample the attractor's states.
+    periods: int = 400
 
 
 SETTINGS = EdgeSettings()
@@ -239,13 +318,17 @@ SETTINGS = EdgeSettings()
 def explained(system: System, chaos: Bands, branches: Sequence[Branch]) -> Bands:
     """The bands with what happens at each edge, as far as the branches of the same diagram show it.
 
-    If a fold or a grazing at which orbits lose their stability lies in the bracket of the edge, it is what happens there. The
-    edge is the end of a cascade if the motions beyond it have 2^k times (k > 0) the period of an orbit whose period doubling lies
-    on that side. It is a crisis if the motions beyond are transients and the attractor, whose states at phase 0 are away from
-    the states of an unstable orbit within the band, comes up to them at the edge.
+    If a fold or a grazing at which orbits lose their stability lies in the bracket of the edge, it
+    is what happens there. The edge is the end of a cascade if the motions beyond it have 2^k times
+    (k > 0) the period of an orbit whose period doubling lies on that side. It is a crisis if the
+    motions beyond are transients and the attractor, whose states at phase 0 are away from the
+    states of an unstable orbit within the band, comes up to them at the edge.
     """
     look = _Evidence(system, chaos, branches)
-    bands = [replace(band, lower=look.of(band, band.lower), upper=look.of(band, band.upper)) for band in chaos.bands]
+    bands = [
+        replace(band, lower=look.of(band, band.lower), upper=look.of(band, band.upper))
+        for band in chaos.bands
+    ]
     return replace(chaos, bands=tuple(bands))
 
 
@@ -253,7 +336,9 @@ class _Evidence:
     """The special points and the unstable orbits of a diagram."""
 
     def __init__(self, system: System, chaos: Bands, branches: Sequence[Branch]) -> None:
-        self.system, self.chaos, self.branches = system, chaos, branches
+        self.system = system
+        self.chaos = chaos
+        self.branches = branches
         self.span = float(np.ptp(chaos.tried.values))
         self.special = turning_points(branches)
 
@@ -267,20 +352,33 @@ class _Evidence:
         if self._verdict(edge.outer) is not Ending.TRANSIENT:
             return edge
         distance = self._touched(band, edge)
-        return replace(edge, distance=distance, kind=EdgeKind.CRISIS if distance <= SETTINGS.touch else edge.kind)
+        return replace(
+            edge,
+            distance=distance,
+            kind=EdgeKind.CRISIS if distance <= SETTINGS.touch else edge.kind,
+        )
 
     def _verdict(self, value: float) -> Ending:
         return Ending(self.chaos.tried.verdict[np.searchsorted(self.chaos.tried.values, value)])
 
     def _special(self, edge: Edge) -> tuple[SpecialPoint | None, EdgeKind]:
-        """The special point that shows what happens at an edge, or None, and the kind of edge that it makes."""
-        low, high, reach = min(edge.inner, edge.outer), max(edge.inner, edge.outer), SETTINGS.beside * self.span
+        """The special point that shows what happens at an edge, or None, and the kind of edge that
+        it makes.
+        """
+        low = min(edge.inner, edge.outer)
+        high = max(edge.inner, edge.outer)
+        reach = SETTINGS.beside * self.span
         beside = [point for point in self.special if low - reach <= point.parameter <= high + reach]
         for code, kind in ((SpecialKind.LP, EdgeKind.FOLD), (SpecialKind.GR, EdgeKind.GRAZING)):
-            nearest = min((p for p in beside if p.kind == code), key=lambda p: abs(p.parameter - edge.outer), default=None)
+            nearest = min(
+                (p for p in beside if p.kind == code),
+                key=lambda p: abs(p.parameter - edge.outer),
+                default=None,
+            )
             if nearest is not None:
                 return nearest, kind
-        period, side = self._period_beyond(edge), np.sign(edge.outer - edge.inner)
+        period = self._period_beyond(edge)
+        side = np.sign(edge.outer - edge.inner)
         doubled = [
             point
             for point in self.special
@@ -292,24 +390,47 @@ class _Evidence:
         return nearest, EdgeKind.CASCADE
 
     def _period_beyond(self, edge: Edge) -> int:
-        """The longest period of the motions at the nearest value beyond an edge at which they are regular; 0 if there is none."""
-        tried, first = self.chaos.tried, int(np.searchsorted(self.chaos.tried.values, edge.outer))
+        """The longest period of the motions at the nearest value beyond an edge at which they are
+        regular; 0 if there is none.
+        """
+        tried = self.chaos.tried
+        first = int(np.searchsorted(self.chaos.tried.values, edge.outer))
         step = 1 if edge.outer > edge.inner else -1
-        nearest = [i for i in range(first, first + SETTINGS.nearest * step, step) if 0 <= i < len(tried.values)]
-        return next((int(tried.period[i]) for i in nearest if tried.verdict[i] == Ending.PERIODIC and tried.period[i] > 0), 0)
+        nearest = [
+            i
+            for i in range(first, first + SETTINGS.nearest * step, step)
+            if 0 <= i < len(tried.values)
+        ]
+        return next(
+            (
+                int(tried.period[i])
+                for i in nearest
+                if tried.verdict[i] == Ending.PERIODIC and tried.period[i] > 0
+            ),
+            0,
+        )
 
     def _touched(self, band: Band, edge: Edge) -> float:
-        """The attractor's distance to the unstable orbit that it touches at an edge but not inside the band; nan if there is
-        none."""
-        tried, span = self.chaos.tried, band.high - band.low
+        """The attractor's distance to the unstable orbit that it touches at an edge but not inside
+        the band; nan if there is none."""
+        tried = self.chaos.tried
+        span = band.high - band.low
         toward = np.sign(edge.inner - edge.outer) * min(SETTINGS.depth * self.span, 0.5 * span)
-        inside = np.flatnonzero(tried.chaotic & (tried.values >= band.low) & (tried.values <= band.high))
-        within = float(tried.values[inside[np.abs(tried.values[inside] - edge.inner - toward).argmin()]])
-        here, there = self._attractor(edge.inner), self._attractor(within)
+        inside = np.flatnonzero(
+            tried.chaotic & (tried.values >= band.low) & (tried.values <= band.high)
+        )
+        within = float(
+            tried.values[inside[np.abs(tried.values[inside] - edge.inner - toward).argmin()]]
+        )
+        here = self._attractor(edge.inner)
+        there = self._attractor(within)
         best = float("nan")
         for branch in self.branches:
             distance = _distance(here, branch, edge.inner)
-            if distance <= SETTINGS.touch and _distance(there, branch, within) >= SETTINGS.grown * distance:
+            if (
+                distance <= SETTINGS.touch
+                and _distance(there, branch, within) >= SETTINGS.grown * distance
+            ):
                 best = float(np.fmin(best, distance))
         return best
 
@@ -324,8 +445,8 @@ class _Evidence:
 
 
 def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
-    """The least distance of an attractor's states to the unstable orbits of a branch, as a share of the attractor's size; inf if
-    there are no such orbits."""
+    """The least distance of an attractor's states to the unstable orbits of a branch, as a share of
+    the attractor's size; inf if there are no such orbits."""
     orbits = _unstable_at(branch, value)
     if not orbits:
         return np.inf
@@ -335,12 +456,16 @@ def _distance(states: np.ndarray, branch: Branch, value: float) -> float:
 
 
 def turning_points(branches: Sequence[Branch]) -> list[SpecialPoint]:
-    """The special points at which stable orbits lose their stability or end: those with stable orbits on one side only."""
+    """The special points at which stable orbits lose their stability or end: those with stable
+    orbits on one side only.
+    """
     return [special for branch in branches for special in branch.special if _turns(branch, special)]
 
 
 def _turns(branch: Branch, special: SpecialPoint) -> bool:
-    """Whether stability changes at a special point, or a stable branch ends there; orbits at the point itself do not count."""
+    """Whether stability changes at a special point, or a stable branch ends there; orbits at the
+    point itself do not count.
+    """
     away = np.abs(branch.parameters - special.parameter)
     apart = away + np.abs(branch.amplitudes - special.amplitude)
     nearest = int(apart.argmin())
@@ -354,7 +479,9 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
 def band_origins(branches: Sequence[Branch]) -> list[BandOrigin]:
     """The special points of branches at which narrow bands may begin, as `BandSearch` takes them."""
     return [
-        BandOrigin(str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist()))
+        BandOrigin(
+            str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist())
+        )
         for special in turning_points(branches)
     ]
 
@@ -375,13 +502,16 @@ def _unstable_at(branch: Branch, value: float) -> list[PeriodicOrbit]:
 
 def _section(orbit: PeriodicOrbit) -> np.ndarray:
     """The states of an orbit at phase 0, and those of its mirror image, (n, d)."""
-    motion, forcing = orbit.motion(orbit.period + 2), orbit.duration / orbit.period
+    motion = orbit.motion(orbit.period + 2)
+    forcing = orbit.duration / orbit.period
     first = forcing * np.ceil(motion.start / forcing)
     times = first + forcing * np.arange(orbit.period)
     states = _at(motion, times)
     if not is_symmetric(orbit.system):
         return states
-    return np.concatenate([states, image_of(orbit.system.model, _at(motion, times + 0.5 * forcing))])
+    return np.concatenate(
+        [states, image_of(orbit.system.model, _at(motion, times + 0.5 * forcing))]
+    )
 
 
 def _at(motion: Motion, times: np.ndarray) -> np.ndarray:

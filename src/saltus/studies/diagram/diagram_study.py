@@ -1,4 +1,6 @@
-"""Response spectra and bifurcation diagrams: every periodic orbit that a simulation finds, followed along one parameter."""
+"""Response spectra and bifurcation diagrams: every periodic orbit that a simulation finds, followed
+along one parameter.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,10 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     """The DataTree that `bifurcation_diagram` returns; `facts` are further attributes."""
     import xarray
 
-    system, path, bounds, branches = search.system, search.path, search.bounds, search.branches.branches
+    system = search.system
+    path = search.path
+    bounds = search.bounds
+    branches = search.branches.branches
     low, high = search.missed.interval
     attributes = provenance(
         system,
@@ -64,38 +69,60 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         missed=search.missed.missed,
         samples_tried=search.missed.samples,
     )
-    order = sorted(range(len(branches)), key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)))
-    nodes = {"/": xarray.Dataset(attrs=attributes), **branch_tables(confirmed([branches[i] for i in order], search.work))}
+    order = sorted(
+        range(len(branches)),
+        key=lambda i: (branches[i].points[0].orbit.period, -len(branches[i].points)),
+    )
+    nodes = {
+        "/": xarray.Dataset(attrs=attributes),
+        **branch_tables(confirmed([branches[i] for i in order], search.work)),
+    }
     chaos = search.chaos
-    bands = {"bands": band_dataset()} if chaos is None else explained(system, chaos, branches).to_datasets()
+    bands = (
+        {"bands": band_dataset()}
+        if chaos is None
+        else explained(system, chaos, branches).to_datasets()
+    )
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
     return xarray.DataTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
 
 
 def _effort(search: DiagramSearch) -> dict[str, Any]:
-    """How much was tried, as attributes; of the search for chaos only the shares of the range down to which it halved."""
-    tried, chaos = asdict(search.effort), search.effort.chaos
+    """How much was tried, as attributes; of the search for chaos only the shares of the range down
+    to which it halved.
+    """
+    tried = asdict(search.effort)
+    chaos = search.effort.chaos
     del tried["chaos"]
     return tried | {"chaos_step": chaos.step, "chaos_edge": chaos.edge}
 
 
 def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[float]:
-    """The amplitudes that motions of the mechanism cannot exceed, rad; none if they vary with the parameter of the diagram."""
-    low, high = ([float(limit.value) for limit in amplitude_limits(system, {path: value})] for value in bounds)
+    """The amplitudes that motions of the mechanism cannot exceed, rad; none if they vary with the
+    parameter of the diagram.
+    """
+    low, high = (
+        [float(limit.value) for limit in amplitude_limits(system, {path: value})]
+        for value in bounds
+    )
     return low if low == high else []
 
 
 def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
-    """The datasets of branches, with the distance by which simulated orbits miss themselves: `defect` after one period, `kept`
-    after 20 periods, for stable orbits.
+    """The datasets of branches, with the distance by which simulated orbits miss themselves:
+    `defect` after one period, `kept` after 20 periods, for stable orbits.
 
-    An orbit with stable multipliers whose motion does not stay on it is not called stable; `unconfirmed` counts these.
+    An orbit with stable multipliers whose motion does not stay on it is not called stable;
+    `unconfirmed` counts these.
     """
     found = [branch.to_xarray() for branch in branches]
     ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
     orbits = [orbit for branch in branches for orbit in branch.orbits]
-    stable = np.flatnonzero(np.concatenate([np.zeros(0), *(data["stable"].values for data in found)]))
-    defect, kept = _distances(orbits, 1, work), np.full(len(orbits), np.nan)
+    stable = np.flatnonzero(
+        np.concatenate([np.zeros(0), *(data["stable"].values for data in found)])
+    )
+    defect = _distances(orbits, 1, work)
+    kept = np.full(len(orbits), np.nan)
     kept[stable] = _distances([orbits[i] for i in stable], CONFIRMATION.rounds, work)
     for data, first, last in zip(found, ends, ends[1:], strict=False):
         here = kept[first:last]
@@ -103,25 +130,42 @@ def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]
         lost |= (data["stable"].values > 0) & ~np.isfinite(here)
         data["stable"][lost] = 0
         data.attrs["unconfirmed"] = int(lost.sum())
-        data["defect"] = ("point", defect[first:last], {"long_name": "distance after one period, by the event-driven flow"})
-        data["kept"] = ("point", here, {"long_name": f"distance after {CONFIRMATION.rounds} periods, where stable"})
+        data["defect"] = (
+            "point",
+            defect[first:last],
+            {"long_name": "distance after one period, by the event-driven flow"},
+        )
+        data["kept"] = (
+            "point",
+            here,
+            {"long_name": f"distance after {CONFIRMATION.rounds} periods, where stable"},
+        )
     return found
 
 
 def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> np.ndarray:
-    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven flow, all orbits in lanes."""
+    """The distance of each orbit from itself after `rounds` of its periods, by the event-driven
+    flow, all orbits in lanes.
+    """
     return work.distances(closing_rows(orbits, rounds)) if orbits else np.empty(0)
 
 
 def _attractors(search: DiagramSearch) -> xarray.Dataset:
-    """The attractors on which motions settled at the values of the grid, a dot each, without those of long periods that are not
-    followed."""
+    """The attractors on which motions settled at the values of the grid, a dot each, without those
+    of long periods that are not followed."""
     found = search.found
     left = np.isin(found.assignment[found.rows], (BranchAssignment.LONGER, BranchAssignment.RARE))
     shown = np.isin(found.motions.value[found.rows], search.grid) & ~left
     data = _dots(search, found.rows[shown])
-    data["starts"] = ("dot", found.starts[shown], {"long_name": "motions of the simulation that have settled on it"})
-    data["placed"] = ("dot", (found.assignment[found.rows[shown]] == BranchAssignment.ON_BRANCH).astype(np.int8))
+    data["starts"] = (
+        "dot",
+        found.starts[shown],
+        {"long_name": "motions of the simulation that have settled on it"},
+    )
+    data["placed"] = (
+        "dot",
+        (found.assignment[found.rows[shown]] == BranchAssignment.ON_BRANCH).astype(np.int8),
+    )
     data["placed"].attrs["long_name"] = "whether it lies on a stable part of a branch"
     return data
 
@@ -129,8 +173,12 @@ def _attractors(search: DiagramSearch) -> xarray.Dataset:
 def _unplaced(search: DiagramSearch) -> xarray.Dataset:
     """The attractors that lie on no branch, at all values, with the reason."""
     rows = search.found.unplaced
-    data, places = _dots(search, rows), search.found.assignment[rows]
-    data["reason"] = ("dot", np.array([BranchAssignment(place).name.lower() for place in places], dtype="U16"))
+    data = _dots(search, rows)
+    places = search.found.assignment[rows]
+    data["reason"] = (
+        "dot",
+        np.array([BranchAssignment(place).name.lower() for place in places], dtype="U16"),
+    )
     data["reason"].attrs = {place.name.lower(): str(place) for place in BranchAssignment}
     return data
 
@@ -139,7 +187,8 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
     """Simulated motions that repeat themselves."""
     import xarray
 
-    motions, model = search.found.motions.only(rows), search.system.model
+    motions = search.found.motions.only(rows)
+    model = search.system.model
     angle = {"units": model.unit_of(model.coordinates[0])}
     columns: dict[str, tuple[np.ndarray, dict[str, str]]] = {
         "parameter": (motions.value, {"long_name": search.path}),
@@ -150,25 +199,38 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
         "impact_count": (motions.impact_count, {"long_name": "impacts in them"}),
     }
     if model.names_its_contacts:
-        columns["slowest"] = motions.slowest, angle | {"long_name": "least speed of an impact, 0 without impacts"}
+        columns["slowest"] = (
+            motions.slowest,
+            angle | {"long_name": "least speed of an impact, 0 without impacts"},
+        )
     for i, name in enumerate(state_names(model.coordinates)):
         columns[name] = motions.last[:, i], angle | {"long_name": f"{name} at phase 0"}
     return xarray.Dataset({name: ("dot", *column) for name, column in columns.items()})
 
 
 def _searched(search: DiagramSearch) -> xarray.Dataset:
-    """The values of the grid, and how many of the motions from the starts there settled on no periodic orbit, and why."""
+    """The values of the grid, and how many of the motions from the starts there settled on no
+    periodic orbit, and why.
+    """
     import xarray
 
     first = search.found.motions.only(slice(0, len(search.grid) * search.effort.starts))
     outcomes = (first.unsettled, first.at_rest, first.ended)
-    unsettled, at_rest, ended = (which.reshape(len(search.grid), -1).sum(axis=1) for which in outcomes)
+    unsettled, at_rest, ended = (
+        which.reshape(len(search.grid), -1).sum(axis=1) for which in outcomes
+    )
     columns = {
-        "unsettled": ("searched", unsettled, {"long_name": "motions that did not settle: slow, of a long period, or chaotic"}),
+        "unsettled": (
+            "searched",
+            unsettled,
+            {"long_name": "motions that did not settle: slow, of a long period, or chaotic"},
+        ),
         "at_rest": ("searched", at_rest, {"long_name": "motions that came to rest"}),
         "ended": ("searched", ended, {"long_name": "motions that a limit of the model ended"}),
     }
-    return xarray.Dataset(columns, coords={"searched": ("searched", search.grid, {"long_name": search.path})})
+    return xarray.Dataset(
+        columns, coords={"searched": ("searched", search.grid, {"long_name": search.path})}
+    )
 
 
 @dataclass(frozen=True)
@@ -235,15 +297,18 @@ def bifurcation_diagram(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
-    """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos (Figs. 11 to 13).
+    """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos
+    (Figs. 11 to 13).
 
-    Motions are simulated from states spread over a window at many values of the parameter, then from the motions at neighbouring
-    values, until nothing new is found. The orbits on which they settle are followed, unless a branch goes through them already;
-    motions that do not settle are judged by `judge`. Unstable orbits of up to `repelling` forcing periods, and the
-    families that are born at every PD and BPC, are followed as well; families of more than one forcing period also above the
-    upper bound, where many of them close. At last random motions estimate the share of the states that end on something that the
-    diagram lacks, and the orbits on which they settle are followed too. Every orbit is confirmed by the event-driven flow over a
-    period, stable ones over 20.
+    Motions are simulated from states spread over a window at many values of the parameter, then
+    from the motions at neighbouring values, until nothing new is found. The orbits on which they
+    settle are followed, unless a branch goes through them already; motions that do not settle are
+    judged by `judge`. Unstable orbits of up to `repelling` forcing periods, and the families that
+    are born at every PD and BPC, are followed as well; families of more than one forcing period
+    also above the upper bound, where many of them close. At last random motions estimate the share
+    of the states that end on something that the diagram lacks, and the orbits on which they settle
+    are followed too. Every orbit is confirmed by the event-driven flow over a period, stable ones
+    over 20.
 
     Parameters
     ----------
@@ -252,28 +317,31 @@ def bifurcation_diagram(
     path, bounds, effort
         Dotted path of the parameter, its range, and how much is tried, see `Effort`.
     max_period
-        The longest period of orbits that are followed, in forcing periods. Orbits of more than 6 are followed only if random
-        motions end on them, and only while they are stable.
+        The longest period of orbits that are followed, in forcing periods. Orbits of more than 6
+        are followed only if random motions end on them, and only while they are stable.
     values
-        Values at which motions are simulated; by default evenly spaced, as many as the effort says. If they are given, the orbits
-        on which random motions settle are not followed.
+        Values at which motions are simulated; by default evenly spaced, as many as the effort says.
+        If they are given, the orbits on which random motions settle are not followed.
     starts, window, seed
-        How many initial states there are at each value, by default as the effort says; the window in which they lie; their seed.
+        How many initial states there are at each value, by default as the effort says; the window
+        in which they lie; their seed.
     repelling, switch
-        The longest period of repelling orbits that are searched for; whether the families born at special points are followed.
+        The longest period of repelling orbits that are searched for; whether the families born at
+        special points are followed.
     step, bands
         The longest step along a branch; whether chaos is looked for.
     store
-        Folder in which all that takes long is kept, so that a search that was stopped goes on, and one with more values or starts
-        computes only what is new.
+        Folder in which all that takes long is kept, so that a search that was stopped goes on, and
+        one with more values or starts computes only what is new.
     workers, scheduler, progress
         Who computes, and how progress is reported, see `saltus.sweep.run`.
 
     Returns
     -------
     xarray.DataTree
-        A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives one), `attractors`,
-        `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`; docs/spectra.md lists their variables and attributes.
+        A DataTree: the branches in `branches`, `points`, `special` and `orbits` (`branch_of` gives
+        one), `attractors`, `unplaced`, `bands`, `exponents`, `stroboscopic` and `search`;
+        docs/spectra.md lists their variables and attributes.
 
     Raises
     ------
@@ -290,22 +358,41 @@ def bifurcation_diagram(
     """
     low, high = check_bounds(bounds)
     tried = EFFORTS[read_effort(effort)]
-    tried = replace(tried, starts=tried.starts if starts is None else starts, samples=tried.samples if values is None else 1)
-    grid, area = _values((low, high), values, tried.values), check_window(window, system)
+    tried = replace(
+        tried,
+        starts=tried.starts if starts is None else starts,
+        samples=tried.samples if values is None else 1,
+    )
+    grid = _values((low, high), values, tried.values)
+    area = check_window(window, system)
     progress = growing(progress)
     progress(0.0, "searching")
-    plan, middle = diagram_plan(system, path, (low, high), area, seed), system.with_({path: 0.5 * (low + high)})
-    with diagram_work(middle, path, plan, None if store is None else Path(store), workers, scheduler) as work:
-        branches = BranchSet(work, (low, high), min(max_period, CHAOS.long_period), step, switch, tried.branches)
+    plan = diagram_plan(system, path, (low, high), area, seed)
+    middle = system.with_({path: 0.5 * (low + high)})
+    with diagram_work(
+        middle, path, plan, None if store is None else Path(store), workers, scheduler
+    ) as work:
+        branches = BranchSet(
+            work, (low, high), min(max_period, CHAOS.long_period), step, switch, tried.branches
+        )
         search = DiagramSearch(work, (low, high), grid, area, seed, tried, branches, max_period)
         _search(search, repelling, bands, values is None, progress)
-        tree = diagram_tree(search, kind="bifurcation_diagram", effort=str(read_effort(effort)), max_period=max_period)
+        tree = diagram_tree(
+            search,
+            kind="bifurcation_diagram",
+            effort=str(read_effort(effort)),
+            max_period=max_period,
+        )
     progress(1.0, "done")
     return tree
 
 
-def _search(search: DiagramSearch, repelling: int, bands: bool, follow: bool, progress: Progress) -> None:
-    """Simulate; follow the orbits that this shows, and look for chaos; see what random motions end on, and `follow` it."""
+def _search(
+    search: DiagramSearch, repelling: int, bands: bool, follow: bool, progress: Progress
+) -> None:
+    """Simulate; follow the orbits that this shows, and look for chaos; see what random motions end
+    on, and `follow` it.
+    """
     search.simulate(part_of(progress, 0.0, SHARES.simulation, "searching"))
     search.find(repelling, bands, part_of(progress, SHARES.simulation, SHARES.search))
     search.estimate(follow, part_of(progress, SHARES.search, SHARES.estimate))
@@ -341,7 +428,8 @@ def response_spectrum(
         What moves, under a load with a frequency.
     path, bounds
         The dotted path of the frequency, its lowest and its highest value.
-    effort, max_period, values, starts, window, seed, repelling, switch, step, bands, store, workers, scheduler, progress
+    effort, max_period, values, starts, window, seed, repelling, switch, step, bands, store,
+    workers, scheduler, progress
         As for `bifurcation_diagram`.
 
     Examples
@@ -375,15 +463,23 @@ def response_spectrum(
 
 
 def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: int) -> np.ndarray:
-    """The values at which motions are simulated, in order: those given, or `count` values from bound to bound."""
+    """The values at which motions are simulated, in order: those given, or `count` values from
+    bound to bound.
+    """
     if values is None:
         return np.linspace(*bounds, count)
     grid = as_numbers(values, "values")
     if grid.ndim != 1 or not grid.size:
-        raise ParameterError(f"values must be numbers at which to search, got {shown(values)}", "values")
+        raise ParameterError(
+            f"values must be numbers at which to search, got {shown(values)}", "values"
+        )
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
         raise ParameterError(
-            f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds or leave it out", "values"
+            (
+                f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds "
+                "or leave it out"
+            ),
+            "values",
         )
     return np.unique(grid)

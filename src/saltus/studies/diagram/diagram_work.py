@@ -1,8 +1,10 @@
-"""The long computations of a diagram's search, done in this process, or as parts that other processes compute and a store keeps.
+"""The long computations of a diagram's search, done in this process, or as parts that other
+processes compute and a store keeps.
 
-Each part is a pure function of its inputs, which are JSON: how motions end, the judgement of motions that have not settled, the
-branch of an orbit, and the distance of an orbit from itself after some of its periods. A search that runs again finds in its
-store what was computed before it was stopped.
+Each part is a pure function of its inputs, which are JSON: how motions end, the judgement of
+motions that have not settled, the branch of an orbit, and the distance of an orbit from itself
+after some of its periods. A search that runs again finds in its store what was computed before it
+was stopped.
 """
 
 from __future__ import annotations
@@ -41,12 +43,14 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-def side_by_side(beside: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress) -> None:
+def side_by_side(
+    beside: Callable[[Progress], object], here: Callable[[Progress], object], progress: Progress
+) -> None:
     """Do two things at the same time, `beside` in another thread.
 
-    Neither may change what the other one reads; the results are then those of one after the other, which is how they are done if
-    there is one core only. Only this thread calls `progress`. If one of them is interrupted or fails, the other one ends when it
-    next reports its progress.
+    Neither may change what the other one reads; the results are then those of one after the other,
+    which is how they are done if there is one core only. Only this thread calls `progress`. If one
+    of them is interrupted or fails, the other one ends when it next reports its progress.
     """
     if available_cores() == 1:
         beside(progress)
@@ -65,7 +69,8 @@ def side_by_side(beside: Callable[[Progress], object], here: Callable[[Progress]
 
 
 def all_at_once(computations: Sequence[Callable[[Progress], R]]) -> list[R]:
-    """The results of computations that do not depend on one another, each in a thread of its own if there are several cores.
+    """The results of computations that do not depend on one another, each in a thread of its own if
+    there are several cores.
 
     After an interrupt each ends when it next reports its progress.
     """
@@ -78,11 +83,16 @@ def all_at_once(computations: Sequence[Callable[[Progress], R]]) -> list[R]:
 
 
 class _Others:
-    """Threads beside this one. If this one leaves the context by an exception, they end when they next report their progress."""
+    """Threads beside this one.
+
+    If this one leaves the context by an exception, they end when they next report their progress.
+    """
 
     def __init__(self, count: int) -> None:
-        self._pool, self._stopped = ThreadPoolExecutor(count), threading.Event()
-        self._runs, self._report = list[Future[Any]](), (0.0, "")
+        self._pool = ThreadPoolExecutor(count)
+        self._stopped = threading.Event()
+        self._runs = list[Future[Any]]()
+        self._report = (0.0, "")
 
     def __enter__(self) -> _Others:
         return self
@@ -118,21 +128,30 @@ class _Others:
 HERE = "saltus.studies.diagram.diagram_work"
 JUDGED = tuple(part.name for part in fields(Judged) if part.name != "settled")
 EARLIER = tuple(part.name for part in fields(EarlierJudgement))
-SETTLED, ALIKE = 32, 4  # the most settled motions that are kept of a judgement, and the most of one period
+# the most settled motions that are kept of a judgement, and the most of one period
+SETTLED = 32
+ALIKE = 4
 
 
 @dataclass(frozen=True)
 class Request:
-    """The request for a branch: its start, its bounds, its longest step, and whether it ends where its orbits lose stability."""
+    """The request for a branch: its start, its bounds, its longest step, and whether it ends where
+    its orbits lose stability.
+    """
 
-    start: PeriodicOrbit | SpecialPoint  # an orbit to be followed, or a special point at which branches are born
+    # an orbit to be followed, or a special point at which branches are born
+    start: PeriodicOrbit | SpecialPoint
     bounds: tuple[float, float]
     step: float
     while_stable: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The request as an input of a part."""
-        numbers = {"bounds": list(self.bounds), "step": self.step, "while_stable": self.while_stable}
+        numbers = {
+            "bounds": list(self.bounds),
+            "step": self.step,
+            "while_stable": self.while_stable,
+        }
         return numbers | {"start": as_json(self.start)}
 
     def branches(self, path: str, progress: Progress = silent) -> list[Branch]:
@@ -140,7 +159,9 @@ class Request:
         options: dict[str, Any] = {"step": self.step, "progress": progress}
         if isinstance(self.start, SpecialPoint):
             return list(switch_branch(self.start, self.bounds, both=False, **options))
-        return [continue_orbit(self.start, path, self.bounds, while_stable=self.while_stable, **options)]
+        return [
+            continue_orbit(self.start, path, self.bounds, while_stable=self.while_stable, **options)
+        ]
 
 
 @dataclass
@@ -150,20 +171,30 @@ class DiagramWork:
     system: System
     path: str
     memo: Memo | None = None  # None: everything is computed in this process, and nothing is kept
-    at_once: int = 1  # branches that are computed at the same time; some of them may turn out not to be needed
-    # For motions that are known to end: how many forcing periods they were given, and after how many they ended.
+    # branches that are computed at the same time; some of them may turn out not to be needed
+    at_once: int = 1
+    # For motions that are known to end: how many forcing periods they were given, and after how
+    # many they ended.
     ended: dict[tuple[float, ...], tuple[int, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for given, found in () if self.memo is None else self.memo.remembered(kinds()["motions"]):
             self._note(given, found)
 
-    def simulate(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
+    def simulate(
+        self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+    ) -> SimulatedMotions:
         """`simulate_from` states at values of the parameter."""
-        return simulate_from(self.system, self.path, values, states, periods, progress, self.followed)
+        return simulate_from(
+            self.system, self.path, values, states, periods, progress, self.followed
+        )
 
-    def followed(self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent) -> SimulatedMotions:
-        """`followed` from states at values of the parameter, for at most so many periods, even if motions are slow."""
+    def followed(
+        self, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+    ) -> SimulatedMotions:
+        """`followed` from states at values of the parameter, for at most so many periods, even if
+        motions are slow.
+        """
         if self.memo is None or not len(values):
             return followed(self.system, self.path, values, states, periods, progress)
         begun = np.column_stack([values, states]).tolist()
@@ -171,10 +202,13 @@ class DiagramWork:
         found = self.memo.results(kinds()["motions"], inputs, progress)
         for given, one in zip(inputs, found, strict=True):
             self._note(given, one)
-        return SimulatedMotions(*(np.array([one[part.name] for one in found]) for part in fields(SimulatedMotions)))
+        return SimulatedMotions(
+            *(np.array([one[part.name] for one in found]) for part in fields(SimulatedMotions))
+        )
 
     def _time(self, begun: tuple[float, ...], periods: int) -> int:
-        """The forcing periods to ask for: `periods` or, if the motion is known to end within these, as many as it was given then.
+        """The forcing periods to ask for: `periods` or, if the motion is known to end within these,
+        as many as it was given then.
 
         It ends in the same way, and the store has the answer to the earlier request.
         """
@@ -186,16 +220,27 @@ class DiagramWork:
             self.ended.setdefault(tuple(given[:-1]), (int(given[-1]), float(found["periods"])))
 
     def judge(
-        self, values: np.ndarray, states: np.ndarray, settings: JudgementSettings, earlier: EarlierJudgement | None = None
+        self,
+        values: np.ndarray,
+        states: np.ndarray,
+        settings: JudgementSettings,
+        earlier: EarlierJudgement | None = None,
     ) -> Judged:
         """`judge` of states (n, m, d) at values (n,) of the parameter."""
         if self.memo is None or not len(values):
             return self._judge(values, states, settings, earlier, silent)
         numbers = asdict(settings)
         given = [of_one[np.isfinite(of_one).all(axis=-1)].tolist() for of_one in states]
-        inputs = [{"value": v, "states": s, "settings": numbers} for v, s in zip(values.tolist(), given, strict=True)]
+        inputs = [
+            {"value": v, "states": s, "settings": numbers}
+            for v, s in zip(values.tolist(), given, strict=True)
+        ]
         if earlier is not None:
-            for one, row in zip(inputs, np.stack([getattr(earlier, name) for name in EARLIER], axis=1).tolist(), strict=True):
+            for one, row in zip(
+                inputs,
+                np.stack([getattr(earlier, name) for name in EARLIER], axis=1).tolist(),
+                strict=True,
+            ):
                 one["earlier"] = row
         return _judged(self.memo.results(kinds()["judgements"], inputs))
 
@@ -207,18 +252,32 @@ class DiagramWork:
         earlier: EarlierJudgement | None,
         progress: Progress,
     ) -> Judged:
-        found = judge(self.system, states, {self.path: values}, settings=settings, earlier=earlier, progress=progress)
+        found = judge(
+            self.system,
+            states,
+            {self.path: values},
+            settings=settings,
+            earlier=earlier,
+            progress=progress,
+        )
         return replace(found, settled=found.settled.few(ALIKE, SETTLED))
 
     def judge_all(
-        self, questions: Sequence[tuple[np.ndarray, np.ndarray, JudgementSettings, EarlierJudgement | None]]
+        self,
+        questions: Sequence[
+            tuple[np.ndarray, np.ndarray, JudgementSettings, EarlierJudgement | None]
+        ],
     ) -> list[Judged]:
-        """`judge` several times: all at once, or one after the other if results are kept or other processes compute."""
+        """`judge` several times: all at once, or one after the other if results are kept or other
+        processes compute.
+        """
         if self.memo is not None:
             return [self.judge(*question) for question in questions]
         return all_at_once([partial(self._judge, *question) for question in questions])
 
-    def branches_of(self, requests: Sequence[Request], progress: Progress = silent) -> list[list[Branch]]:
+    def branches_of(
+        self, requests: Sequence[Request], progress: Progress = silent
+    ) -> list[list[Branch]]:
         """The branches of each request; those that the store lacks are computed at the same time."""
         if self.memo is None:
             return [request.branches(self.path, progress) for request in requests]
@@ -226,7 +285,9 @@ class DiagramWork:
         return [from_json(one["branches"]) for one in found]
 
     def prepare(self, requests: Sequence[Request]) -> None:
-        """Compute branches that may be asked for later at the same time, if there are other processes to do so."""
+        """Compute branches that may be asked for later at the same time, if there are other
+        processes to do so.
+        """
         if self.at_once > 1 and self.memo is not None:
             self.memo.results(kinds()["branches"], [request.to_json() for request in requests])
 
@@ -234,7 +295,9 @@ class DiagramWork:
         """`closing_distances` of orbits, (n,), which are given as rows by `closing_rows`."""
         if self.memo is None or not len(starts):
             return closing_distances(self.system, self.path, starts)
-        return np.array([one["distance"] for one in self.memo.results(kinds()["distances"], starts.tolist())])
+        return np.array(
+            [one["distance"] for one in self.memo.results(kinds()["distances"], starts.tolist())]
+        )
 
 
 def kinds() -> dict[str, MemoKind]:
@@ -252,9 +315,15 @@ def kinds() -> dict[str, MemoKind]:
 
 @contextmanager
 def diagram_work(
-    system: System, path: str, plan: Plan, store: Path | None, workers: int | None, scheduler: str | None
+    system: System,
+    path: str,
+    plan: Plan,
+    store: Path | None,
+    workers: int | None,
+    scheduler: str | None,
 ) -> Iterator[DiagramWork]:
-    """The work of a diagram, remembered in a store if one is given, and computed by other processes or by a cluster.
+    """The work of a diagram, remembered in a store if one is given, and computed by other processes
+    or by a cluster.
 
     Raises
     ------
@@ -279,28 +348,41 @@ def diagram_work(
             yield DiagramWork(system, path, Memo(common, store, processes, scheduler), at_once)
         except KeyboardInterrupt:
             keeps = (
-                "nothing is kept without a store" if store is None else f"{store} keeps its parts: run the same again to go on"
+                "nothing is kept without a store"
+                if store is None
+                else f"{store} keeps its parts: run the same again to go on"
             )
             raise SweepInterrupted(f"interrupted; {keeps}") from None
         if kept is not None:
             kept.write((0,), finished({}, {"diagram": np.zeros(1)}))
 
 
-BRANCHES_AT_ONCE = 8  # branches, whatever the number of processes, so that what is computed does not depend on this number
+# branches, whatever the number of processes, so that what is computed does not depend on this
+# number
+BRANCHES_AT_ONCE = 8
 
 
-def diagram_plan(system: System, path: str, bounds: tuple[float, float], window: Any, seed: int) -> Plan:
-    """The plan that identifies the store of a diagram: searches that agree in its entries have parts in common, and may share a
-    store."""
+def diagram_plan(
+    system: System, path: str, bounds: tuple[float, float], window: Any, seed: int
+) -> Plan:
+    """The plan that identifies the store of a diagram: searches that agree in its entries have
+    parts in common, and may share a store."""
     from saltus.sweep import Plan, Variable
 
-    about = {"kind": "diagram", "path": path, "bounds": list(bounds), "window": np.ravel(window).tolist()}
+    about = {
+        "kind": "diagram",
+        "path": path,
+        "bounds": list(bounds),
+        "window": np.ravel(window).tolist(),
+    }
     mark = Variable(dtype="i1", attrs={"long_name": "1 once a search has come to its end"})
     return Plan(
         function=f"{HERE}:finished",
         axes={"diagram": np.zeros(1)},
         variables={"finished": mark},
-        attrs=provenance(system, seed=seed, title="bifurcation diagram computed by saltus", **about),
+        attrs=provenance(
+            system, seed=seed, title="bifurcation diagram computed by saltus", **about
+        ),
     )
 
 
@@ -316,34 +398,56 @@ def _system(arguments: Mapping[str, Any]) -> System:
 
 
 def motions(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, np.ndarray]:
-    """How motions end: each input is the value of the parameter, coordinates, velocities, and the most forcing periods."""
-    system, begun = _system(arguments), np.array(inputs, dtype=float)
+    """How motions end: each input is the value of the parameter, coordinates, velocities, and the
+    most forcing periods.
+    """
+    system = _system(arguments)
+    begun = np.array(inputs, dtype=float)
     periods = np.unique(begun[:, -1])
     alike = [np.flatnonzero(begun[:, -1] == each) for each in periods]
-    parts = [followed(system, arguments["path"], begun[rows, 0], begun[rows, 1:-1], int(begun[rows[0], -1])) for rows in alike]
+    parts = [
+        followed(
+            system, arguments["path"], begun[rows, 0], begun[rows, 1:-1], int(begun[rows[0], -1])
+        )
+        for rows in alike
+    ]
     found = parts[0].joined(*parts[1:]).only(np.argsort(np.concatenate(alike)))
     return {part.name: getattr(found, part.name) for part in fields(found)}
 
 
 def judgements(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, Any]:
-    """The judgements of motions that have not settled; all inputs have the same settings, as they come from one call."""
-    system, settings = _system(arguments), JudgementSettings(**inputs[0]["settings"])
-    states = np.full((len(inputs), max(len(given["states"]) for given in inputs), system.dimension), np.nan)
+    """The judgements of motions that have not settled; all inputs have the same settings, as they
+    come from one call.
+    """
+    system = _system(arguments)
+    settings = JudgementSettings(**inputs[0]["settings"])
+    states = np.full(
+        (len(inputs), max(len(given["states"]) for given in inputs), system.dimension), np.nan
+    )
     for to_fill, given in zip(states, inputs, strict=True):
         to_fill[: len(given["states"])] = given["states"]
-    earlier = EarlierJudgement(*np.array([given["earlier"] for given in inputs]).T) if "earlier" in inputs[0] else None
+    earlier = (
+        EarlierJudgement(*np.array([given["earlier"] for given in inputs]).T)
+        if "earlier" in inputs[0]
+        else None
+    )
     values = np.array([given["value"] for given in inputs])
     found = judge(system, states, {arguments["path"]: values}, settings=settings, earlier=earlier)
     later = found.settled.few(ALIKE, SETTLED)
     own = [later.question == row for row in range(len(inputs))]
-    settled = {f"settled_{name}": [getattr(later, name)[rows] for rows in own] for name in ("state", "period")}
+    settled = {
+        f"settled_{name}": [getattr(later, name)[rows] for rows in own]
+        for name in ("state", "period")
+    }
     return {name: getattr(found, name) for name in JUDGED} | settled
 
 
 def _judged(found: Sequence[Mapping[str, Any]]) -> Judged:
     """The judgements that `judgements` has given, together."""
     question = np.repeat(np.arange(len(found)), [len(one["settled_period"]) for one in found])
-    settled = (np.concatenate([one[f"settled_{name}"] for one in found]) for name in ("state", "period"))
+    settled = (
+        np.concatenate([one[f"settled_{name}"] for one in found]) for name in ("state", "period")
+    )
     columns = {name: np.array([one[name] for one in found]) for name in JUDGED}
     return Judged(settled=SettledLater(question, *settled), **columns)
 
@@ -353,11 +457,17 @@ def branches(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, A
     _system(arguments)
     found = []
     for given in inputs:
-        request = Request(from_json(given["start"]), tuple(given["bounds"]), given["step"], given["while_stable"])
+        request = Request(
+            from_json(given["start"]), tuple(given["bounds"]), given["step"], given["while_stable"]
+        )
         found.append(as_json(request.branches(arguments["path"])))
     return {"branches": found}
 
 
 def distances(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, np.ndarray]:
     """The distances of orbits from themselves after some of their periods."""
-    return {"distance": closing_distances(_system(arguments), arguments["path"], np.array(inputs, dtype=float))}
+    return {
+        "distance": closing_distances(
+            _system(arguments), arguments["path"], np.array(inputs, dtype=float)
+        )
+    }

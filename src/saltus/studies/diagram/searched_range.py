@@ -1,5 +1,5 @@
-"""The values of a parameter at which chaos was looked for: motions that are begun there, and the judgement of those that do not
-settle."""
+"""The values of a parameter at which chaos was looked for: motions that are begun there, and the
+judgement of those that do not settle."""
 
 from __future__ import annotations
 
@@ -27,17 +27,23 @@ class SearchedValue:
     """What is known at one value of the parameter."""
 
     value: float
-    verdict: Ending = field(default=Ending.PERIODIC, compare=False)  # until a motion is judged, all are taken to settle
+    # until a motion is judged, all are taken to settle
+    verdict: Ending = field(default=Ending.PERIODIC, compare=False)
     exponent: float = field(default=np.nan, compare=False)
     error: float = field(default=np.nan, compare=False)
     mean_life: float = field(default=np.nan, compare=False)
-    period: int = field(default=0, compare=False)  # of a motion that settles slowly, or on an orbit of a long period
-    judgement_level: int = field(default=0, compare=False)  # number of the judgement that gave the verdict
-    settled_count: int = field(default=0, compare=False)  # companions that settled in that judgement
-    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # (n, d): states of unsettled motions
+    # of a motion that settles slowly, or on an orbit of a long period
+    period: int = field(default=0, compare=False)
+    # number of the judgement that gave the verdict
+    judgement_level: int = field(default=0, compare=False)
+    # companions that settled in that judgement
+    settled_count: int = field(default=0, compare=False)
+    # (n, d): states of unsettled motions
+    chaos: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)
     # Period, number of impacts, amplitude and state at phase 0 of each motion that has settled.
     orbits: list[tuple[int, int, float, np.ndarray]] = field(default_factory=list, compare=False)
-    longest_orbit: int = field(default=0, compare=False)  # the longest of their periods, which is asked for very often
+    # the longest of their periods, which is asked for very often
+    longest_orbit: int = field(default=0, compare=False)
 
     @property
     def chaotic(self) -> bool:
@@ -46,7 +52,9 @@ class SearchedValue:
 
     @property
     def periods_without_settling(self) -> float:
-        """Forcing periods of companions, in all, if none of these has settled, else 0; see `Judged.mean_life`."""
+        """Forcing periods of companions, in all, if none of these has settled, else 0; see
+        `Judged.mean_life`.
+        """
         return 0.0 if self.settled_count else 3.0 * self.mean_life
 
     @property
@@ -56,7 +64,9 @@ class SearchedValue:
 
     @property
     def goes_on(self) -> bool:
-        """Whether motions here are chaotic or may be so, are on a torus, or have a longer period than those that have settled."""
+        """Whether motions here are chaotic or may be so, are on a torus, or have a longer period
+        than those that have settled.
+        """
         if self.verdict is Ending.PERIODIC:
             return self.period > self.longest_orbit
         return self.verdict is not Ending.TRANSIENT
@@ -67,12 +77,16 @@ class SearchedValue:
         return max(self.period, self.longest_orbit)
 
     def judge(self, judged: Judged, row: int, level: int) -> None:
-        """Take the verdict on the unsettled motions here, unless an earlier judgement was more careful, or as careful and found a
-        verdict of higher rank."""
+        """Take the verdict on the unsettled motions here, unless an earlier judgement was more
+        careful, or as careful and found a verdict of higher rank."""
         verdict = Ending(judged.ending[row])
-        if level < self.judgement_level or (level == self.judgement_level and RANKS.index(verdict) < RANKS.index(self.verdict)):
+        if level < self.judgement_level or (
+            level == self.judgement_level and RANKS.index(verdict) < RANKS.index(self.verdict)
+        ):
             return
-        self.verdict, self.judgement_level, self.chaos = verdict, level, judged.states[row]
+        self.verdict = verdict
+        self.judgement_level = level
+        self.chaos = judged.states[row]
         self.exponent, self.error = float(judged.exponent[row]), float(judged.error[row])
         self.mean_life, self.period = float(judged.mean_life[row]), int(judged.period[row])
         self.settled_count = int(judged.settled_count[row])
@@ -88,13 +102,19 @@ class SearchedValue:
     def starts(self, seeds: int, orbits: int) -> np.ndarray:
         """States from which motions at neighbouring values are begun, (n, d)."""
         unsettled = len(self.chaos) > 0 and (self.goes_on or not self.orbits)
-        chosen = self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)] if unsettled else self.chaos[:0]
+        chosen = (
+            self.chaos[np.linspace(0, len(self.chaos) - 1, seeds).astype(int)]
+            if unsettled
+            else self.chaos[:0]
+        )
         settled = [orbit[3][None] for orbit in self.orbits[:orbits]]
         return np.concatenate([*([chosen] if len(chosen) or not settled else []), *settled])
 
 
 class MotionStarts(NamedTuple):
-    """Motions that begin at one value, from states (n, d), and the care with which they are judged if they do not settle."""
+    """Motions that begin at one value, from states (n, d), and the care with which they are judged
+    if they do not settle.
+    """
 
     value: float
     states: np.ndarray
@@ -102,7 +122,9 @@ class MotionStarts(NamedTuple):
 
 
 class JudgementRequest(NamedTuple):
-    """States (n, m, d) of motions that have not settled at values (n,), to be judged with the same care."""
+    """States (n, m, d) of motions that have not settled at values (n,), to be judged with the same
+    care.
+    """
 
     values: np.ndarray
     states: np.ndarray
@@ -118,13 +140,16 @@ class SearchedRange:
     bounds: tuple[float, float]
     settings: ChaosSettings = CHAOS
     entries: list[SearchedValue] = field(default_factory=list)  # by value
-    given: list[SimulatedMotions] = field(default_factory=list)  # motions that were simulated before, in the order of the calls
-    begun: list[SimulatedMotions] = field(default_factory=list)  # motions that the search has begun itself
+    # motions that were simulated before, in the order of the calls
+    given: list[SimulatedMotions] = field(default_factory=list)
+    # motions that the search has begun itself
+    begun: list[SimulatedMotions] = field(default_factory=list)
 
     @property
     def bands(self) -> Bands:
         """The bands that have been found."""
-        tried, motions = self.tried(), self.given[0].joined(*self.given[1:], *self.begun)
+        tried = self.tried()
+        motions = self.given[0].joined(*self.given[1:], *self.begun)
         return Bands(self.work.system, self.work.path, bands_of(tried), tried, motions)
 
     @property
@@ -136,7 +161,9 @@ class SearchedRange:
         """The entry of a value, a new one if the value was not tried before."""
         at = bisect_left(self.entries, SearchedValue(value))
         if at == len(self.entries) or self.entries[at].value != value:
-            insort(self.entries, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension))))
+            insort(
+                self.entries, SearchedValue(value, chaos=np.empty((0, self.work.system.dimension)))
+            )
         return self.entries[at]
 
     def simulate_starts(self, begun: Iterable[MotionStarts]) -> None:
@@ -151,8 +178,12 @@ class SearchedRange:
         self.begun.append(self.work.simulate(values, states, self.settings.settling))
         return self.begun[-1]
 
-    def take(self, motions: SimulatedMotions, level: Mapping[float, int] = MappingProxyType({})) -> None:
-        """Add motions to what is known, and judge those that have not settled, with more care at some values."""
+    def take(
+        self, motions: SimulatedMotions, level: Mapping[float, int] = MappingProxyType({})
+    ) -> None:
+        """Add motions to what is known, and judge those that have not settled, with more care at
+        some values.
+        """
         self._settle(motions)
         for value in np.unique(motions.value):
             self.entry(float(value))
@@ -160,26 +191,38 @@ class SearchedRange:
         values, row = np.unique(loose.value, return_inverse=True)
         if not values.size:
             return
-        most, last = int(np.bincount(row).max()), loose.states[:, -self.settings.states :]
+        most = int(np.bincount(row).max())
+        last = loose.states[:, -self.settings.states :]
         states = np.full((len(values), most, *last.shape[1:]), np.nan)
         for i in range(len(values)):
             states[i, : np.count_nonzero(row == i)] = last[row == i]
-        states, levels = states.reshape(len(values), -1, states.shape[-1]), np.array([level.get(value, 0) for value in values])
-        self._judge([JudgementRequest(values[levels == one], states[levels == one], one) for one in np.unique(levels).tolist()])
+        states, levels = (
+            states.reshape(len(values), -1, states.shape[-1]),
+            np.array([level.get(value, 0) for value in values]),
+        )
+        self._judge(
+            [
+                JudgementRequest(values[levels == one], states[levels == one], one)
+                for one in np.unique(levels).tolist()
+            ]
+        )
 
     def _judge(self, questions: Sequence[JudgementRequest]) -> None:
         """Judge motions that have not settled.
 
         Motions on which companions have settled are then simulated too, and added to what is known.
         """
-        answers = self.work.judge_all([(q.values, q.states, self.settings.judgements[q.level], q.earlier) for q in questions])
+        answers = self.work.judge_all(
+            [(q.values, q.states, self.settings.judgements[q.level], q.earlier) for q in questions]
+        )
         later: list[MotionStarts] = []
         for question, judged in zip(questions, answers, strict=True):
             for row, value in enumerate(question.values):
                 self.entry(float(value)).judge(judged, row, question.level)
             found = judged.settled.few(self.settings.neighbours // 2, len(judged.settled.period))
             later += [
-                MotionStarts(question.values[row], state[None]) for row, state in zip(found.question, found.state, strict=True)
+                MotionStarts(question.values[row], state[None])
+                for row, state in zip(found.question, found.state, strict=True)
             ]
         if later:
             states = np.concatenate([one.states for one in later])
@@ -188,7 +231,11 @@ class SearchedRange:
     def _settle(self, motions: SimulatedMotions) -> None:
         """Note at each value on what motions have settled."""
         for i in np.flatnonzero(motions.periodic):
-            impacts = 0 if 0.0 < motions.slowest[i] < self.settings.dying else int(motions.impact_count[i])
+            impacts = (
+                0
+                if 0.0 < motions.slowest[i] < self.settings.dying
+                else int(motions.impact_count[i])
+            )
             facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
             self.entry(float(motions.value[i])).settle(*facts, motions.last[i])
 

@@ -1,4 +1,6 @@
-"""The simulated motions of a diagram: where each begins and how it ends, and the attractors that they have found."""
+"""The simulated motions of a diagram: where each begins and how it ends, and the attractors that
+they have found.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,17 @@ from saltus.systems import System, Window, even_steps, is_still, within_window
 class SimulationSettings:
     """How motions are started, followed and kept."""
 
-    kept: int = 64  # Stroboscopic states that are kept of each motion, as dots of a diagram and as starts of other motions.
-    # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within this share of its amplitude.
+    # Stroboscopic states that are kept of each motion, as dots of a diagram and as starts of other
+    # motions.
+    kept: int = 64
+    # An unsettled motion is taken as slow, not chaotic, if it returns to an earlier state within
+    # this share of its amplitude.
     slow: float = 1e-2
-    patience: int = 8  # Slow motions are followed for up to so many times the forcing periods of the others.
-    # Chaotic motions return as near by chance. A slow motion is followed in rounds, as long as each round reduces the distance of
-    # its return by this factor; otherwise it can hardly settle in the time that is left.
+    # Slow motions are followed for up to so many times the forcing periods of the others.
+    patience: int = 8
+    # Chaotic motions return as near by chance. A slow motion is followed in rounds, as long as each
+    # round reduces the distance of its return by this factor; otherwise it can hardly settle in the
+    # time that is left.
     nearer: float = 0.3
     still: float = 1e-6  # A motion that stays this near to the contact is at rest.
 
@@ -44,11 +51,14 @@ class SimulatedMotions:
     last: np.ndarray  # (n, d): coordinates and velocities at the end, at phase 0
     outcome: np.ndarray  # (n,): an `Ending`
     period: np.ndarray  # (n,): forcing periods after which it repeats itself; 0 where it does not
-    impact_count: np.ndarray  # (n,): impacts in one period or, if it has none, in the forcing periods that are kept
-    highest: np.ndarray  # (n,): largest coordinate over its period, or over the forcing periods that are kept
+    # (n,): impacts in one period or, if it has none, in the forcing periods that are kept
+    impact_count: np.ndarray
+    # (n,): largest coordinate over its period, or over the forcing periods that are kept
+    highest: np.ndarray
     lowest: np.ndarray  # (n,): least coordinate over the same time
     slowest: np.ndarray  # (n,): with several contacts the least speed of an impact; else 0
-    states: np.ndarray  # (n, kept, d): its last stroboscopic states, of a periodic motion those of one period; else nan
+    # (n, kept, d): its last stroboscopic states, of a periodic motion those of one period; else nan
+    states: np.ndarray
     peaks: np.ndarray  # (n, kept): max abs of the coordinate in each of these periods
 
     def __len__(self) -> int:
@@ -66,7 +76,9 @@ class SimulatedMotions:
 
     @property
     def unsettled(self) -> np.ndarray:
-        """Which neither rest, nor repeat themselves, nor have ended: chaotic, slow, or of a period above 16, (n,)."""
+        """Which neither rest, nor repeat themselves, nor have ended: chaotic, slow, or of a period
+        above 16, (n,).
+        """
         return np.asarray(self.outcome == Ending.UNDECIDED)
 
     @property
@@ -91,21 +103,30 @@ class SimulatedMotions:
     def joined(self, *others: SimulatedMotions) -> SimulatedMotions:
         """These motions, then others."""
         every = (self, *others)
-        return SimulatedMotions(*(np.concatenate([getattr(one, part.name) for one in every]) for part in fields(self)))
+        return SimulatedMotions(
+            *(np.concatenate([getattr(one, part.name) for one in every]) for part in fields(self))
+        )
 
 
 Follow = Callable[[np.ndarray, np.ndarray, int, Progress], SimulatedMotions]
 
 
-def starts_at(system: System, values: np.ndarray, count: int, window: Window, seed: int) -> np.ndarray:
-    """(values, count, d): states spread over the window at each value, every other one drawn in towards the contact.
+def starts_at(
+    system: System, values: np.ndarray, count: int, window: Window, seed: int
+) -> np.ndarray:
+    """(values, count, d): states spread over the window at each value, every other one drawn in
+    towards the contact.
 
-    The states at a value follow from the seed and the value alone, and the first of more states are those of fewer: a finer grid
-    or more starts only add motions to those that were simulated. The states at all values together are dense in the window.
+    The states at a value follow from the seed and the value alone, and the first of more states are
+    those of fewer: a finer grid or more starts only add motions to those that were simulated. The
+    states at all values together are dense in the window.
     """
     bits = np.ascontiguousarray(values, dtype="<f8").view("<u4").reshape(len(values), 2)
-    size, steps = len(window) + 1, even_steps(len(window))
-    offsets = np.array([np.random.default_rng([seed, *pair]).random(size) for pair in bits.tolist()]).reshape(-1, 1, size)
+    size = len(window) + 1
+    steps = even_steps(len(window))
+    offsets = np.array(
+        [np.random.default_rng([seed, *pair]).random(size) for pair in bits.tolist()]
+    ).reshape(-1, 1, size)
     number = np.arange(1, count + 1)
     points = 2.0 * ((offsets[..., :-1] + number[:, None] * steps) % 1.0) - 1.0
     share = CELLS.innermost ** ((offsets[..., -1] + number * steps[0]) % 1.0)
@@ -122,7 +143,8 @@ def simulate_from(
     progress: Progress = silent,
     follow: Follow | None = None,
 ) -> SimulatedMotions:
-    """Follow motions from states (n, d) at phase 0 at values (n,) of the parameter until they settle or the time is up.
+    """Follow motions from states (n, d) at phase 0 at values (n,) of the parameter until they
+    settle or the time is up.
 
     `follow` takes the place of `followed` where another process computes or a store remembers.
     """
@@ -139,12 +161,18 @@ def simulate_from(
 
 
 def followed(
-    system: System, path: str, values: np.ndarray, states: np.ndarray, periods: int, progress: Progress = silent
+    system: System,
+    path: str,
+    values: np.ndarray,
+    states: np.ndarray,
+    periods: int,
+    progress: Progress = silent,
 ) -> SimulatedMotions:
-    """Follow motions from states (n, d) at values (n,) for at most so many forcing periods; none depends on the others.
+    """Follow motions from states (n, d) at values (n,) for at most so many forcing periods; none
+    depends on the others.
 
-    All periods that lanes recognise are looked for, even if a diagram follows shorter ones only: motions of periods between must
-    not be taken as unsettled.
+    All periods that lanes recognise are looked for, even if a diagram follows shorter ones only:
+    motions of periods between must not be taken as unsettled.
     """
     ends = find_recurrence(
         system,
@@ -163,10 +191,15 @@ def followed(
 def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedMotions:
     """The motions with their ends; a motion that stays at the contact is at rest."""
     assert ends.extrema is not None
-    highest, lowest = ends.highest, ends.lowest
-    period, outcome = ends.period.copy(), ends.outcome.copy()
-    still = is_still(system, highest, lowest, SETTINGS.still) & ((period > 0) | (outcome == Ending.UNDECIDED))
-    outcome[still], period[still] = Ending.HELD, 0
+    highest = ends.highest
+    lowest = ends.lowest
+    period = ends.period.copy()
+    outcome = ends.outcome.copy()
+    still = is_still(system, highest, lowest, SETTINGS.still) & (
+        (period > 0) | (outcome == Ending.UNDECIDED)
+    )
+    outcome[still] = Ending.HELD
+    period[still] = 0
     shown = ends.within_period & ~ends.rest[:, None]
     return SimulatedMotions(
         value=np.array(values, dtype=float),
@@ -184,13 +217,21 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
 
 
 def _return_distance(motions: SimulatedMotions) -> np.ndarray:
-    """The least distance at which motions return to an earlier state, (n,); inf where that is not known."""
-    return np.asarray(np.nan_to_num(return_distances(motions.states, RECURRENCE.compiled_max_period).min(axis=1), nan=np.inf))
+    """The least distance at which motions return to an earlier state, (n,); inf where that is not
+    known.
+    """
+    return np.asarray(
+        np.nan_to_num(
+            return_distances(motions.states, RECURRENCE.compiled_max_period).min(axis=1), nan=np.inf
+        )
+    )
 
 
 def _is_slow(motions: SimulatedMotions) -> np.ndarray:
     """Which motions return near to an earlier state, (n,)."""
-    return np.asarray(_return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still))
+    return np.asarray(
+        _return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still)
+    )
 
 
 class BranchAssignment(NumberedSentence):
@@ -200,26 +241,40 @@ class BranchAssignment(NumberedSentence):
     ON_BRANCH = 1, "it lies on a stable part of a branch"
     LONGER = 2, "its period is longer than the longest that is followed"
     NO_ORBIT = 3, "Newton's method finds no orbit near it"
-    UNSTABLE = 4, "the orbit near it is not called stable: it grazes, or is about to lose its stability"
+    UNSTABLE = (
+        4,
+        "the orbit near it is not called stable: it grazes, or is about to lose its stability",
+    )
     ELSEWHERE = 5, "the branch of the orbit near it does not come back to it"
     RARE = 6, "its period is long, and no random motion ends on it"
-    LEFT = 7, "it is stable in a small part of the range alone, and the effort follows no more of such"
+    LEFT = (
+        7,
+        "it is stable in a small part of the range alone, and the effort follows no more of such",
+    )
 
 
 @dataclass
 class AttractorsFound:
-    """All motions that were simulated, and the different attractors among them: each once at each value."""
+    """All motions that were simulated, and the different attractors among them: each once at each
+    value.
+    """
 
     motions: SimulatedMotions
     max_period: int  # the longest period of orbits that are followed
-    assignment: np.ndarray = field(init=False)  # (n,): a `BranchAssignment` for each motion, kept up to date for `rows` only
-    looked: np.ndarray = field(init=False)  # (n,): a motion was compared with so many branches, the first ones
-    rows: np.ndarray = field(init=False)  # the first motion that was found on each attractor, by value
-    starts: np.ndarray = field(init=False)  # how many motions were found on the attractor of each of these rows
-    attractor: np.ndarray = field(init=False)  # (n,): the row of the attractor of each motion; its own where it has not settled
+    # (n,): a `BranchAssignment` for each motion, kept up to date for `rows` only
+    assignment: np.ndarray = field(init=False)
+    # (n,): a motion was compared with so many branches, the first ones
+    looked: np.ndarray = field(init=False)
+    # the first motion that was found on each attractor, by value
+    rows: np.ndarray = field(init=False)
+    # how many motions were found on the attractor of each of these rows
+    starts: np.ndarray = field(init=False)
+    # (n,): the row of the attractor of each motion; its own where it has not settled
+    attractor: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.assignment, self.looked = np.zeros(len(self.motions), dtype=np.int8), np.zeros(len(self.motions), dtype=int)
+        self.assignment = np.zeros(len(self.motions), dtype=np.int8)
+        self.looked = np.zeros(len(self.motions), dtype=int)
         self._tell_apart()
 
     def add(self, more: SimulatedMotions) -> int:
@@ -232,15 +287,17 @@ class AttractorsFound:
         return len(self.rows) - before
 
     def _tell_apart(self) -> None:
-        """Find the attractors: motions at one value are on one attractor if they have the same period and the same extrema, or
-        those of the mirror image."""
+        """Find the attractors: motions at one value are on one attractor if they have the same
+        period and the same extrema, or those of the mirror image."""
         rows = np.flatnonzero(self.motions.periodic)
         table = as_chart_motions(self.motions.only(rows))
         seen = (table[name] for name in ("other", "amplitude", "slowest", "period"))
         order = np.lexsort((rows, *seen, self.motions.value[rows]))
         rows, table = rows[order], table[order]
         fresh = np.ones(len(rows), dtype=bool)
-        fresh[1:] = (self.motions.value[rows[1:]] != self.motions.value[rows[:-1]]) | ~is_same(table[1:], table[:-1])
+        fresh[1:] = (self.motions.value[rows[1:]] != self.motions.value[rows[:-1]]) | ~is_same(
+            table[1:], table[:-1]
+        )
         begin = np.flatnonzero(fresh)
         self.rows = np.minimum.reduceat(rows, begin) if len(rows) else rows
         self.starts = np.diff(np.append(begin, len(rows)))
@@ -248,7 +305,9 @@ class AttractorsFound:
         self.attractor[rows] = np.repeat(self.rows, self.starts)
         period = self.motions.period[self.rows]
         self.assignment[self.rows[period > self.max_period]] = BranchAssignment.LONGER
-        self.assignment[np.intersect1d(self.open, self.rows[period > CHAOS.long_period])] = BranchAssignment.RARE
+        self.assignment[np.intersect1d(self.open, self.rows[period > CHAOS.long_period])] = (
+            BranchAssignment.RARE
+        )
 
     @property
     def open(self) -> np.ndarray:
@@ -256,9 +315,13 @@ class AttractorsFound:
         return np.asarray(self.rows[self.assignment[self.rows] == BranchAssignment.OPEN])
 
     def reopen(self, motions: np.ndarray) -> None:
-        """Let attractors be followed that were taken as rare, as the random motions of these rows end on them."""
+        """Let attractors be followed that were taken as rare, as the random motions of these rows
+        end on them.
+        """
         ends = self.attractor[motions]
-        self.assignment[ends[self.assignment[ends] == BranchAssignment.RARE]] = BranchAssignment.OPEN
+        self.assignment[ends[self.assignment[ends] == BranchAssignment.RARE]] = (
+            BranchAssignment.OPEN
+        )
 
     @property
     def unplaced(self) -> np.ndarray:
@@ -266,7 +329,9 @@ class AttractorsFound:
         return np.asarray(self.rows[self.assignment[self.rows] != BranchAssignment.ON_BRANCH])
 
     def families(self, rows: np.ndarray) -> list[np.ndarray]:
-        """The attractors of these rows in runs along the parameter, each of similar motions; long runs first."""
+        """The attractors of these rows in runs along the parameter, each of similar motions; long
+        runs first.
+        """
         motions = self.motions.only(rows)
         table = as_chart_motions(motions)
         order = np.lexsort((motions.value, table["impact_count"], table["period"]))
@@ -274,8 +339,11 @@ class AttractorsFound:
         runs = np.split(rows[order], 1 + np.flatnonzero(~alike)) if len(rows) else []
         return sorted(runs, key=lambda run: -len(run))
 
-    def seeds(self, system: System, grid: np.ndarray, known: np.ndarray, since: int) -> tuple[np.ndarray, np.ndarray]:
-        """Further starts, values (n,) and states (n, d): attractors are started at the neighbouring values that have none alike.
+    def seeds(
+        self, system: System, grid: np.ndarray, known: np.ndarray, since: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Further starts, values (n,) and states (n, d): attractors are started at the neighbouring
+        values that have none alike.
 
         Parameters
         ----------
@@ -284,7 +352,8 @@ class AttractorsFound:
         grid
             The values that have neighbours.
         known
-            Attractors that are known from branches, as records of a chart whose cells are the values of the grid.
+            Attractors that are known from branches, as records of a chart whose cells are the
+            values of the grid.
         since
             Only attractors that were first found by the motion of this row, or later.
         """
@@ -297,9 +366,12 @@ class AttractorsFound:
 
 
 def as_chart_motions(motions: SimulatedMotions) -> np.ndarray:
-    """The motions as records of a chart, all in cell 0, so that they are compared by the same functions."""
+    """The motions as records of a chart, all in cell 0, so that they are compared by the same
+    functions.
+    """
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
     for name in ("period", "impact_count", "amplitude", "slowest"):
         table[name] = getattr(motions, name)
-    table["other"], table["state"] = np.minimum(motions.highest, -motions.lowest), motions.last
+    table["other"] = np.minimum(motions.highest, -motions.lowest)
+    table["state"] = motions.last
     return table
