@@ -15,9 +15,8 @@ MOST_FILES = 10
 # of its lines.
 PEAK = {
     "flow/kernel/layout.py": {
-        "    CROSSING = 10\n    RESET_SLOPES = 11": (
-            "    CROSSING = 10\n    PEAK = 11\n    RESET_SLOPES = 12"
-        )
+        "    CROSSING = 10\n": "    CROSSING = 10\n    PEAK = 11\n",
+        "    RESET_SLOPES = 11": "    RESET_SLOPES = 12",
     },
     "flow/motion/events.py": {
         '    CROSSING = "crossing"': '    CROSSING = "crossing"\n    PEAK = "peak"\n    # once'
