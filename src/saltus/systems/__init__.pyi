@@ -68,3 +68,5 @@ from .states import within_window as within_window
 from .system import System as System
 from .system import check_system as check_system
 from .system import image_of as image_of
+from .system_units import NaturalUnits as NaturalUnits
+from .system_units import natural_units as natural_units

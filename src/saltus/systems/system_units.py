@@ -1,0 +1,268 @@
+"""The natural units of a system: a length for each coordinate and a time, in which its motions have
+numbers near 1.
+
+Thresholds and default steps that must not depend on the units of a user are numbers times these.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.systems.contact_model import normal_forces
+from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.model import Jet, each_of
+from saltus.systems.system import System
+
+# Instants at which a load is looked at. Mean squares over so many equal parts of a period are exact
+# for harmonics up to the third, whatever the phase.
+INSTANTS = 8
+ANGLES = ("rad", "deg")  # units of coordinates that have their own natural unit
+
+
+@dataclass(frozen=True, eq=False)
+class NaturalUnits:
+    """The natural units of a system, each a number in the units of its user.
+
+    1. They scale as what they measure: where all lengths of a system are L times as large and all
+       times s times, `lengths` are L times and `time` is s times as large, up to rounding. They are
+       not rounded themselves; `powers_of_two` are, for those who scale numbers by them exactly.
+    2. They do not depend on the order of contacts and coordinates, on the origin of a coordinate
+       along which a contact holds, on a shift of the load by a phase, on friction of 0 or on
+       contacts that are farther away than another one.
+    3. `time` is 1 / Omega of the load; without one it is sqrt(d / a) of the distance d and the
+       acceleration a below, or of the stiffness alone. `lengths` are the distance by which the load
+       and the contacts hold the system away from its equilibrium, d = (abs(J) + Omega^2)^-1 a, where
+       a is the acceleration at rest at a contact, in the mean over a period, J = da/dq, and the
+       contact is the one with the smallest d. A coordinate that is an angle has the unit 1 rad.
+    4. Where there is no such distance, friction gives one, then the positions of contacts, then a
+       ground that moves. What has none at all is 1: the system itself has no unit then.
+    5. They are all finite and above 0.
+
+    Attributes
+    ----------
+    lengths
+        The unit of each coordinate, (n,).
+    time
+        The unit of time.
+    """
+
+    lengths: np.ndarray
+    time: float
+
+    @property
+    def length(self) -> float:
+        """The largest unit of a coordinate."""
+        return float(self.lengths.max())
+
+    @property
+    def speed(self) -> float:
+        """The unit of speed."""
+        return self.length / self.time
+
+    @property
+    def acceleration(self) -> float:
+        """The unit of acceleration, and of a force on the mass 1."""
+        return self.length / self.time**2
+
+    @cached_property
+    def speeds(self) -> np.ndarray:
+        """The unit of the velocity of each coordinate, (n,)."""
+        return self.lengths / self.time
+
+    @cached_property
+    def state(self) -> np.ndarray:
+        """The units of a state, coordinates and then velocities, (2 n,)."""
+        return np.concatenate([self.lengths, self.speeds])
+
+    @property
+    def powers_of_two(self) -> NaturalUnits:
+        """These units rounded to the nearest powers of 2, so that scaling by them is exact."""
+        return NaturalUnits(np.exp2(np.round(np.log2(self.lengths))), _power_of_two(self.time))
+
+
+def natural_units(system: System) -> NaturalUnits:
+    """The natural units of a system, in its own coordinates; they are found once.
+
+    Parameters
+    ----------
+    system
+        What moves: as it was given, or `in_gap_coordinates`, whose coordinates are others.
+    """
+    found: NaturalUnits = system._remembered(natural_units, lambda: _found(system))
+    return found
+
+
+def _power_of_two(value: float) -> float:
+    return math.ldexp(1.0, round(math.log2(value)))
+
+
+def _found(system: System) -> NaturalUnits:
+    model = system.model
+    load = DeclaredLoad(system.load, model)
+    rate = 0.0 if system.load.frequency is None else float(system.load.frequency)
+    instants = _instants(system.load)
+    nearest: np.ndarray | None = None
+    stiffest = 0.0
+    push = np.zeros(len(model.coordinates))
+    with np.errstate(all="ignore"):
+        for place in _places(model):
+            found = _held_away(model, load, place, rate, instants)
+            if found is None:
+                continue
+            distance, acceleration, stiffness = found
+            stiffest = max(stiffest, stiffness)
+            if distance.any() and (
+                nearest is None or np.linalg.norm(distance) < np.linalg.norm(nearest)
+            ):
+                nearest = distance
+                push = acceleration
+        time = _time(rate, nearest, push, stiffest)
+        if nearest is None:
+            nearest = _other_length(system, load, time)
+    angular = np.array([model.unit_of(name) in ANGLES for name in model.coordinates])
+    largest = float(np.max(nearest, where=~angular, initial=0.0))
+    first_order = np.arange(len(nearest)) >= len(model.moving)
+    lengths = np.where(first_order & (nearest > 0.0), nearest, largest)
+    lengths = np.where(angular, 1.0, lengths)
+    sound = np.isfinite(lengths) & (lengths > 0.0)
+    return NaturalUnits(np.where(sound, lengths, 1.0), time)
+
+
+def _places(model: Any) -> Iterator[np.ndarray]:
+    """The coordinates (n,) nearest to 0 at which one of its contacts or surfaces is reached; 0
+    without any.
+    """
+    names = model.coordinates
+    if model.has_one_contact:
+        yield np.array([float(model.contact)])
+        return
+    parts = [part for part in (*model.contacts, *model.surfaces) if _is_sum(part, names)]
+    for part in parts:
+        terms = (
+            {part.coordinate: 1.0} if isinstance(part.coordinate, str) else dict(part.coordinate)
+        )
+        row = np.array([float(terms.get(name, 0.0)) for name in names])
+        yield row * (float(part.position) / float(row @ row))
+    if not parts:
+        yield np.zeros(len(names))
+
+
+def _is_sum(part: Any, names: tuple[str, ...]) -> bool:
+    """Whether a contact or a surface is of a sum of coordinates, and of ground displacements."""
+    terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
+    return any(name in names for name in terms) and all(
+        name in names or name.startswith("ground") for name in terms
+    )
+
+
+def _instants(load: Load) -> np.ndarray:
+    """Instants over a period of a load; over the longest of its records and pulses without one."""
+    span = load.period
+    if span is None:
+        span = 0.0
+        for signal in load.channels.values():
+            for term in getattr(signal, "terms", (signal,)):
+                if term.once:
+                    times = np.ravel(getattr(term, "time", 0.0))
+                    end = getattr(term, "start", 0.0) + getattr(term, "length", 0.0)
+                    span = max(span, float(times[-1]), float(end))
+    return np.arange(INSTANTS) * (span / INSTANTS) if span > 0.0 else np.zeros(1)
+
+
+def _held_away(
+    model: Any, load: Any, place: np.ndarray, rate: float, instants: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """d and a (n,) of the docstring of `NaturalUnits` at a place, in the mean of squares over a
+    period, and the largest stiffness there; None where the model has no accelerations.
+    """
+    pushes = []
+    for t in instants:
+        for side in model.every_side:
+            value = _acceleration(model, float(t), place.tolist(), side, load)
+            if value is not None:
+                pushes.append(value)
+    if not pushes:
+        return None
+    slopes = _slopes(model, place, model.every_side[0], load)
+    left, sizes, right = np.linalg.svd(slopes)
+    shares = sizes + rate**2
+    moved = np.array(pushes) @ left
+    moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right
+    return _mean(moved), _mean(np.array(pushes)), float(sizes.max())
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """The root of the mean squares over the first axis."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return largest * np.sqrt(((values / (largest or 1.0)) ** 2).mean(axis=0))
+
+
+def _acceleration(model: Any, t: float, q: list[Any], side: int, load: Any) -> np.ndarray | None:
+    """The accelerations at rest (n,), without contacts and frictions; None where there are none."""
+    try:
+        single = len(q) == 1
+        still = [0.0] * len(q)
+        value = model.acceleration(
+            t, q[0] if single else tuple(q), 0.0 if single else tuple(still), side, load
+        )
+        numbers = np.array([float(x) for x in each_of(value)])
+    except Exception:  # a user's own code may raise anything
+        return None
+    return numbers if len(numbers) == len(q) and np.isfinite(numbers).all() else None
+
+
+def _slopes(model: Any, place: np.ndarray, side: int, load: Any) -> np.ndarray:
+    """J = da/dq at rest, (n, n), 0 where it is not known."""
+    size = len(place)
+    slopes = np.zeros((size, size))
+    still = 0.0 if size == 1 else (0.0,) * size
+    for column in range(size):
+        q = [Jet(x, float(i == column)) for i, x in enumerate(place.tolist())]
+        try:
+            value = model.acceleration(0.0, q[0] if size == 1 else tuple(q), still, side, load)
+            slopes[:, column] = [
+                float(x.first) if isinstance(x, Jet) else 0.0 for x in each_of(value)
+            ]
+        except Exception:  # a user's own code may raise anything
+            continue
+    return np.where(np.isfinite(slopes), slopes, 0.0)
+
+
+def _time(rate: float, distance: np.ndarray | None, push: np.ndarray, stiffness: float) -> float:
+    """The unit of time, from the load, a distance and its acceleration, or a stiffness."""
+    if rate > 0.0:
+        return 1.0 / rate
+    squared = 1.0 / stiffness if stiffness > 0.0 else 0.0
+    if distance is not None and push.any():
+        squared = float(np.linalg.norm(distance) / np.linalg.norm(push))
+    time = math.sqrt(squared)
+    return time if 0.0 < time < math.inf else 1.0
+
+
+def _other_length(system: System, load: Any, time: float) -> np.ndarray:
+    """A length (n,) of a system that nothing holds away from its equilibrium; 0 if it has none."""
+    model = system.model
+    still = np.zeros(len(model.coordinates))
+    lengths = list[float]()
+    try:
+        pressed: Any = still.tolist() if len(still) > 1 else 0.0
+        normals = normal_forces(model, 0.0, pressed, pressed, load)
+        holding = [
+            abs(float(friction.kinetic) * float(normal))
+            for friction, normal in zip(model.frictions, normals, strict=True)
+        ]
+        lengths.append(max(holding, default=0.0) * time**2)
+    except Exception:  # a user's own code may raise anything
+        lengths.clear()
+    lengths.append(
+        min((abs(float(c.position)) for c in model.contacts if float(c.position)), default=0.0)
+    )
+    lengths.append(max((abs(float(f.ground_speed)) * time for f in model.frictions), default=0.0))
+    known = [length for length in lengths if 0.0 < length < math.inf]
+    return np.full(len(still), known[0] if known else 0.0)

@@ -1,0 +1,120 @@
+"""The natural units of a system scale with the units of its user, and depend on nothing else."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from shared_systems import forced
+
+import saltus
+from saltus.systems import natural_units
+
+SCALES = [(1e-9, 1.0), (1e6, 1.0), (1.0, 1e-3), (1.0, 1e6), (1e-6, 1e3)]
+
+
+def stopped(length=1.0, rate=1.0, phase=0.3):
+    """An oscillator between stops, in units in which lengths are `length` and rates are `rate`."""
+    model = saltus.TwoStops(stiffness=rate**2, damping=0.1 * rate, left=-length, right=1.7 * length)
+    force = saltus.Harmonic(0.6 * rate**2 * length, phase=phase)
+    return saltus.System(
+        model=model,
+        load=saltus.Load(frequency=0.9 * rate, force=force),
+        impact=saltus.NewtonImpact(e=0.7),
+    )
+
+
+def beam(length=1.0, rate=1.0):
+    """Four masses in a row, of which the last one hits a stop."""
+    stiffness = rate**2 * (2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    model = saltus.Structure(
+        mass=np.eye(4),
+        stiffness=stiffness,
+        damping=0.05 / rate * stiffness,
+        contacts=[saltus.Contact(name="stop", coordinate=3, position=0.2 * length, sign=-1)],
+        forces={"f": 0},
+    )
+    force = saltus.Harmonic(0.05 * rate**2 * length)
+    return saltus.System(
+        model=model,
+        load=saltus.Load(frequency=0.24 * rate, f=force),
+        impact=saltus.NewtonImpact(e=0.6),
+    )
+
+
+@pytest.mark.parametrize(("length", "rate"), SCALES)
+@pytest.mark.parametrize("make", [stopped, beam])
+def test_units_scale_as_what_they_measure(make, length, rate):
+    of_one = natural_units(make())
+    scaled = natural_units(make(length, rate))
+    np.testing.assert_allclose(scaled.lengths, of_one.lengths * length, rtol=1e-12)
+    assert scaled.time == pytest.approx(of_one.time / rate, rel=1e-14)
+    assert scaled.speed == pytest.approx(of_one.speed * length * rate, rel=1e-12)
+
+
+def test_powers_of_two_are_exact_and_near():
+    units = natural_units(stopped(1e-9, 1e6))
+    for value, rounded in (
+        (units.time, units.powers_of_two.time),
+        (units.length, units.powers_of_two.length),
+    ):
+        assert np.frexp(rounded)[0] == 0.5
+        assert 2.0**-0.5 <= rounded / value <= 2.0**0.5
+
+
+def test_a_shift_of_the_load_changes_nothing():
+    lengths = [natural_units(stopped(phase=phase)).length for phase in (0.0, 0.4, 2.9)]
+    np.testing.assert_allclose(lengths, lengths[0], rtol=1e-12)
+
+
+def test_angles_have_the_unit_of_one_radian():
+    assert natural_units(forced(H=1e-4)).length == 1.0
+
+
+def test_under_constant_loads_they_are_the_distance_to_the_contact_and_the_free_oscillation():
+    """x'' = 3 - 4 x is at rest at x = 3/4; the wall is 5/4 away from there, and the rate is 2."""
+    load = saltus.Load(force=3.0)
+    system = saltus.System(model=saltus.WallOscillator(stiffness=4.0, wall=2.0), load=load)
+    units = natural_units(system)
+    assert (units.length, units.time) == pytest.approx((1.25, 0.5), rel=1e-14)
+
+
+class Walled(saltus.ContactModel):
+    """An oscillator about `origin` between walls, declared in any order."""
+
+    coordinates: ClassVar[tuple] = ("x",)
+    channels: ClassVar[tuple] = ("force",)
+    origin: ClassVar[float] = 0.0
+    walls: ClassVar[tuple] = ((-1.0, 1), (1.5, -1))
+
+    @property
+    def contacts(self):
+        return tuple(
+            saltus.Contact(name=f"wall_{i}", coordinate="x", position=self.origin + p, sign=sign)
+            for i, (p, sign) in enumerate(self.walls)
+        )
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - (x - self.origin)
+
+
+def test_origin_order_and_far_contacts_change_nothing():
+    load = saltus.Load(frequency=1.1, force=saltus.Harmonic(0.3))
+
+    def units_of(**changes):
+        model = type("Moved", (Walled,), changes)()
+        return natural_units(saltus.System(model=model, load=load)).length
+
+    usual = units_of()
+    assert units_of(walls=Walled.walls[::-1]) == usual
+    assert units_of(walls=(Walled.walls[0], (1e6, -1))) == units_of(walls=Walled.walls[:1])
+    assert units_of(origin=1024.0) == pytest.approx(usual, rel=1e-12)
+
+
+def test_friction_gives_a_length_where_nothing_else_does():
+    """A mass on a belt: the spring of 1 holds against a friction of 0.2 at 0.2 from its end."""
+    belt = saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.1)
+    units = natural_units(saltus.System(model=belt))
+    assert (units.length, units.time) == pytest.approx((0.2, 1.0))
+    doubled = replace(belt, kinetic=0.4, static=0.6)
+    assert natural_units(saltus.System(model=doubled)).length == pytest.approx(0.4)
