@@ -109,16 +109,20 @@ class EventSequence:
 
 
 def sequence_of(
-    motion: Motion, sampled: SampledMotion, images: Sequence[int] | None = None
+    motion: Motion,
+    sampled: SampledMotion,
+    images: Sequence[int] | None = None,
+    smooth: frozenset[int] = frozenset(),
 ) -> EventSequence:
-    """The events of one period of an orbit, whose motion begins at its section.
+    """The events of one period of an orbit, whose motion begins at its section. Crossings of the
+    surfaces `smooth`, across which forces are continuous, are none.
 
     With `images`, the number of the mirror image of each contact and friction, the motion is half a
     period of a symmetric orbit: the images of its events follow.
     """
     period = motion.time - motion.start
     modes = modes_in(motion.system)
-    listed, when, all_speeds = _listed(motion)
+    listed, when, all_speeds = _listed(motion, smooth)
     events = tuple(listed)
     times = tuple(when.tolist())
     speeds = [
@@ -134,14 +138,14 @@ def sequence_of(
         )
         times, period = times + tuple(time + period for time in times), 2.0 * period
     apart = [FARTHEST]
-    groups = modes.groups(motion.position)
+    groups = modes.groups(motion.position, smooth)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
     distance = float(
         min(
             [
-                sampled.nearest_touch(),
+                sampled.nearest_touch(smooth),
                 *speeds,
                 *(time for time in apart if time > ONE_INSTANT * period),
             ]
@@ -151,9 +155,11 @@ def sequence_of(
     return EventSequence(events, times, period, max(distance, 0.0), section_distance, groups)
 
 
-def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
-    """The events that change the mode, without the impacts of accumulations; their times; and how
-    fast each closes a contact.
+def _listed(
+    motion: Motion, smooth: frozenset[int]
+) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
+    """The events that change the mode, without the impacts of accumulations and the crossings of
+    the surfaces `smooth`; their times; and how fast each closes a contact.
     """
     found = motion.events
     dense = motion.dense
@@ -168,8 +174,10 @@ def _listed(motion: Motion) -> tuple[list[OrbitEvent], np.ndarray, np.ndarray]:
         times > motion.start
     )
     chosen = np.isin(codes[:, 0], CHANGES) & (alone | (codes[:, 0] != EventCode.REST))
+    groups = reading.groups(motion.position, smooth)
+    chosen &= codes[:, 1] & sum(parts for parts, _ in groups) != 0
     kept = np.flatnonzero(chosen)
-    for parts, _ in reading.groups(motion.position):
+    for parts, _ in groups:
         own = kept[codes[kept, 1] & parts != 0]
         chosen[
             own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]

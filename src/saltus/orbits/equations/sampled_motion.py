@@ -87,8 +87,10 @@ class SideModes:
         images of contacts and frictions."""
         return parts, 4 - mode
 
-    def groups(self, position: Any) -> tuple[Group, ...]:
-        """The groups of contacts and frictions, at a position."""
+    def groups(self, position: Any, smooth: frozenset[int] = frozenset()) -> tuple[Group, ...]:
+        """The groups of contacts, frictions and surfaces, at a position, without the surfaces of
+        the numbers `smooth`.
+        """
         return (Group(1, 3),)
 
     def codes(self, motion: Motion) -> np.ndarray:
@@ -126,8 +128,10 @@ class SideModes:
                 )
         return pairs
 
-    def gaps(self, side: np.ndarray) -> list[GapAlong]:
-        """The gaps of the contacts; that of a single contact on each side."""
+    def gaps(self, side: np.ndarray, smooth: frozenset[int] = frozenset()) -> list[GapAlong]:
+        """The gaps of the contacts, that of a single contact on each side; and the distances from
+        surfaces, without those of the numbers `smooth`.
+        """
         one = self.system.one_contact
         return [
             GapAlong(0, one.inward(number), float(one.contact), side == number)
@@ -186,7 +190,7 @@ class ContactModes(SideModes):
             found += (3 if direction == 2 else 1 - int(direction)) << (count + 2 * (image - count))
         return sum(1 << image for i, image in enumerate(images) if parts >> i & 1), found
 
-    def groups(self, position: Any) -> tuple[Group, ...]:
+    def groups(self, position: Any, smooth: frozenset[int] = frozenset()) -> tuple[Group, ...]:
         """The contacts of each group if the mass matrix couples no coordinates of different groups;
         else one group of all.
         """
@@ -194,8 +198,16 @@ class ContactModes(SideModes):
         known = self.system.contact_model
         contacts = known.contacts
         frictions = len(known.frictions) + len(known.surfaces)
+        left_out = [len(known.frictions) + number for number in smooth]
         everything = (
-            Group((1 << len(contacts) + frictions) - 1, (1 << len(contacts) + 2 * frictions) - 1),
+            Group(
+                (1 << len(contacts) + frictions)
+                - 1
+                - sum(1 << len(contacts) + place for place in left_out),
+                (1 << len(contacts) + 2 * frictions)
+                - 1
+                - sum(3 << len(contacts) + 2 * place for place in left_out),
+            ),
         )
         names = dict.fromkeys(contact.group for contact in contacts)
         if len(names) < 2 or frictions:
@@ -244,7 +256,7 @@ class ContactModes(SideModes):
     ) -> list[tuple[float, float]]:
         return []
 
-    def gaps(self, side: np.ndarray) -> list[GapAlong]:
+    def gaps(self, side: np.ndarray, smooth: frozenset[int] = frozenset()) -> list[GapAlong]:
         names = self.system.model.coordinates
         known = self.system.contact_model
         found = zip(known.contacts, self.closed(side), strict=True)
@@ -252,10 +264,15 @@ class ContactModes(SideModes):
             GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed)
             for c, closed in found
         ]
-        for surface, beside in zip(known.surfaces, modes_of(known, side)[2], strict=True):
+        surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
+        for number, (surface, beside) in enumerate(surfaces):
+            if number in smooth:
+                continue
             place = names.index(surface.coordinate)
             position = float(surface.position)
-            gaps += [GapAlong(place, sign, position, beside == sign) for sign in (1.0, -1.0)]
+            # `beside` is the side as the surface counts it, the gap that of its coordinate
+            side_of = surface.sign * beside
+            gaps += [GapAlong(place, sign, position, side_of == sign) for sign in (1.0, -1.0)]
         return gaps
 
     def grazed(self, side: np.ndarray) -> list[GapAlong]:
@@ -427,17 +444,17 @@ class SampledMotion:
             least.append(self._turning_of(course, sign * self.velocity[place], is_open))
         return float(min(least))
 
-    def nearest_touch(self) -> float:
+    def nearest_touch(self, smooth: frozenset[int] = frozenset()) -> float:
         """How near the motion comes to a further change of its mode: the least of the inner minima
         of the gaps of open contacts and of the distances from surfaces, the speeds of sliding
         frictions, the reactions of closed contacts, and the forces that sticking frictions still
-        lack to slip.
+        lack to slip. Surfaces of the numbers `smooth` do not count.
 
         For reactions and sticking frictions the value just after an event counts too. inf without
         such minima.
         """
         modes = modes_in(self.motion.system)
-        least = [self._lowest_of(modes.gaps(self.side))]
+        least = [self._lowest_of(modes.gaps(self.side, smooth))]
         for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
             course[:, 0] = course[:, 0] - s * ground_speed

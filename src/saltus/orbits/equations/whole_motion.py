@@ -24,6 +24,7 @@ from saltus.flow import (
     MotionRequest,
     SegmentColumn,
     Stop,
+    continuous_surfaces,
     derivatives_of,
     follow,
     program,
@@ -293,7 +294,8 @@ class WholeMotionEquations(OrbitEquations):
         if evaluation.events is None:
             sampled = SampledMotion.of(motion)
             half = motion.at(0.5 * (motion.start + motion.time))
-            events = sequence_of(motion, sampled, self.images if self.signature.symmetric else None)
+            images = self.images if self.signature.symmetric else None
+            events = sequence_of(motion, sampled, images, self.smooth_surfaces)
             middle = np.concatenate([np.atleast_1d(part) for part in half])
             extremes = self._extremes(sampled)
             middle[self.following] = 0.0
@@ -398,6 +400,17 @@ class WholeMotionEquations(OrbitEquations):
             later[:, None], image_of(self.system.model, states) if later.any() else states, states
         )
         return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
+
+    @cached_property
+    def smooth_surfaces(self) -> frozenset[int]:
+        """The surfaces whose touch is no event, as forces are continuous across them, for any
+        values of the parameters at `paths`.
+        """
+        if not self.system.model.surfaces:
+            return frozenset()
+        values = self._values.copy()
+        values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
+        return continuous_surfaces(self._run.trace, tuple(values), self.paths)
 
     @cached_property
     def _program(self) -> Any:

@@ -1,0 +1,62 @@
+"""The regularity of surfaces, which decides what a touch of one is; it is determined from the
+traced expressions.
+
+Where the accelerations on both sides are equal at the surface without speed along it, the map's
+derivative is continuous at a touch, as it is at such a single contact (see
+`flow/one_contact/regularity.py`): the touch is no event of an orbit.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, normal_form
+
+
+@lru_cache(maxsize=4096)
+def continuous_surfaces(
+    traced: Trace, values: tuple[float, ...], free: tuple[str, ...] = ()
+) -> frozenset[int]:
+    """The numbers of the surfaces at which no acceleration jumps without speed, for the given
+    numbers, and for any values of the parameters at the paths `free`.
+
+    This is proved in exact arithmetic (`taylor/exact_algebra.py`); surfaces without a proof are
+    left out. The accelerations are compared with all contacts open: where forces are equal, so are
+    reactions.
+    """
+    leaves = {
+        Expr("parameter", (), i): constant(value)
+        for i, (path, value) in enumerate(zip(traced.parameters, values, strict=True))
+        if path not in free
+    } | {Expr("free", (), i): constant(1.0) for i in range(traced.dof)}
+    parts = traced.friction_coordinates
+    frictions = sum(place >= 0 for place in parts)
+    return frozenset(
+        part - frictions
+        for part, place in enumerate(parts)
+        if place < 0 and _is_continuous(traced, leaves, part, -1 - place)
+    )
+
+
+def _is_continuous(traced: Trace, leaves: dict[Expr, Form], part: int, coordinate: int) -> bool:
+    """Whether the accelerations on both sides of a surface along a coordinate are equal, at rest
+    along it.
+    """
+    if coordinate in traced.first_order_rows:
+        return False
+    try:
+        position = normal_form(traced.ground_speeds[part], leaves)
+        at = {
+            Expr("coordinate", (), coordinate): position,
+            Expr("velocity", (), coordinate): constant(0.0),
+        }
+        above, below = (
+            [
+                normal_form(acceleration, leaves | at | {Expr("slide", (), part): constant(side)})
+                for acceleration in traced.acceleration[: traced.dof]
+            ]
+            for side in (1.0, -1.0)
+        )
+    except NoNormalForm:
+        return False
+    return above == below
