@@ -41,3 +41,17 @@ def test_doctor_names_what_another_package_no_longer_does(saltus, monkeypatch):
     )
     assert "random numbers (NumPy): a seed gives other random numbers" in said
     assert "netCDF files" not in said
+
+
+def test_doctor_says_how_to_install_what_clusters_need(saltus, monkeypatch):
+    """With the name of the extra, which the table must not take for a style."""
+    version = metadata.version
+
+    def without_distributed(name):
+        if name == "distributed":
+            raise metadata.PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(metadata, "version", without_distributed)
+    found = saltus("doctor")
+    assert 'pip install "saltus[cluster]"' in " ".join(found.stdout.split())

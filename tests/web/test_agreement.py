@@ -162,9 +162,10 @@ def masses(rng):
         forces={"force": 0},
         names=tuple("abcd"),
     )
-    return System(
+    system = System(
         model=model, load=shaken(rng, "force"), impact=saltus.NewtonImpact(e=rng.uniform(0.3, 0.9))
-    ), {"d": 0.0}
+    )
+    return system, {name: rng.uniform(-0.03, 0.03) for name in model.coordinates}
 
 
 KINDS = (cell, inelastic_cell, wall, block, recorded, stops, pair, belt, layers, cells, masses)

@@ -350,14 +350,15 @@ class Block:
 
 
 def block_table(block: Block) -> Table:
-    """The rows of a block as a table for the terminal."""
+    """The rows of a block as a table for the terminal; brackets are text, no style."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, show_header=bool(block.heads))
     for head in block.heads or ("", ""):
         table.add_column(head, header_style="dim", overflow="fold")
     for row in block.rows:
-        table.add_row(*row)
+        table.add_row(*map(escape, row))
     return table
 
 
