@@ -42,6 +42,15 @@ C_FUNCTIONS = {
     "pow": 2,
     "numba_nextafter": 2,
 }
+# The process that writes the text of a kernel does not optimise it, and knows neither this machine's
+# processor nor the order in which Python's sets happen to be: the text is the same on every machine.
+WRITER = {
+    "NUMBA_OPT": "0",
+    "NUMBA_LLVM_REFPRUNE_PASS": "0",
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_CPU_FEATURES": "",
+    "PYTHONHASHSEED": "0",
+}
 # What numba's code calls besides: memory that is never given back, but used again by the next call,
 # and a root.
 RUNTIME = """
@@ -160,12 +169,11 @@ def kernel_object(several: bool) -> bytes:
 
 def _made_elsewhere(several: bool) -> bytes:
     """A kernel's object file, made by a new process."""
-    settings = {"NUMBA_OPT": "0", "NUMBA_LLVM_REFPRUNE_PASS": "0"}
     with tempfile.TemporaryDirectory(prefix="saltus-page-") as folder:
         path = Path(folder) / "kernel.o"
         code = f"from saltus.web import objects; objects.make_kernel({several!r}, {str(path)!r})"
         done = subprocess.run(
-            [sys.executable, "-c", code], env=os.environ | settings, capture_output=True, text=True
+            [sys.executable, "-c", code], env=os.environ | WRITER, capture_output=True, text=True
         )
         if done.returncode or not path.exists():
             last = (done.stderr.strip().splitlines() or ["it gave no reason"])[-1]

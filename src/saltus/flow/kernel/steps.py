@@ -383,7 +383,10 @@ def two_modes(motion, place, j, order, allowed):
             two = a * r - b * p
             y[k] = one
             z[k] = two
-        if math.hypot(start - y[0], other - z[0]) <= allowed:
+        real_change = start - y[0]
+        imaginary_change = other - z[0]
+        # a page has a root, and no `hypot`
+        if math.sqrt(real_change**2 + imaginary_change**2) <= allowed:
             return
     y[0] = start
     z[0] = other

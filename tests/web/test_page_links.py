@@ -1,0 +1,100 @@
+"""Both kernels and the functions of every class of models are compiled and linked for the page, on
+every machine to the same bytes.
+
+These tests need no browser and no node: what a page lacks is seen when it is linked.
+"""
+
+import os
+
+import pytest
+from what_works.model_classes import NAMES, model_class, system_of
+
+import saltus
+from saltus.web import objects
+from saltus.web.description import page_parts
+from saltus.web.object_files import OF_FUNCTION, ObjectFile
+
+# What each kernel is given by a structure: nothing, as functions are places of the page's table.
+KERNELS = {"one contact": False, "several contacts": True}
+REFUSED = {
+    "own, gaps between bodies": "give it system.in_gap_coordinates",
+    "own, curved gaps": "give it system.in_gap_coordinates",
+    "structure with a soft stop": "a page follows no surfaces so far",
+    "own, with surfaces": "a page follows no surfaces so far",
+    "own, friction in a contact": "a page follows no frictions in contacts so far",
+    "own, first order": "a page follows no coordinates of first order so far",
+}
+OTHER_MACHINES = {
+    "AVX2": {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx,+avx2,+fma,-avx512f"},
+    "SSE": {"NUMBA_CPU_NAME": "nehalem", "NUMBA_CPU_FEATURES": "+sse4.2,-avx,-avx2,-fma"},
+}
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_kernel_of_the_page_calls_nothing_that_is_not_in_it(kernel):
+    symbols = ObjectFile(objects.kernel_object(KERNELS[kernel])).symbols
+    missing = [s.name for s in symbols if s.kind == OF_FUNCTION and not s.defined]
+    assert missing == []
+    assert {"advance", "rewind", "sqrt"} <= {s.name for s in symbols if s.public}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_class_of_models_has_a_page_or_is_refused_in_one_sentence(name, tmp_path):
+    system, start = system_of(name), model_class(name).whole_start
+    if name in REFUSED:
+        with pytest.raises(saltus.ParameterError, match=REFUSED[name]):
+            saltus.page(system, path=tmp_path / "page.html", **start)
+        return
+    content, described = page_parts(system)
+    assert content[:8] == b"\0asm\1\0\0\0"
+    assert 2 not in _sections(content)  # it imports nothing
+    assert described["engine"]["several"] == system.model.holds_coordinates
+    assert saltus.page(system, path=tmp_path / "page.html", **start).stat().st_size > 50_000
+
+
+def _sections(content):
+    """The numbers of a module's sections."""
+    found, at = [], 8
+    while at < len(content):
+        found.append(content[at])
+        size, shift, at = 0, 0, at + 1
+        while True:
+            byte, at = content[at], at + 1
+            size, shift = size | (byte & 0x7F) << shift, shift + 7
+            if byte < 0x80:
+                break
+        at += size
+    return found
+
+
+def check_other_machines(several, monkeypatch, machines):
+    """A kernel's object file is the same to the last byte where another processor is named, and
+    where Python orders its sets otherwise.
+    """
+    known = objects.kernel_object(several)
+    for number, name in enumerate(machines):
+        for key, value in OTHER_MACHINES[name].items():
+            monkeypatch.setitem(os.environ, key, value)
+        monkeypatch.setitem(os.environ, "PYTHONHASHSEED", str(number + 1))
+        assert objects._made_elsewhere(several) == known, name
+
+
+def test_the_kernel_of_one_contact_is_the_same_on_every_machine(monkeypatch):
+    check_other_machines(False, monkeypatch, ["SSE"])
+
+
+@pytest.mark.thorough
+def test_both_kernels_are_the_same_on_every_machine(monkeypatch):
+    for several in KERNELS.values():
+        check_other_machines(several, monkeypatch, OTHER_MACHINES)
+
+
+def test_the_functions_of_a_structure_are_the_same_for_any_number_of_lanes():
+    """They are written for one number at a time and without fused multiply-adds."""
+    written = {
+        function.name: function.arithmetic.unfused()
+        for name in ("one contact", "both layers")
+        for function in saltus.flow.PortableMotion(system_of(name)).functions()
+    }
+    assert {arithmetic.width for arithmetic in written.values()} == {1}
+    assert not any(arithmetic.fused for arithmetic in written.values())
