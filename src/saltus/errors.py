@@ -176,8 +176,10 @@ def shown(value: Any, most: int = 60) -> str:
 
 
 def shortened(sentence: str) -> str:
-    """A sentence on one line, cut to `LONGEST` characters."""
+    """A sentence on one line, cut to `LONGEST` characters, of letters that can be printed: bytes of
+    a damaged file may be quoted in it."""
     line = " ".join(sentence.split())
+    line = line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
     return (
         line
         if len(line) <= LONGEST

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from saltus.checks import check_memory
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, SaltusError, shown
 
 PART = ".part"
 # s; without locks, a half-written file that was not touched for so long is taken as left by a
@@ -196,6 +196,34 @@ def parsed_json(text: str | bytes) -> Any:
 
 
 # --- reading -----------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def reading(path: Path | str, kind: str) -> Iterator[None]:
+    """Where a file that others wrote is read: whatever the reader of its format raises is told in
+    one sentence.
+
+    Raises
+    ------
+    ParameterError
+        The file does not exist, or cannot be read as what `kind` says, such as "a record".
+    """
+    try:
+        yield
+    except SaltusError:
+        raise
+    except FileNotFoundError:
+        raise ParameterError(f"file {shown(str(path), 160)} does not exist", "file") from None
+    except RecursionError:
+        raise ParameterError(
+            f"file {shown(str(path), 160)} cannot be read as {kind}: it is nested too deeply",
+            "file",
+        ) from None
+    except Exception as error:  # a format's reader may raise anything where the bytes are damaged
+        said = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise ParameterError(
+            f"file {shown(str(path), 160)} cannot be read as {kind} ({said:.120})", "file"
+        ) from error
 
 
 def read_dataset(path: Path | str) -> Any:

@@ -6,6 +6,8 @@ three components also gave the peaks that its headings state; COSMOS 1.20 of AK.
 the four that are found in public repositories.
 """
 
+import time
+
 import numpy as np
 import pytest
 
@@ -248,3 +250,79 @@ def test_what_a_v2_file_does_not_have_is_refused(tmp_path):
         read(tmp_path, cosmos(), quantity="velocity")
     with pytest.raises(ParameterError, match="does not exist"):
         Record.read(tmp_path / "none.AT2")
+
+
+STEPS_IN_SECONDS = ("0.0200 SEC", "2.0D-02 SEC", "2.0e-2", "20 MSEC", "20  ms")
+STEPS_REFUSED = (
+    *("2/100 SEC", "0,02 SEC", "2.0 E-02", "0.02*1", "0.02 HZ", "0.02, MSEC", "0.02 SEC*2"),
+    *("1.2.3", "", "SEC"),
+)
+UNITS_OF_G = {"G": 9.80665, "g.": 9.80665, "CM/S**2": 0.01, "(CM / SEC / SEC)": 0.01, "M/S^2": 1.0}
+UNITS_REFUSED = (
+    *("G/10", "g*100", "10**-3 G", "MM/S2 (x 1000)", "CM/SEC 2", "CM/S^3", "G, TIMES 1000"),
+    *("G  TIMES 2", "0.1 G", "MG"),
+)
+
+
+def refusal(tmp_path, text, **options):
+    with pytest.raises(ParameterError) as caught:
+        read(tmp_path, text, **options)
+    sentence = str(caught.value)
+    assert len(sentence) <= 400
+    assert sentence.isprintable()
+    return sentence
+
+
+def test_a_field_of_a_heading_is_read_whole_or_refused(tmp_path):
+    """Of a number or a unit no part is left out: `1.0D-02` is no 1, and `g*100` no g."""
+    for step in STEPS_IN_SECONDS:
+        assert read(tmp_path, peer(said=f"NPTS= 43, DT= {step}")).time[1] == pytest.approx(STEP)
+    for step in STEPS_REFUSED:
+        assert "line 4 must" in refusal(tmp_path, peer(said=f"NPTS= 43, DT= {step}")), step
+    for count in ("43", "43.0"):
+        assert len(read(tmp_path, peer(said=f"NPTS= {count}, DT= .02")).time) == 43
+    for count in ("4,000", "4E1", "4 3", "-43", "x", "9" * 300):
+        assert "samples" in refusal(tmp_path, peer(said=f"NPTS= {count}, DT= .02"))
+    for unit, factor in UNITS_OF_G.items():
+        found = read(tmp_path, peer(f"ACCELERATION TIME SERIES IN UNITS OF {unit}"))
+        np.testing.assert_allclose(found.value, factor * ACCELERATION / 980.665, atol=1e-6)
+    for unit in UNITS_REFUSED:
+        heading = f"ACCELERATION TIME SERIES IN UNITS OF {unit}"
+        assert "are not known" in refusal(tmp_path, peer(heading)), unit
+        # units that are given count
+        assert read(tmp_path, peer(heading), units="g").quantity == "acceleration"
+    remark = "ACCELERATION TIME HISTORY IN UNITS OF G. FILTER POINTS: HP=0.2 Hz LP=30.0 Hz"
+    np.testing.assert_array_equal(read(tmp_path, peer(remark)).value, read(tmp_path, peer()).value)
+
+
+def test_headings_of_v2_files_are_read_whole_or_refused(tmp_path):
+    milliseconds = csmip().replace(" .020 sec", " 20 msec")
+    np.testing.assert_array_equal(read(tmp_path, milliseconds).time, read(tmp_path, csmip()).time)
+    for said in ("in g/10. (8f10.3)", "in 0.1 cm/sec2. (8f10.3)", "(units: mg)", "times 10"):
+        assert "are not known" in refusal(tmp_path, csmip(said)), said
+    assert "width above 0" in refusal(tmp_path, csmip("in cm/sec2. (8f0)"))
+    assert "with its unit" in refusal(tmp_path, csmip().replace(" .020 sec", " 1/50 sec"))
+    for wrong in ("approx 1.2.3 secs", "approx secs", "approx   1 hours"):
+        text = cosmos().replace("approx   1 secs", wrong)
+        assert "must have a duration and units" in refusal(tmp_path, text), wrong
+    assert "are not known" in refusal(tmp_path, cosmos(said="units=0.1 cm/s2,Format=(10F8.2)"))
+
+
+def test_a_component_that_a_file_does_not_have_is_refused(tmp_path):
+    for text in (peer(), "0,0\n1,1\n"):
+        assert "has one component, and no number 2" in refusal(tmp_path, text, component=2)
+
+
+def test_reading_takes_a_time_that_grows_with_the_size_alone(tmp_path):
+    """Words and lines of a million letters are refused within the time of reading them."""
+    head = "\n".join(peer().splitlines()[:4]) + "\n"
+    n = 1_000_000
+    cells = ("1" * n + "x", "+1" * n + "x", "1.1." * n, "1e" * n, " " * n + "x")
+    texts = [head + cell for cell in cells]
+    texts += [f"NPTS={' ' * n}DT=\n1 2\n", "1" * n + " points of accel data equally spaced at"]
+    texts += [f"ACC {'UNITS OF ' * n}\nNPTS= 4, DT= .1\n1 2 3 4\n", "1 real-header" + " " * n]
+    begun = time.process_time()
+    for text in texts:
+        refusal(tmp_path, text)
+    assert time.process_time() - begun < 5.0  # quadratic ones took hours
+    assert "has 0 of the 43 samples" in refusal(tmp_path, head)

@@ -10,23 +10,36 @@ import base64
 import math
 import re
 import stat
-import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_count, check_number, free_memory
+from saltus.checks import LIMITS, check_count, check_number, check_size, free_memory
 from saltus.errors import ParameterError, near, shown
+from saltus.files import reading
+from saltus.systems.matrix_files import unpacked_numbers
+from saltus.systems.record_headings import (
+    DECIMAL,
+    PEER,
+    SPAN,
+    TOUCHING,
+    SamplesHeading,
+    heading_in,
+    peer_units,
+    real_headings,
+)
 
 GRAVITY = 9.80665  # m/s^2, the standard value, of which the g of a record is a multiple
 # bytes that a character of a record takes, about, while it is read: as text, in lines, in pairs of
 # numbers
 RECORD_MEMORY = 20
 WANTED = "saltus reads AT2, VT2 and DT2 (PEER), V2 (CSMIP, COSMOS), and text with two columns, time and value"
+# the most letters of a word among samples: numbers of a line may touch, longer ones are no numbers
+LONGEST_CELL = 400
 # the most lines before the samples of a PEER file: there are four, and some programs write more
 MOST_HEADINGS = 12
 UNITS = {
@@ -45,28 +58,6 @@ UNITS = {
 }
 # of a V2 file that does not say it
 PLAIN = {"acceleration": "cm/s2", "velocity": "cm/s", "displacement": "cm"}
-KINDS = {"acc": "acceleration", "vel": "velocity", "dis": "displacement"}  # by their first letters
-PEER_COUNT = re.compile(
-    r"NPTS\s*=\s*(\d+)\s*,?\s*DT\s*=\s*([\d.E+-]+)|^\s*(\d+)\s+([\d.E+-]+)\s+NPTS", re.IGNORECASE
-)
-PEER_UNITS = re.compile(r"\b(ACC|VEL|DIS)\w*\b.*\bUNITS?\s*(?:OF|:|=)\s*([\w/^.]+)", re.IGNORECASE)
-CSMIP = re.compile(
-    r"^\s*(\d+)\s+points? of (acc|vel|dis)\w* data equally spaced at\s*([\d.]+)\s*sec\w*[^\w(]*(?:in\s+|\(?\s*units\s*[:=]\s*)?"
-    r"([a-z]+(?:/[\w/^]+)?)?(?:.*\(\s*\d*\s*[fegi](\d+))?",
-    re.IGNORECASE,
-)
-COSMOS = re.compile(
-    r"^\s*(\d+)\s+(?:[a-z]+\.?\s+)?(acc|vel|dis)\w*\.?\s+(?:pts|points),?\s*(?:approx\.?|at?)\s*"
-    r"([\d.]+\s*(?:secs?|(?:pts|points)/sec))\s*,\s*units?\s*=\s*([\w/^]+)(?:.*\(\s*\d*\s*[fegi](\d+))?",
-    re.IGNORECASE,
-)
-DECIMAL = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[ed][-+]?\d+)?"
-# numbers whose signs stand where spaces would
-TOUCHING = re.compile(rf"{DECIMAL}(?:(?=[-+]){DECIMAL})*", re.IGNORECASE)
-COSMOS_REALS = re.compile(
-    r"^\s*(\d+)\s+real-header values follow on\s+(\d+)\s+lines.*\(\s*\d*\s*[feg](\d+)",
-    re.IGNORECASE,
-)
 # The places, from 0, of the step of the processed samples in ms, and of the raw ones in s, among
 # the numbers of a COSMOS heading.
 COSMOS_STEPS = ((61, 0.001), (33, 1.0))
@@ -117,76 +108,69 @@ class RecordFile:
 
     def samples(self, quantity: str, component: int) -> FileSamples:
         """The samples, in whichever of the formats the file is."""
-        headings = enumerate(self.lines[:MOST_HEADINGS])
-        peer = next((i for i, line in headings if PEER_COUNT.search(line)), None)
-        if peer is not None:
-            return self._peer(peer, quantity)
-        parts = [i for i, line in enumerate(self.lines) if CSMIP.match(line) or COSMOS.match(line)]
-        return (
-            self._strong_motion(parts, quantity or "acceleration", component)
-            if parts
-            else self._columns()
-        )
+        headings = {
+            i: found
+            for i, line in enumerate(self.lines)
+            if (found := self._heading(i, line)) is not None
+        }
+        peer = next((i for i in headings if headings[i].step_below == PEER), None)
+        strong = {i: found for i, found in headings.items() if found.step_below != PEER}
+        if peer is None and strong:
+            return self._strong_motion(strong, quantity or "acceleration", component)
+        if component > 1:
+            self.refuse(f"has one component, and no number {component}", "")
+        return self._columns() if peer is None else self._peer(peer, headings[peer], quantity)
 
-    def _peer(self, at: int, quantity: str) -> FileSamples:
+    def _heading(self, at: int, line: str) -> SamplesHeading | None:
+        """The heading of samples that a line is, if it is one."""
+        try:
+            return heading_in(line, at < MOST_HEADINGS)
+        except ValueError as error:
+            self.refuse(f"line {at + 1} {error}, got {_quoted(line.strip())}")
+
+    def _peer(self, at: int, heading: SamplesHeading, quantity: str) -> FileSamples:
         """The samples below the heading with their number and their step, of a file of PEER; the
         quantity, if it is given.
         """
-        found = PEER_COUNT.search(self.lines[at])
-        assert found is not None
-        count = int(found[1] or found[3])
-        step = _decimal(found[2] or found[4])
-        words = next(
-            (said for line in self.lines[:MOST_HEADINGS] if (said := PEER_UNITS.search(line))), None
-        )
-        if words is None and not quantity:
+        units = {
+            i: found
+            for i, line in enumerate(self.lines[:MOST_HEADINGS])
+            if (found := peer_units(line)) is not None
+        }
+        if not units and not quantity:
             self.refuse(
                 'does not say in its headings in which units it is; give them, such as units="g"',
                 "",
             )
-        first = at + 1 if words is None or self.lines[at + 1] != words.string else at + 2
-        kind, units = ("", "") if words is None else (KINDS[words[1].lower()], words[2])
-        return self._even(count, step, first, None, kind, units)
+        first = at + 2 if at + 1 in units else at + 1
+        kind, unit = next(iter(units.values()), ("", ""))
+        return self._even(replace(heading, quantity=kind, units=unit), heading.step, first)
 
-    def _strong_motion(self, parts: list[int], quantity: str, component: int) -> FileSamples:
+    def _strong_motion(
+        self, headings: Mapping[int, SamplesHeading], quantity: str, component: int
+    ) -> FileSamples:
         """The samples of a quantity and a component in a V2 file of CSMIP or COSMOS."""
-        said = {i: CSMIP.match(self.lines[i]) or COSMOS.match(self.lines[i]) for i in parts}
-        own = [
-            (i, found)
-            for i, found in said.items()
-            if found is not None and KINDS[found[2].lower()] == quantity
-        ]
+        own = [i for i, found in headings.items() if found.quantity == quantity]
         if not own:
-            there = ", ".join(
-                dict.fromkeys(KINDS[found[2].lower()] for found in said.values() if found)
-            )
+            there = ", ".join(dict.fromkeys(found.quantity for found in headings.values()))
             self.refuse(f"has samples of {there}, and none of {quantity}", "")
         if component > len(own):
             self.refuse(f"has {len(own)} components of {quantity}, and no number {component}", "")
-        at, found = own[component - 1]
-        plain = CSMIP.match(self.lines[at]) is not None
-        step = _decimal(found[3]) if plain else self._cosmos_step(at, int(found[1]), found[3])
-        return self._even(
-            int(found[1]),
-            step,
-            at + 1,
-            int(found[5]) if found[5] else None,
-            quantity,
-            found[4] or PLAIN[quantity],
-        )
+        at = own[component - 1]
+        heading = headings[at]
+        span = heading.step_below == SPAN
+        step = self._fitting_step(at, heading.count, heading.step) if span else heading.step
+        named = heading if heading.units else replace(heading, units=PLAIN[quantity])
+        return self._even(named, step, at + 1)
 
-    def _cosmos_step(self, at: int, count: int, said: str) -> float:
-        """The step of the samples below a heading of COSMOS, which has the number of samples and
-        about their duration in s, or how many there are in a second."""
-        span = float(re.sub(r"[^\d.]", "", said.rpartition("/")[0] or said))
-        each = "/" in said
-        if each:
-            return 1.0 / span if span else 0.0
+    def _fitting_step(self, at: int, count: int, span: float) -> float:
+        """The step of the samples below a heading of COSMOS that has their number and about their
+        duration in s: that of the headings above it which fits."""
         fitting: list[float] = []
         for i in range(at):
-            found = COSMOS_REALS.match(self.lines[i])
-            if found:
-                numbers = list(self._numbers(i + 1, int(found[1]), int(found[3])))
+            reals = real_headings(self.lines[i])
+            if reals is not None:
+                numbers = list(self._numbers(i + 1, *reals))
                 steps = [
                     numbers[place] * unit for place, unit in COSMOS_STEPS if place < len(numbers)
                 ]
@@ -201,22 +185,24 @@ class RecordFile:
             )
         return fitting[0]
 
-    def _even(
-        self, count: int, step: float, first: int, width: int | None, quantity: str, units: str
-    ) -> FileSamples:
-        """`count` samples from line `first` on, which are `step` apart."""
-        value = np.array(list(self._numbers(first, count, width)))
+    def _even(self, heading: SamplesHeading, step: float, first: int) -> FileSamples:
+        """The samples of a heading from line `first` on, which are `step` apart."""
+        count = heading.count
+        value = np.array(list(self._numbers(first, count, heading.width)))
         if value.size < count:
             self.refuse(f"has {value.size} of the {count} samples that its headings promise", "")
         if not step > 0.0:
             self.refuse(f"has samples {step:g} s apart; the step must be above 0", "")
-        return FileSamples(step * np.arange(count), value, quantity, units)
+        return FileSamples(step * np.arange(count), value, heading.quantity, heading.units)
 
     def _numbers(self, first: int, count: int, width: int | None) -> Iterator[float]:
         """The next `count` numbers from a line on, each `width` characters wide, or parted by
         spaces.
         """
         for number, line in enumerate(self.lines[first:], start=first + 1):
+            longest = max(map(len, line.split()), default=0)
+            if width is None and longest > LONGEST_CELL:
+                self.refuse(f"line {number} must be numbers, got a word of {longest} letters")
             cells = (
                 _cells(line)
                 if width is None
@@ -276,8 +262,9 @@ def read_record(
     if baseline is not None:
         check_count("baseline", baseline, 0, 9)
     unit = None if units is None else _unit(units)
-    file = RecordFile.opened(Path(path), source or str(path))
-    found = file.samples(quantity or (unit or ("",))[0], component)
+    with reading(path, "a record"):
+        file = RecordFile.opened(Path(path), source or str(path))
+        found = file.samples(quantity or (unit or ("",))[0], component)
     if unit is None and found.units:
         unit = _unit(found.units, f"file {file.name!r}: ")
     said = dict.fromkeys(name for name in (quantity, unit and unit[0], found.quantity) if name)
@@ -299,9 +286,15 @@ def read_record(
 
 def _unit(name: Any, where: str = "") -> tuple[str, float]:
     """The quantity that has a unit, and the unit in SI; `cm/sec^2`, `cm/sec/sec` and `gal` are
-    cm/s2.
+    cm/s2. The name is read whole: of `g*100` nothing is left out.
     """
-    plain = re.sub(r"[\^.*]", "", name.lower()).replace("sec", "s") if isinstance(name, str) else ""
+    plain = ""
+    if isinstance(name, str):
+        plain = name[: 2 * LONGEST_CELL].lower().strip()
+        if plain.startswith("(") and plain.endswith(")"):
+            plain = plain[1:-1].strip()
+        plain = re.sub(r"\s*/\s*", "/", plain.removesuffix("."))
+        plain = plain.replace("**", "").replace("^", "").replace("sec", "s")
     plain = {"gal": "cm/s2", "gals": "cm/s2", "g's": "g"}.get(plain, plain).replace("/s/s", "/s2")
     if plain not in UNITS:
         raise ParameterError(
@@ -325,7 +318,8 @@ def _decimal(text: str) -> float:
     ten.
     """
     try:
-        return float(text) if text.isascii() and "_" not in text else math.nan
+        plain = text.replace("d", "e").replace("D", "E")
+        return float(plain) if text.isascii() and "_" not in text else math.nan
     except ValueError:
         return math.nan
 
@@ -397,56 +391,50 @@ def read_array(given: Any, name: str) -> np.ndarray:
     """
     try:
         if isinstance(given, str) and given.startswith(PACKED):
-            _, size, text = given.split(" ")
-            shape = [int(number) for number in size.split("x")]
-            return (
-                np.frombuffer(zlib.decompress(base64.b64decode(text)), dtype="<f8")
-                .reshape(shape)
-                .astype(float)
-            )
+            return _unpacked(given, name)
         dense = given.toarray() if hasattr(given, "toarray") else given  # a sparse matrix of SciPy
-        array = np.array(dense, dtype=float)
+        check_size(dense, name)
+        array = np.array(dense)
     except (TypeError, ValueError, zlib.error):
+        raise ParameterError(f"{name} must be rows of numbers, got {shown(given)}", name) from None
+    if np.ma.is_masked(dense):
+        raise ParameterError(f"{name} must be numbers, and some of them are masked", name)
+    if array.dtype.kind == "c":
+        raise ParameterError(_of_complex(name), name)
+    try:
+        if array.dtype.kind not in "biufO":  # NumPy would read a text as a number
+            raise TypeError
+        array = array.astype(float)
+    except (TypeError, ValueError):
         raise ParameterError(f"{name} must be rows of numbers, got {shown(given)}", name) from None
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
     return array
 
 
-def matrices_in(path: str, names: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    """The matrices in a .npz or .mat file by their names, each with what it may be called there;
-    damping may lack.
-    """
-    place = Path(path)
-    if place.suffix not in (".npz", ".mat"):
-        raise ParameterError(
-            f"file must be a .npz or .mat file of matrices, got {shown(path)}", "file"
+def _of_complex(name: str) -> str:
+    """The refusal of complex numbers, which would lose their imaginary parts."""
+    if name == "stiffness":
+        return (
+            "stiffness must be real, got complex numbers: structural damping K (1 + i eta) is a "
+            "response to one frequency alone; give its real part, and damping=C of the motion"
         )
-    if not place.is_file():
-        raise ParameterError(f"there is no file {path}", "file")
-    try:
-        if place.suffix == ".npz":
-            with np.load(place, allow_pickle=False) as data:
-                arrays: dict[str, Any] = {name: data[name] for name in data.files}
-        else:
-            from scipy.io import loadmat
+    return f"{name} must be real, got complex numbers; give what slows the motion as damping"
 
-            arrays = {
-                name: value for name, value in loadmat(place).items() if not name.startswith("__")
-            }
-    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile) as error:
-        raise ParameterError(
-            f"{path} cannot be read as a {place.suffix} file: {error!s:.120}", "file"
-        ) from None
-    found: dict[str, Any] = {}
-    for name, called in names.items():
-        there = [arrays[key] for key in called if key in arrays]
-        if not there and name != "damping":
-            raise ParameterError(
-                f"{path} has no {' or '.join(called)}; it has {', '.join(arrays)}", "file"
-            )
-        found[name] = there[0] if there else None
-    return found
+
+def _unpacked(text: str, name: str) -> np.ndarray:
+    """The numbers of a text that `ConstantNumbers.packed` has written, within their size."""
+    try:
+        _, size, packed = text.split(" ")
+        shape = [int(number) for number in size.split("x")]
+        if any(number < 0 for number in shape) or math.prod(shape) > LIMITS.count:
+            raise ValueError
+        array = unpacked_numbers(base64.b64decode(packed, validate=True), shape).astype(float)
+    except (TypeError, ValueError, zlib.error):
+        raise ParameterError(f"{name} must be rows of numbers, got {shown(text)}", name) from None
+    if not np.isfinite(array).all():
+        raise ParameterError(f"{name} must be finite; it holds nan or inf", name)
+    return array
 
 
 def check_matrices(given: Mapping[str, np.ndarray]) -> None:

@@ -32,12 +32,12 @@ from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
 from saltus.systems.eigenmodes import eigenmodes_of
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
+from saltus.systems.matrix_files import matrices_in
 from saltus.systems.model import Count, is_zero
 from saltus.systems.record_files import (
     ConstantNumbers,
     check_independent,
     check_matrices,
-    matrices_in,
     read_array,
 )
 
