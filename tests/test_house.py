@@ -402,3 +402,32 @@ def test_every_test_that_is_named_for_contributors_is_there() -> None:
         assert f"\ndef {named[1]}(" in (SOURCE.parents[1] / file).read_text(), f"{file}::{named[1]}"
         found += 1
     assert found > 20
+
+
+# --- order -------------------------------------------------------------------
+
+
+def bare_sorts(tree: ast.Module) -> list[int]:
+    """The lines of calls of `argsort` and `argpartition` that leave the order of equal numbers to
+    the processor."""
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    return [
+        call.lineno
+        for call in calls
+        if getattr(call.func, "attr", getattr(call.func, "id", "")) in ("argsort", "argpartition")
+        and not any(
+            word.arg == "kind" and getattr(word.value, "value", None) == "stable"
+            for word in call.keywords
+        )
+    ]
+
+
+def test_every_sort_of_places_is_stable():
+    """NumPy's default orders equal numbers by the width of the processor's vectors."""
+    assert bare_sorts(ast.parse("np.argsort(a)\nb.argsort(kind='quicksort')")) == [1, 2]
+    found = {
+        str(path.relative_to(SOURCE)): lines
+        for path in FILES
+        if (lines := bare_sorts(parsed(path)))
+    }
+    assert not found

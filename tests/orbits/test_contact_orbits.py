@@ -62,9 +62,8 @@ def test_between_two_walls_the_symmetric_orbit_is_its_closed_form():
         np.testing.assert_allclose(
             (orbit.impact_times * W - phi + 1.0) % math.pi, 1.0, rtol=0, atol=1e-10
         )
-        first, second, *zeros = orbit.multipliers
+        first, second = orbit.multipliers
         assert first * second == pytest.approx(e**4, abs=1e-10)
-        assert np.abs(zeros).max() < 1e-12
         found += 1
     assert found
 
@@ -94,7 +93,8 @@ def test_orbits_repeat_and_have_the_multipliers_of_their_motions(orbit):
     start = orbit.start()
     flow = saltus.sensitivities(orbit.system, **start, periods=orbit.period, tol=1e-14)
     theirs = np.linalg.eigvals(flow.state)
-    theirs = theirs[np.argsort(-np.abs(theirs))][:2]
+    assert len(theirs) == len(orbit.multipliers)
+    theirs = theirs[np.argsort(-np.abs(theirs), kind="stable")][:2]
     assert np.abs(np.sort_complex(theirs) - np.sort_complex(orbit.multipliers[:2])).max() < 1e-10
     assert np.abs(orbit.multipliers[2:]).max(initial=0.0) < 1e-7
     assert defects([orbit], rounds=3)[0] < 1e-11

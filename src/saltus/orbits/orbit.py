@@ -147,7 +147,7 @@ class PeriodicOrbit(Result):
             return phases, speeds
         first = self.releases[0] * self.frequency
         phases = first + (phases - first) % (2.0 * math.pi * self.period)
-        order = np.argsort(phases)
+        order = np.argsort(phases, kind="stable")
         return phases[order], speeds[order]
 
     @property
@@ -202,10 +202,10 @@ class PeriodicOrbit(Result):
         within = found[:, 0] % period
         begin = found[int(np.argmin(within))]
         turned = (found[:, 0] - begin[0]) % self.duration
-        first = within.min() + np.sort(
-            np.where(turned > self.duration - TOLERANCES.release * period, 0.0, turned)
-        )
-        return np.column_stack([first, first + (found[:, 1] - found[:, 0])[np.argsort(turned)]])
+        turned[turned > self.duration - TOLERANCES.release * period] = 0.0
+        order = np.argsort(turned, kind="stable")
+        first = within.min() + turned[order]
+        return np.column_stack([first, first + (found[:, 1] - found[:, 0])[order]])
 
     @property
     def releases(self) -> np.ndarray:
@@ -328,17 +328,34 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """The Floquet multipliers, by falling modulus, complex: two for a coordinate, one for a
-        coordinate of first order; and one more, which is 0, for an orbit that is followed from
-        event to event of several contacts."""
+        """The Floquet multipliers, complex: two for each coordinate, one for each coordinate of
+        first order.
+
+        They are sorted by falling modulus.
+        Of equal ones, up to rounding, the larger real part comes first, and of a complex pair the
+        one above the real axis.
+        A contact that is closed for a part of the period makes some 0.
+        They are inf where the orbit has an impact without speed: motions beside it without this
+        impact have other ones.
+        """
+        model = self.equations.given.model
+        count = 2 * len(model.coordinates) - len(model.first_order)
         chain = self.solution.evaluation.monodromy()
         following = self.equations.following
         chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
-        if not np.isfinite(chain).all():
-            return np.full(len(chain), complex(np.inf))
-        values = np.linalg.eigvals(chain).astype(complex)
-        values = values**2 if self.symmetric else values
-        return values[np.argsort(-np.abs(values))]
+        if self._has_touch or not np.isfinite(chain).all():
+            return np.full(count, complex(np.inf))
+        values = np.zeros(count, dtype=complex)  # 0 for what contacts hold where the state is given
+        values[: len(chain)] = np.linalg.eigvals(chain)
+        return by_falling_modulus(values**2 if self.symmetric else values)
+
+    @cached_property
+    def _has_touch(self) -> bool:
+        """Whether one of its impacts has no speed, so that its equations have no derivative there."""
+        return (
+            not self.equations.passes_contact
+            and abs(self.equations.touching_speed(self.solution)) < TOLERANCES.touch
+        )
 
     @property
     def grazes(self) -> bool:
@@ -348,10 +365,8 @@ class PeriodicOrbit(Result):
         False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then
         keep their meaning.
         """
-        speed = self.equations.touching_speed(self.solution)
-        return (
-            not self.equations.passes_contact
-            and min(abs(self.clearance), abs(speed)) < TOLERANCES.touch
+        return self._has_touch or (
+            not self.equations.passes_contact and abs(self.clearance) < TOLERANCES.touch
         )
 
     @property
@@ -533,6 +548,22 @@ class PeriodicOrbit(Result):
             f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, "
             f"residual={self.residual:.1g})"
         )
+
+
+def by_falling_modulus(values: np.ndarray) -> np.ndarray:
+    """Complex numbers in an order that no rounding changes but among equal ones: by falling
+    modulus, then by falling real part, and of a complex pair the one above the real axis first.
+
+    Moduli are equal up to `TOLERANCES.same_modulus` of the larger one.
+    """
+    moduli = np.abs(values)
+    order = np.argsort(-moduli, kind="stable")
+    falling = moduli[order]
+    smaller = falling[1:] < (1.0 - TOLERANCES.same_modulus) * falling[:-1]
+    group = np.empty(len(values), dtype=int)
+    group[order] = np.append(0, np.cumsum(smaller))[: len(values)]
+    # + 0.0 takes the sign of zeros away
+    return np.asarray(values[np.lexsort((-values.imag, -values.real, group))] + 0.0)
 
 
 def solve(

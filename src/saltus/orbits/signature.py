@@ -186,6 +186,9 @@ class OrbitTolerances:
     # Moduli of multipliers on the unit circle: those without damping, and at a special point that
     # is located to rounding.
     on_circle: float = 1e-9
+    # Moduli of two multipliers that differ by rounding alone, relatively; a double one is split by
+    # the root of rounding.
+    same_modulus: float = 1e-9
     # Only with a multiplier this near to 1 may an orbit belong to a continuum of orbits at one
     # value of the parameter, such as those of a mass that no wall and no spring holds. Near a fold
     # it is as near only within 1e-14 of the fold's parameter.

@@ -587,7 +587,7 @@ def _blind_sentence(names: tuple[str, ...], direction: np.ndarray, shares: np.nd
     """What the data do not tell, for a direction of the unknowns that changes nothing beyond the
     noise.
     """
-    moved = [i for i in np.argsort(-np.abs(shares)) if abs(shares[i]) > FIT.named]
+    moved = [i for i in np.argsort(-np.abs(shares), kind="stable") if abs(shares[i]) > FIT.named]
     if len(moved) == 1:
         return (
             f"the data say nothing of {names[moved[0]]} beyond its bounds: the motion hardly "

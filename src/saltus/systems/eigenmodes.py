@@ -92,7 +92,7 @@ def longer_steps(structure: Any) -> float:
     period = 2.0 * math.pi / math.sqrt(square.min())
     with np.errstate(divide="ignore"):
         lives = np.minimum(period, 23.0 / np.maximum(-values.real, 0.0))
-    order = np.argsort(-lives)
+    order = np.argsort(-lives, kind="stable")
     fastest = np.maximum.accumulate(np.abs(values[order]))
     ends = lives[order]
     return float(period * fastest[-1] / np.sum(fastest * (ends - np.append(ends[1:], 0.0))))

@@ -73,7 +73,7 @@ def peaks(branch: Any, share: float = PROMINENT) -> np.ndarray:
     y = branch["amplitude"].values
     at, facts = find_peaks(y, prominence=share * y.max())
     rows = np.stack([x[at], y[at], facts["prominences"]], axis=1)
-    return np.asarray(rows[np.argsort(rows[:, 0])])
+    return np.asarray(rows[np.argsort(rows[:, 0], kind="stable")])
 
 
 def superharmonic(branch: Any, share: float = PROMINENT) -> np.ndarray:

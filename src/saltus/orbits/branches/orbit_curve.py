@@ -216,8 +216,8 @@ def torus(point: OrbitPoint) -> float:
     if point.orbit.grazes:
         return math.nan
     with np.errstate(all="ignore"):
-        if len(values) == 2 and not point.orbit.equations.following.size:
-            half = float(np.prod(_areas(evaluation.here) / _areas(evaluation.there)))
+        half = None if point.orbit.equations.following.size else evaluation.area_factor()
+        if half is not None:
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
             values = np.where(
@@ -232,13 +232,6 @@ def torus(point: OrbitPoint) -> float:
         if math.isfinite(product)
         else math.nan
     )
-
-
-def _areas(maps: np.ndarray) -> np.ndarray:
-    """The determinants of maps (..., d, d)."""
-    if maps.shape[-1] != 2:
-        return np.asarray(np.linalg.det(maps))
-    return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
 
 
 def complex_pairs(orbit: PeriodicOrbit) -> np.ndarray:

@@ -61,30 +61,45 @@ class ContactsEvaluation(OrbitEvaluation):
     # asked for
     seen: np.ndarray
     state_count: int  # how many of the unknowns are the state; the others are phases
+    rates: np.ndarray  # of this state, to the phase, just after the first event
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
         matrix[:, : len(matrix)] = self.here + closing * self.there
 
     def monodromy(self) -> np.ndarray:
-        """The derivative of the map of the first event's phase, and the state after it, over a
-        period; inf at a grazing.
+        """The derivative of the state at the phase of the first event, just after it, to the state
+        a period before; inf at a grazing.
+
+        The equations say how the state and the phase at the first event follow from those of the
+        period before.
+        At a fixed phase, a perturbation of the state alone begins the same motion as at any other,
+        and a later event by d phi moves the state by the rates times -d phi.
+        Without this the direction of the flow would be one multiplier more, which is 0.
         """
         count = self.state_count
-        state = [*range(count + 1)] if self.here.shape[0] > count else [*range(count)]
-        later = [*range(count + 1, self.here.shape[0])]
-        # the first rows are the guards of the later events
-        rows = [*range(len(later), self.here.shape[0])]
+        phases = self.here.shape[0] - count
+        state = [*range(count)]
+        # the first rows are the guards of the later events, and of the first one a period later
+        rows = [*range(max(phases - 1, 0), self.here.shape[0])]
+        columns = [*state, count] if phases else state
         with np.errstate(all="ignore"):
             try:
                 chain = self.here[np.ix_(rows, state)]
-                if later:
-                    inner = self.here[: len(later)]
+                if phases > 1:
+                    later = [*range(count + 1, self.here.shape[0])]
+                    inner = self.here[: phases - 1]
                     chain = chain - self.here[np.ix_(rows, later)] @ np.linalg.solve(
                         inner[:, later], inner[:, state]
                     )
-                return np.asarray(-np.linalg.solve(self.there[np.ix_(rows, state)], chain))
+                following = -np.linalg.solve(self.there[np.ix_(rows, columns)], chain)
             except np.linalg.LinAlgError:
-                return np.full((len(state), len(state)), np.inf)
+                return np.full((count, count), np.inf)
+            if not phases:
+                return np.asarray(following)
+            return np.asarray(following[:count] - np.outer(self.rates, following[count]))
+
+    def area_factor(self) -> float | None:
+        return None
 
 
 class ContactsEquations(OrbitEquations):
@@ -362,7 +377,15 @@ class ContactsEquations(OrbitEquations):
             there[:, first] = total[:, end_phase]
         residual = np.append(guards, (after - end)[free])
         return ContactsEvaluation(
-            residual, here, there, total[:, parameters:], ends, self._extremes(seen), seen, first
+            residual,
+            here,
+            there,
+            total[:, parameters:],
+            ends,
+            self._extremes(seen),
+            seen,
+            first,
+            ends[0, SegmentEnd.NUMBERS + 2 * own : SegmentEnd.NUMBERS + 4 * own][free] / frequency,
         )
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:

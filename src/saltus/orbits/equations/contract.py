@@ -91,6 +91,20 @@ class OrbitEvaluation:
                 chain = segment @ chain
         return chain
 
+    def area_factor(self) -> float | None:
+        """The determinant of the monodromy matrix, as the product of those of the segments' maps,
+        which keeps its digits where one multiplier is large; None for other than two multipliers.
+        """
+        if self.here.shape[-1] != 2:
+            return None
+        with np.errstate(all="ignore"):
+            return float(np.prod(_areas(self.here) / _areas(self.there)))
+
+
+def _areas(maps: np.ndarray) -> np.ndarray:
+    """The determinants of maps (..., 2, 2)."""
+    return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
+
 
 @dataclass(frozen=True)
 class Solution:

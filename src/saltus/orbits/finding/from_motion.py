@@ -387,7 +387,7 @@ def _guesses(states: np.ndarray, period: int) -> np.ndarray:
     begin = states[:, :-period].reshape(-1, states.shape[-1])
     chosen = begin[:0]
     for i in np.flatnonzero(distance < NEAR_RETURNS.near)[
-        np.argsort(distance[distance < NEAR_RETURNS.near])
+        np.argsort(distance[distance < NEAR_RETURNS.near], kind="stable")
     ]:
         if len(chosen) >= NEAR_RETURNS.guesses:
             break

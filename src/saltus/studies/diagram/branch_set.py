@@ -118,7 +118,7 @@ class PlacedBranch:
         With `stable`, one of the points on both sides of a value must be stable.
         """
         usable, low, high = self._stable_joins if stable else self._joins
-        order = np.argsort(values)
+        order = np.argsort(values, kind="stable")
         first = np.searchsorted(values[order], low, "left")
         last = np.searchsorted(values[order], high, "right")
         number = last - first

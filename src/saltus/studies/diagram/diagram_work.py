@@ -411,7 +411,7 @@ def motions(arguments: Mapping[str, Any], inputs: Sequence[Any]) -> dict[str, np
         )
         for rows in alike
     ]
-    found = parts[0].joined(*parts[1:]).only(np.argsort(np.concatenate(alike)))
+    found = parts[0].joined(*parts[1:]).only(np.argsort(np.concatenate(alike), kind="stable"))
     return {part.name: getattr(found, part.name) for part in fields(found)}
 
 
