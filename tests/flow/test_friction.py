@@ -451,10 +451,6 @@ class Rubbed(saltus.ContactModel):
             tuple(saltus.Friction(name="a", coordinate="x", kinetic=0.1) for _ in range(2)),
             "names of their own",
         ),
-        (
-            (saltus.Friction(name="a", coordinate="x", kinetic=0.3, static=0.1),),
-            "kinetic <= static",
-        ),
     ],
 )
 def test_frictions_without_meaning_are_refused(

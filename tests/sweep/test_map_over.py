@@ -2,6 +2,12 @@
 goes on.
 """
 
+import functools
+import os
+import subprocess
+import sys
+import threading
+
 import numpy as np
 import pytest
 
@@ -59,24 +65,163 @@ def test_processes_find_a_function_wherever_it_stands(where, tmp_path):
 
 
 def test_what_is_kept_is_not_computed_again_after_a_failure(tmp_path):
-    asked, broken = [], [True]
+    """But for two of the kept points, by which a change is noticed that no digest can tell."""
+    log, broken = tmp_path / "log.txt", tmp_path / "broken"
 
     def fragile(x, y):
-        asked.append((x, y))
-        if broken[0] and x == 2.0:
+        with log.open("a") as file:
+            print(x, y, file=file)
+        if broken.exists() and x == 2.0:
             raise ValueError("no answer here")
         return x * y
 
+    broken.touch()
     with pytest.raises(SweepError, match="no answer here"):
         saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr", retries=0)
-    asked.clear()
-    broken[0] = False
+    log.unlink()
+    broken.unlink()
     data = saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr")
-    assert sorted(asked) == [(2.0, 0.0), (2.0, 10.0)]
+    asked = log.read_text().splitlines()
+    assert len(asked) == 4
+    assert not {"2.0 0.0", "2.0 10.0"} - {*asked}
     np.testing.assert_array_equal(data.value, np.multiply.outer(GRID["x"], GRID["y"]))
-    asked.clear()
+    log.unlink()
     saltus.map_over(fragile, GRID, store=tmp_path / "kept.zarr")
-    assert not asked
+    assert not log.exists()
+
+
+def scaled(a, x):
+    return a * x
+
+
+def shifted(a, x):
+    return a + 3 * x
+
+
+class Times:
+    def __init__(self, a):
+        self.a = a
+
+    def __call__(self, x):
+        return self.a * x
+
+    def method(self, x):
+        return self.a * x
+
+
+def closed_over(a):
+    return lambda x: a * x
+
+
+def with_default(a):
+    return lambda x, a=a: a * x
+
+
+def with_global(value, body="wall.get('load.force') * x"):
+    space = {"wall": value, "np": np, "__name__": "a_user"}
+    exec(f"def helper(x): return wall(x)\ndef asked(x): return {body}", space)
+    return space["asked"]
+
+
+def wall(damping):
+    model = saltus.WallOscillator(damping=damping)
+    return saltus.System(model=model, load=saltus.Load(force=damping))
+
+
+# each makes a function of 2 or of 3, which gives other values for them
+MAKERS = {
+    "a partial call": lambda a: functools.partial(scaled, a),
+    "another partial call": lambda a: functools.partial(scaled if a == 2 else shifted, 2),
+    "an object": Times,
+    "a method": lambda a: Times(a).method,
+    "a closure": closed_over,
+    "a default": with_default,
+    "a global number": lambda a: with_global(a, "wall * x"),
+    "a global array": lambda a: with_global(np.array([1.0, a]), "wall[1] * x"),
+    "a global system": lambda a: with_global(wall(float(a))),
+    "a global function": lambda a: with_global(closed_over(a), "wall(x)"),
+    "a function of a function": lambda a: with_global(closed_over(a), "helper(x)"),
+    "a deep value": lambda a: with_global({"a": [(1, {"b": Times(a)})]}, "wall['a'][0][1]['b'](x)"),
+    "one's own code": lambda a: with_global(0, f"{a} * x"),
+    "a nested function": lambda a: with_global(0, f"(lambda y: {a} * y)(x)"),
+    "another function": lambda a: with_global(0, ["np.sinh(x)", "np.cosh(x)"][a - 2]),
+    "lambdas of one line": lambda a: [lambda x: 2 * x, lambda x: 3 * x][a - 2],
+}
+
+
+@pytest.mark.parametrize("how", MAKERS)
+def test_a_store_of_another_function_is_refused(how, tmp_path):
+    """Never the answers of the old one; and the same function, made anew, goes on."""
+    make, store, grid = MAKERS[how], tmp_path / "kept.zarr", {"x": [1.0, 2.0]}
+    before = saltus.map_over(make(2), grid, store=store)
+    assert not np.array_equal(before.value, saltus.map_over(make(3), grid).value)
+    with pytest.raises(ParameterError, match=r"has changed since .*remove_store") as refusal:
+        saltus.map_over(make(3), grid, store=store)
+    assert refusal.value.parameter == "store"
+    again = saltus.map_over(make(2), grid, store=store)
+    np.testing.assert_array_equal(again.value, before.value)
+
+
+def test_digests_are_those_of_other_processes(tmp_path):
+    """Whatever seed the hashes of texts have: a store is gone on with after a restart."""
+    script = tmp_path / "a_script.py"
+    script.write_text(
+        "import functools, sys, numpy as np, saltus\n"
+        "from saltus.sweep.content import contents_of\n"
+        "words = {'one', 'two', 'three', 'four'}\n"
+        "table = {word: np.arange(3) for word in words}\n"
+        "block = saltus.PhysicalBlock(half_width=0.2, half_height=0.8)\n"
+        "class Rule:\n"
+        "    def __init__(self): self.rule = self\n"
+        "    def __call__(self, x): return x in words\n"
+        "rule = Rule()\n"
+        "def asked(x):\n"
+        "    return len(table) * x if x in {1.0, 2.0} or 'a' in {'b', 'c'} else rule(x) + block.alpha\n"
+        "print(sorted(contents_of(asked).items()))\n"
+    )
+    found = set()
+    for seed in ("1", "2", "3"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, script], env=environment, capture_output=True, text=True, check=True
+        )
+        found.add(done.stdout)
+    assert len(found) == 1
+    assert "global table" in found.pop()
+
+
+def test_what_cannot_be_digested_is_refused_by_its_name(tmp_path):
+    lock = threading.Lock()
+
+    def locked(x):
+        with lock:
+            return x
+
+    with pytest.raises(ParameterError, match=r"value lock holds .*lock.*cannot be digested"):
+        saltus.map_over(locked, {"x": [1.0]}, store=tmp_path / "kept.zarr")
+    assert saltus.map_over(locked, {"x": [1.0]}).value == 1.0
+
+
+def test_a_file_that_has_changed_is_noticed_where_a_store_is_gone_on_with(tmp_path):
+    """A digest does not see what a function reads from elsewhere."""
+    file, broken = tmp_path / "factor.txt", tmp_path / "broken"
+
+    def asked(x):
+        if broken.exists() and x == 3.0:
+            raise ValueError("no answer here")
+        return float(file.read_text()) * x
+
+    file.write_text("2.0")
+    broken.touch()
+    with pytest.raises(SweepError):
+        saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr", retries=0)
+    broken.unlink()
+    file.write_text("2.5")
+    with pytest.raises(ParameterError, match=r"keeps .*something that it reads has changed"):
+        saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr")
+    file.write_text("2.0")
+    data = saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr")
+    np.testing.assert_array_equal(data.value, [2.0, 4.0, 6.0])
 
 
 def test_other_points_are_computed_where_the_function_raises_at_the_first():

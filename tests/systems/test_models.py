@@ -354,3 +354,73 @@ def test_what_the_class_of_a_user_refuses_is_said_with_its_path_and_value():
         )
     ends = {side: bound["end"] for side, bound in accepted(system)["model.stiffness"].items()}
     assert ends == {"least": 0.0, "most": 5.0}  # which are the ends of the slider of a page
+
+
+NO_NUMBERS = (math.nan, math.inf, -math.inf, 1j, "1", [1.0], np.array([1.0, 2.0]), np.ma.masked, {})
+PARTS = {
+    saltus.Contact: (
+        {"name": "stop", "coordinate": "x"},
+        {"position": (), "restitution": (-0.5, 1.5), "sign": (0, 0.5)},
+    ),
+    saltus.Surface: (
+        {"name": "stop", "coordinate": "x"},
+        {"position": (), "stiffness": (), "damping": (), "sign": (0, 2)},
+    ),
+    saltus.Friction: (
+        {"name": "belt", "coordinate": "x", "kinetic": 0.2},
+        {
+            "kinetic": (-0.1,),
+            "static": (0.1, -0.3),
+            "ground_speed": (),
+            "stribeck_speed": (0.0, -1),
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", PARTS)
+def test_parts_of_models_check_their_numbers(kind):
+    """A restitution of nan, or below 0, gave a motion without a word."""
+    fitting, fields = PARTS[kind]
+    for name, outside in fields.items():
+        for value in (*NO_NUMBERS, *outside):
+            with pytest.raises(saltus.ParameterError) as refusal:
+                kind(**{**fitting, name: value})
+            assert refusal.value.parameter == name
+            assert fitting["name"] in str(refusal.value)
+    for name in ("name", *(("group",) if kind is saltus.Contact else ())):
+        with pytest.raises(saltus.ParameterError, match="must be a text"):
+            kind(**{**fitting, name: 1.0})
+
+
+def test_a_parameter_of_a_model_may_be_a_number_of_its_contact():
+    """While its equations are traced it is a symbol; as a number it is checked."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Stopped(saltus.ContactModel):
+        place: float = 0.5
+        bounce: float = 0.8
+        coordinates = ("x",)
+
+        @property
+        def contacts(self):
+            return (
+                saltus.Contact(
+                    name="stop",
+                    coordinate="x",
+                    position=self.place,
+                    sign=-1,
+                    restitution=self.bounce,
+                ),
+            )
+
+        def force(self, t, x, v, load):
+            return 0.0
+
+    system = saltus.System(model=Stopped(), impact=saltus.NewtonImpact())
+    motion = saltus.simulate(system, x=0.0, velocity=1.0, duration=1.0)
+    # it arrives at 0.5, and comes back with 0.8 of its speed
+    assert (motion.x, motion.velocity) == (pytest.approx(0.5 - 0.8 * 0.5), pytest.approx(-0.8))
+    for path, value in (("model.bounce", 1.5), ("model.bounce", -0.1)):
+        with pytest.raises(saltus.ParameterError, match="restitution of the contact 'stop'"):
+            system.with_({path: value})

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import itertools
 import pickle
 import sys
@@ -18,8 +16,10 @@ from saltus.checks import Numbers, answered, check_count
 from saltus.errors import ParameterError, SweepError, shown
 from saltus.progress import Progress, silent
 from saltus.result import MAPPED, provenance
+from saltus.sweep.content import contents_of
 from saltus.sweep.execution import check_run, run
 from saltus.sweep.plan import Plan, Variable, axis_values
+from saltus.sweep.store import opened
 from saltus.sweep.store_files import METADATA
 from saltus.sweep.store_status import read_plan
 
@@ -27,13 +27,18 @@ if TYPE_CHECKING:
     import xarray
 
 VALUE = "value"  # the variable of a function that returns no names
+ASKED_AGAIN = 2  # kept points that are computed again where a store is gone on with
+REPEATED = 1e-6  # the relative difference of values that another machine may round differently
+ANEW = (
+    "name another store, or remove this one (saltus.sweep.remove_store) to compute all points anew"
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FunctionPlan(Plan):
     """A plan of single calls.
 
-    Its store knows the function by its name and its text; processes get it itself, or pickled.
+    Its store knows the function by its name and by digests of what it computes with; processes get it itself, or pickled.
     """
 
     call: Any
@@ -67,7 +72,9 @@ def map_over(
     all combinations of values.
 
     With a `store` it can be stopped, or killed, at any moment, and the same call goes on where it
-    was; a store that was made by another text of the function is refused. The function may be
+    was. A store that was made by another function, or by other values that it reads (closures,
+    defaults, globals, and what these depend on), is refused, and where it goes on two points are
+    computed again and compared. The function may be
     defined anywhere, in a notebook too: with `workers` or a `scheduler` it is sent to the processes
     by cloudpickle then (`pip install "saltus[cluster]"` has it).
 
@@ -132,8 +139,8 @@ def map_over(
     path = check_run(store, workers, scheduler, progress)
     axes = {name: axis_values(name, values) for name, values in grid.items()}
     name = getattr(function, "__qualname__", type(function).__name__)
-    text = _text_digest(function)
-    _refuse_other_text(path, name, text)
+    content = {} if path is None else contents_of(function)
+    _refuse_other_content(path, name, content)
     call = (
         function
         if workers is None and scheduler is None
@@ -141,7 +148,7 @@ def map_over(
     )
     plan = FunctionPlan(
         function=f"{__name__}:values_at",
-        arguments={"function": name, "text": text},
+        arguments={"function": name, "content": content},
         variables=_known_variables(path) or _variables(_first_answer(function, axes)),
         attrs={"title": f"{name} over a grid, computed by saltus", "kind": MAPPED}
         | provenance(None),
@@ -149,6 +156,8 @@ def map_over(
         chunk=dict.fromkeys(axes, 1) | dict(chunk or {}),
         call=call,
     )
+    if path is not None:
+        _ask_again(plan, path, name)
     return run(plan, path, workers=workers, scheduler=scheduler, progress=progress, retries=retries)
 
 
@@ -247,25 +256,62 @@ def _known_variables(path: Path | None) -> dict[str, Variable]:
     }
 
 
-def _refuse_other_text(path: Path | None, name: str, text: str) -> None:
-    """Refuse a store that was begun with another text of the function."""
+def _refuse_other_content(path: Path | None, name: str, content: Mapping[str, str]) -> None:
+    """Refuse a store that was begun with another function, or with other values in it."""
     if path is None or not (path / METADATA).is_file():
         return
-    if read_plan(path)["arguments"].get("text", text) != text:
-        raise ParameterError(
-            f"the text of the function {name} has changed since {path} was begun: name another store, or remove this one "
-            "(saltus.sweep.remove_store) to compute all points anew",
-            "store",
-        )
+    arguments = read_plan(path)["arguments"]
+    known = arguments.get("content")
+    if not isinstance(known, dict):
+        what = f"{path} does not say of what its function was made, as an older saltus wrote it"
+    else:
+        changed = [part for part in {**known, **content} if known.get(part) != content.get(part)]
+        if not changed:
+            return
+        part = next((part for part in changed if part == "text"), changed[0])
+        what = f"the {part} of the function {name} has changed since {path} was begun"
+    raise ParameterError(f"{what}: {ANEW}", "store")
 
 
-def _text_digest(function: Callable[..., Any]) -> str:
-    """A digest of the function's text, by which a store notices that it has changed."""
-    try:
-        text = inspect.getsource(function)
-    except (OSError, TypeError):
-        text = repr(getattr(getattr(function, "__code__", None), "co_code", ""))
-    return hashlib.sha256(text.encode()).hexdigest()
+def _ask_again(plan: FunctionPlan, path: Path, name: str) -> None:
+    """Refuse a store with kept points at which the function gives other values now, as where it
+    reads a file that has changed: some are computed again where it goes on.
+    """
+    if not (path / METADATA).is_file():
+        return
+    with opened(plan, path) as store:
+        missing = set(store.missing())
+        kept = [index for index in np.ndindex(plan.chunks.grid) if index not in missing]
+        if not missing or not kept:
+            return
+        rng = np.random.default_rng()
+        for place in rng.permutation(len(kept))[:ASKED_AGAIN]:
+            cut = plan.chunks.slices(kept[place])
+            point = tuple(int(rng.integers(part.start, part.stop)) for part in cut)
+            block = {
+                axis: values[[i]]
+                for (axis, values), i in zip(plan.axes.items(), point, strict=True)
+            }
+            try:
+                now = values_at(plan.arguments, block)
+            except Exception:  # the run tells what it raises, and may come to this point again
+                continue
+            for variable, array in store.arrays.items():
+                before = np.asarray(array[tuple(slice(i, i + 1) for i in point)])
+                if before.shape != now[variable].shape or not _same(before, now[variable]):
+                    where = ", ".join(f"{axis}={float(v[0]):g}" for axis, v in block.items())
+                    raise ParameterError(
+                        f"the function {name} gives {variable} = {shown(now[variable].ravel()[0])} "
+                        f"at {where}, and {path} keeps {shown(before.ravel()[0])}: something that "
+                        f"it reads has changed; {ANEW}",
+                        "store",
+                    )
+
+
+def _same(before: np.ndarray, now: np.ndarray) -> bool:
+    """Whether values are the same but for the rounding of another machine."""
+    size = float(np.nanmax(np.abs(before), initial=0.0, where=np.isfinite(before)))
+    return np.allclose(now, before, rtol=REPEATED, atol=1e-3 * REPEATED * size, equal_nan=True)
 
 
 def _sent(function: Callable[..., Any], far: bool) -> Any:

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import timedelta
+from decimal import Decimal
+from numbers import Complex
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.checks import number_problem
+from saltus.errors import ParameterError, shown
 from saltus.systems.load import LoadOnSides, Sides
 from saltus.systems.model import Model, is_zero
 
@@ -64,15 +68,16 @@ class Contact:
     name: str
     coordinate: Any
     sign: int = 1
-    position: Any = 0.0
+    position: Number = 0.0
     group: str = ""
-    restitution: Any = None
+    restitution: Number | None = None
 
     def __post_init__(self) -> None:
-        if self.sign not in (1, -1):
-            raise ParameterError(
-                f"the sign of the contact {self.name!r} must be +1 or -1, got {self.sign!r}", "sign"
-            )
+        _check_texts(self, "name", "group")
+        _check_sign(self)
+        _check_numbers(self, "position")
+        if self.restitution is not None:
+            _check_numbers(self, "restitution", at_least=0.0, at_most=1.0)
 
     def gap(self, position: Any) -> Any:
         """sign (q - p), at a position q.
@@ -132,6 +137,21 @@ class Friction:
     ground_speed: Number = 0.0
     contact: str | None = None
     stribeck_speed: Number | None = None
+
+    def __post_init__(self) -> None:
+        _check_texts(self, "name", *(() if self.contact is None else ("contact",)))
+        _check_numbers(self, "kinetic", at_least=0.0)
+        _check_numbers(self, "ground_speed")
+        if self.static is not None:
+            _check_numbers(self, "static")
+            if _is_number(self.static) and _is_number(self.kinetic) and self.static < self.kinetic:
+                pair = f"kinetic = {self.kinetic:g} and static = {self.static:g}"
+                raise ParameterError(
+                    f"the friction {shown(self.name)} must have 0 <= kinetic <= static, got {pair}",
+                    "static",
+                )
+        if self.stribeck_speed is not None:
+            _check_numbers(self, "stribeck_speed", above=0.0)
 
     @property
     def limit(self) -> str:
@@ -208,16 +228,15 @@ class Surface:
 
     name: str
     coordinate: Any
-    position: Any = 0.0
+    position: Number = 0.0
     sign: int = 1
-    stiffness: Any = 0.0
-    damping: Any = 0.0
+    stiffness: Number = 0.0
+    damping: Number = 0.0
 
     def __post_init__(self) -> None:
-        if self.sign not in (1, -1):
-            raise ParameterError(
-                f"the sign of the surface {self.name!r} must be +1 or -1, got {self.sign!r}", "sign"
-            )
+        _check_texts(self, "name")
+        _check_sign(self)
+        _check_numbers(self, "position", "stiffness", "damping")
 
     def side(self, position: Any) -> Any:
         """s, +1 or -1, at a position q.
@@ -228,6 +247,46 @@ class Surface:
             The coordinate q.
         """
         return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is given, and is not a parameter of a model whose equations are traced: such
+    a symbol can be computed with, and is no array.
+    """
+    symbol = hasattr(value, "__radd__") and not hasattr(value, "__array__")
+    return not symbol or isinstance(value, (Complex, Decimal, timedelta))
+
+
+def _check_numbers(part: Contact | Friction | Surface, *names: str, **bounds: Any) -> None:
+    """Refuse anything but finite numbers within bounds in the fields of a part of a model."""
+    for name in names:
+        value = getattr(part, name)
+        problem = number_problem(value, **bounds) if _is_number(value) else None
+        if problem is not None:
+            raise ParameterError(f"{name} of {_called(part)} {problem}", name)
+
+
+def _check_texts(part: Contact | Friction | Surface, *names: str) -> None:
+    """Refuse anything but texts in the fields of a part of a model."""
+    for name in names:
+        value = getattr(part, name)
+        if not isinstance(value, str) or (name == "name" and not value):
+            what = type(part).__name__
+            raise ParameterError(f"{name} of a {what} must be a text, got {shown(value)}", name)
+
+
+def _check_sign(part: Contact | Surface) -> None:
+    """Refuse a sign that is none."""
+    value = part.sign
+    if number_problem(value) is not None or value not in (1, -1):
+        raise ParameterError(
+            f"the sign of {_called(part)} must be +1 or -1, got {shown(value)}", "sign"
+        )
+
+
+def _called(part: Contact | Friction | Surface) -> str:
+    """What a part of a model is called in a sentence."""
+    return f"the {type(part).__name__.lower()} {shown(part.name)}"
 
 
 # Those closed are bits of a whole number; a friction or a surface takes two.
