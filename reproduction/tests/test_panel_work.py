@@ -3,6 +3,8 @@ share is computed once.
 """
 
 import os
+import signal
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +24,15 @@ def refuse() -> None:
     raise ZeroDivisionError
 
 
+def number() -> int:
+    return 7
+
+
+def end() -> None:
+    """End the process as the system does where memory is short."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_path: Path) -> None:
     shared = partial(marked, str(tmp_path), name="shared", value=3)
     parts = {
@@ -29,7 +40,7 @@ def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_p
         "two": {"d": partial(marked, str(tmp_path), name="shared", value=3)},
         "three": {"only": partial(marked, str(tmp_path), name="only", value=5)},
     }
-    made = {part: panels for part, panels, _ in compute_panels(parts)}
+    made = {part.name: part.panels for part in compute_panels(parts)}
     assert {part: list(panels.items()) for part, panels in made.items()} == {
         "one": [("b", 2), ("a", 3)],
         "two": [("d", 3)],
@@ -41,9 +52,22 @@ def test_parts_get_their_panels_in_order_and_a_shared_one_is_computed_once(tmp_p
 @pytest.mark.parametrize(
     "panels", [{"a": refuse}, {"a": refuse, "b": partial(int, 1)}], ids=["here", "in processes"]
 )
-def test_a_panel_that_fails_ends_the_others_with_its_own_error(panels: dict) -> None:
-    with pytest.raises(ZeroDivisionError):
-        list(compute_panels({"part": panels}))
+def test_a_panel_that_fails_leaves_the_other_parts_alone(panels: dict) -> None:
+    parts = {part.name: part for part in compute_panels({"bad": panels, "good": {"c": number}})}
+    assert isinstance(parts["bad"].error, ZeroDivisionError)
+    assert not parts["bad"].panels
+    assert parts["good"].error is None
+    assert parts["good"].panels == {"c": 7}
+
+
+def test_a_process_that_is_ended_costs_its_own_panel_alone() -> None:
+    """As where there is no memory left; all other panels that waited are computed."""
+    good = {name: partial(int, value) for value, name in enumerate("abcdef")}
+    parts = {
+        part.name: part for part in compute_panels({"bad": {"x": end, "y": end}, "good": good})
+    }
+    assert isinstance(parts["bad"].error, BrokenProcessPool)
+    assert parts["good"].panels == {name: value for value, name in enumerate("abcdef")}
 
 
 def cores_beside(pipe: str, mode: str) -> int:
@@ -59,8 +83,8 @@ def test_panels_that_are_computed_at_the_same_time_share_the_cores(tmp_path: Pat
     pipe = str(tmp_path / "pipe")
     os.mkfifo(pipe)
     panels = {mode: partial(cores_beside, pipe, mode) for mode in ("r", "w")}
-    ((_, made, _),) = compute_panels({"part": panels})
-    first, last = sorted(made.values())
+    (part,) = compute_panels({"part": panels})
+    first, last = sorted(part.panels.values())
     assert first == available_cores() // 2
     assert last in (first, available_cores())  # one may be done before the other one has asked
 

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,31 @@ def test_the_options_reach_the_paper(saltus, monkeypatch, arguments, names, outp
     monkeypatch.setattr("saltus_paper.report_as_pdf", lambda folder: None)
     assert saltus("reproduce", *arguments).exit_code == 0
     assert (*calls[0][:3], calls[0][4]) == (names, output, force, effort)
+
+
+def test_a_part_that_fails_is_named_at_the_end_and_the_others_are_made(
+    saltus, monkeypatch, tmp_path
+):
+    from saltus_paper import FIGURES
+
+    def fail(data):
+        raise KeyError("no pen")
+
+    monkeypatch.setitem(FIGURES, "fig08", replace(FIGURES["fig08"], draw=fail))
+    monkeypatch.setattr("saltus_paper.report.browser.BROWSERS", ())
+    found = saltus("reproduce", "fig08", "table1", "-o", tmp_path)
+    assert found.exit_code == 1
+    assert "saltus: fig08 failed: KeyError: 'no pen'" in found.stderr
+    assert "in fail" in (tmp_path / "failures.txt").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'id="table1"' in page
+    assert 'id="fig08"' not in page
+    monkeypatch.undo()
+    monkeypatch.setattr("saltus_paper.report.browser.BROWSERS", ())
+    again = saltus("reproduce", "fig08", "table1", "-o", tmp_path)
+    assert again.exit_code == 0
+    assert not (tmp_path / "failures.txt").exists()
+    assert 'id="fig08"' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_an_unknown_part_is_refused(refused, tmp_path):

@@ -4,6 +4,7 @@ its report.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 RESULTS = Path("results")
+FAILED = 1  # the exit status where a part could not be made
 
 
 def reproduce(
@@ -43,6 +45,8 @@ def reproduce(
 
     Writes PNG, PDF and netCDF files, and report.html to open (report.pdf too,
     where a browser is found that can print it). What is up to date is skipped.
+    If a part fails, the others and the report are made; the command names it
+    at its end, and ends with status 1.
 
     Example: [cyan]saltus reproduce[/] for everything
 
@@ -82,6 +86,7 @@ def reproduce_paper(
     from saltus.cli import progress_bar
     from saltus_paper import FIGURES, HEADINGS, ledger, tally, with_summaries
     from saltus_paper import reproduce as made
+    from saltus_paper.reproduction import FAILURES
 
     with progress_bar("paper") as progress:
         results = made(names, output, force, progress, effort)
@@ -89,7 +94,7 @@ def reproduce_paper(
     table = Table(box=None, show_header=False)
     for result in results:
         time = f"{result.seconds:.1f} s of processor time" if result.made else "up to date"
-        table.add_row(result.name, time, FIGURES[result.name].title)
+        table.add_row(result.name, "FAILED" if result.error else time, FIGURES[result.name].title)
     console.print(table)
     claims = with_summaries(claim for result in results for claim in result.claims)
     verdicts = Table(HEADINGS[0], box=None, padding=(0, 1, 0, 0))
@@ -100,6 +105,12 @@ def reproduce_paper(
     console.print(verdicts)
     console.print(tally(claims), markup=False, soft_wrap=True)
     _print_report(console, output)
+    failed = [result for result in results if result.error]
+    for result in failed:
+        print(f"saltus: {result.name} failed: {result.error}", file=sys.stderr)
+    if failed:
+        print(f"saltus: the tracebacks are in {output / FAILURES}", file=sys.stderr, flush=True)
+        raise typer.Exit(FAILED)
 
 
 def renew_report(output: Path) -> None:

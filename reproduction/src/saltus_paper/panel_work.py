@@ -9,7 +9,8 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,40 +19,58 @@ from saltus.flow import available_cores, share_cores
 # the functions that compute the panels of a part, by the panels' names
 Panels = Mapping[str, Callable[[], Any]]
 Task = tuple[str, str]  # the names of a part and of its panel
+Work = tuple[Callable[[], Any], list[Task]]  # what computes a panel, and all that it is a panel of
 
 
-def compute_panels(parts: Mapping[str, Panels]) -> Iterator[tuple[str, dict[str, Any], float]]:
+@dataclass(frozen=True, slots=True)
+class PanelOutcome:
+    """What became of one panel: its data and seconds of processor time, or why there are none."""
+
+    data: Any = None
+    seconds: float = 0.0
+    error: Exception | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ComputedPart:
+    """What became of one part: its panels by name and in their order, or the first error of one."""
+
+    name: str
+    panels: dict[str, Any]
+    seconds: float  # of processor time
+    error: Exception | None = None
+
+
+def compute_panels(parts: Mapping[str, Panels]) -> Iterator[ComputedPart]:
     """Compute the panels of all parts; each part is given as soon as its last panel is there.
 
     Panels are begun in the order of the parts. Parts of a single panel each are computed here: to
-    start a process takes longer.
-
-    Yields
-    ------
-    tuple[str, dict[str, Any], float]
-        The name of the part, its panels by name and in their order, and the seconds of processor
-        time that they took.
+    start a process takes longer. A panel that fails leaves the others alone: its parts have its
+    error.
     """
     # by the function and its arguments: a chart of two figures is computed once
     shared: dict[Any, list[Task]] = {}
     for part, panels in parts.items():
         for name, make in panels.items():
             shared.setdefault(_what(make), []).append((part, name))
-    found: dict[Task, tuple[Any, float]] = {}
+    outcomes: dict[Task, PanelOutcome] = {}
     work = [(parts[tasks[0][0]][tasks[0][1]], tasks) for tasks in shared.values()]
-    with _results(
-        work, min(available_cores(), max(map(len, parts.values()), default=1))
-    ) as results:
-        for tasks, result in results:
-            found |= dict.fromkeys(tasks, result)
-            for part in dict.fromkeys(part for part, _ in tasks):
-                if all((part, name) in found for name in parts[part]):
-                    made = {name: found.pop((part, name)) for name in parts[part]}
-                    yield (
-                        part,
-                        {name: data for name, (data, _) in made.items()},
-                        sum(seconds for _, seconds in made.values()),
-                    )
+    cores = min(available_cores(), max(map(len, parts.values()), default=1))
+    for tasks, outcome in _outcomes(work, cores):
+        outcomes |= dict.fromkeys(tasks, outcome)
+        for part in dict.fromkeys(part for part, _ in tasks):
+            if all((part, name) in outcomes for name in parts[part]):
+                yield _joined(part, {name: outcomes.pop((part, name)) for name in parts[part]})
+
+
+def _joined(part: str, panels: Mapping[str, PanelOutcome]) -> ComputedPart:
+    errors = [outcome.error for outcome in panels.values() if outcome.error is not None]
+    return ComputedPart(
+        part,
+        {} if errors else {name: outcome.data for name, outcome in panels.items()},
+        sum(outcome.seconds for outcome in panels.values()),
+        errors[0] if errors else None,
+    )
 
 
 def _what(make: Callable[[], Any]) -> Any:
@@ -65,32 +84,59 @@ def _what(make: Callable[[], Any]) -> Any:
     )
 
 
-@contextmanager
-def _results(
-    work: Sequence[tuple[Callable[[], Any], list[Task]]], cores: int
-) -> Iterator[Iterator[tuple[list[Task], tuple[Any, float]]]]:
-    """The results of each piece of work, and its seconds, as they come."""
+def _outcomes(work: Sequence[Work], cores: int) -> Iterator[tuple[list[Task], PanelOutcome]]:
+    """What becomes of each piece of work, as it comes.
+
+    Where a process is ended from outside, for instance for want of memory, nobody knows by which of
+    the panels: each panel that is not done yet is then computed alone, one after another.
+    """
     if cores < 2:
-        yield ((tasks, _timed(make)) for make, tasks in work)
+        yield from ((tasks, _attempted(make)) for make, tasks in work)
         return
+    alone = []
+    for piece, outcome in _in_processes(work, cores):
+        if isinstance(outcome.error, BrokenProcessPool):
+            alone.append(piece)
+        else:
+            yield piece[1], outcome
+    for piece in alone:
+        for _, outcome in _in_processes([piece], 1):
+            yield piece[1], outcome
+
+
+def _in_processes(work: Sequence[Work], cores: int) -> Iterator[tuple[Work, PanelOutcome]]:
+    """The outcomes of a pool of processes, as they come."""
     context = multiprocessing.get_context("spawn")
     left = context.Value("i", len(work))
     with ProcessPoolExecutor(
         cores, mp_context=context, initializer=_begin, initargs=(left,)
     ) as pool:
-        futures = {pool.submit(_counted, make): tasks for make, tasks in work}
+        futures = {pool.submit(_counted, piece[0]): piece for piece in work}
         try:
-            yield ((futures.pop(future), future.result()) for future in as_completed(list(futures)))
-        except (
-            BaseException
-        ):  # after an interruption or a failed panel the others are not needed any more
+            for future in as_completed(list(futures)):
+                piece, error = futures.pop(future), future.exception()
+                if error is None:
+                    yield piece, future.result()
+                elif isinstance(error, Exception):
+                    yield piece, PanelOutcome(error=error)
+                else:
+                    raise error
+        except BaseException:  # after an interruption nobody waits for the others
             _stop(pool)
             raise
 
 
-def _timed(make: Callable[[], Any]) -> tuple[Any, float]:
+def _attempted(make: Callable[[], Any]) -> PanelOutcome:
+    try:
+        return _timed(make)
+    except Exception as error:
+        return PanelOutcome(error=error)
+
+
+def _timed(make: Callable[[], Any]) -> PanelOutcome:
     start = time.process_time()
-    return make(), time.process_time() - start
+    data = make()
+    return PanelOutcome(data, time.process_time() - start)
 
 
 def _stop(pool: Executor) -> None:
@@ -112,9 +158,10 @@ def _begin(left: Any) -> None:
     share_cores(lambda: int(left.value))
 
 
-def _counted(make: Callable[[], Any]) -> tuple[Any, float]:
+def _counted(make: Callable[[], Any]) -> PanelOutcome:
     """Compute a panel of the pool; afterwards the panels that are left share the cores anew."""
-    result = _timed(make)
-    with _left[0].get_lock():
-        _left[0].value -= 1
-    return result
+    try:
+        return _timed(make)
+    finally:
+        with _left[0].get_lock():
+            _left[0].value -= 1

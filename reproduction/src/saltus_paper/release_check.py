@@ -41,9 +41,10 @@ def check_release(folder: Path) -> int:
         force=True,
         progress=lambda fraction, what: print(f"{fraction:4.0%}  {what}", flush=True),
     )
-    lines = failures(with_summaries(claim for result in results for claim in result.claims))
+    lines = [f"{result.name} failed: {result.error}" for result in results if result.error]
+    lines += failures(with_summaries(claim for result in results for claim in result.claims))
     print(*lines, sep="\n")
-    print(f"{len(lines)} claims fail." if lines else "Every claim was judged, and none disagrees.")
+    print(f"{len(lines)} failures." if lines else "Every claim was judged, and none disagrees.")
     return int(bool(lines))
 
 

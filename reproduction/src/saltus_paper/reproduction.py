@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import difflib
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from saltus import ParameterError, page, save
+from saltus import ParameterError, SaltusError, page, save
 from saltus.flow import available_cores
 from saltus.plots import style
 from saltus_paper import up_to_date as state
@@ -17,7 +19,7 @@ from saltus_paper.claims.claim import Claim
 from saltus_paper.expected_time import expected_seconds, measured_speed, on_the_clock
 from saltus_paper.figures.figure import EFFORTS, PaperFigure
 from saltus_paper.output_folder import check_writable
-from saltus_paper.panel_work import compute_panels
+from saltus_paper.panel_work import ComputedPart, compute_panels
 from saltus_paper.report.report import write_report
 
 # what `saltus.cli.progress_bar` and `saltus.show_progress` are
@@ -26,13 +28,28 @@ Progress = Callable[[float, str], object]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MadeFigure:
-    """The result for one name: its files, its claims, and whether it was made anew."""
+    """The result for one name: its files, its claims, and whether it was made anew, or why not."""
 
     name: str
     made: bool  # False: it was up to date
     seconds: float  # of processor time, of all cores together; 0 if it was up to date
     files: tuple[Path, ...]
     claims: tuple[Claim, ...]
+    error: str = ""  # why the part could not be made, in a sentence; it has no files and no claims
+
+
+FAILURES = "failures.txt"  # in the output folder: the tracebacks of the parts that failed
+
+
+@dataclass(slots=True)
+class _Progress:
+    """What became of the parts so far."""
+
+    seconds: dict[str, float] = field(default_factory=dict)  # of processor time, of those made
+    errors: dict[str, Exception] = field(default_factory=dict)
+
+    def is_open(self, name: str) -> bool:
+        return name not in self.seconds and name not in self.errors
 
 
 def reproduce(
@@ -52,6 +69,9 @@ def reproduce(
     What is up to date is left alone unless `force`. It is said at once how long the rest will take
     here, and each picture is named as soon as it can be looked at. An interrupt leaves complete
     files only, and the next run goes on from there.
+
+    A part that fails leaves the others alone. Its result says why, the report is written without
+    it, and failures.txt has the tracebacks.
 
     Raises
     ------
@@ -84,43 +104,91 @@ def reproduce(
     stale = {
         figure.name: figure for figure in chosen if force or not state.up_to_date(figure, output)
     }
-    seconds = _make(
+    made = _make(
         {name: stale[name] for name in dict.fromkeys((*ORDER, *stale)) if name in stale},
         output,
         progress,
     )
+    _keep_tracebacks(made.errors, output)
     progress(1.0, "writing the report")
-    results = [_result(figure, output, seconds) for figure in chosen]
-    write_report(FIGURES.values(), output, {result.name: result.claims for result in results})
+    results = [_result(figure, output, made) for figure in chosen]
+    write_report(
+        FIGURES.values(),
+        output,
+        {result.name: result.claims for result in results if not result.error},
+    )
     return results
 
 
-def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) -> dict[str, float]:
-    """Compute, draw and judge these parts, begun in their order; returns their seconds."""
-    seconds: dict[str, float] = {}
+def _make(figures: Mapping[str, PaperFigure], output: Path, progress: Progress) -> _Progress:
+    """Compute, draw and judge these parts, begun in their order."""
+    made = _Progress()
     expected = _announced(figures, progress)
-    for name, made, computing in compute_panels(
-        {name: figure.panels(**figure.parameters) for name, figure in figures.items()}
-    ):
-        figure = figures[name]
-        start = time.process_time()
-        data = figure.join(made)
-        _write(figure, data, output)
-        # The data are taken from memory; tests show that reading the file gives the same.
-        claims = figure.claims(data)
-        seconds[name] = computing + time.process_time() - start
-        state.write(figure, output, claims, seconds[name])
-        left = sum(expected[other] for other in figures if other not in seconds)
-        ready = next(
-            output / file
-            for file in figure.files()
-            if not file.endswith(".nc") or len(figure.files()) == 1
-        )
-        progress(
-            1.0 - left / sum(expected.values()),
-            f"{ready} is ready, {figure.title}; about {on_the_clock(left)} left",
-        )
+    panels = {}
+    for name, figure in figures.items():
+        try:
+            panels[name] = figure.panels(**figure.parameters)
+        except Exception as error:
+            made.errors[name] = error
+    with closing(compute_panels(panels)) as parts:
+        for part in parts:
+            figure = figures[part.name]
+            try:
+                if part.error is not None:
+                    raise part.error
+                made.seconds[part.name] = _finish(figure, part, output)
+            except Exception as error:
+                made.errors[part.name] = error
+            left = sum(expected[name] for name in figures if made.is_open(name))
+            what = (
+                f"{figure.name} FAILED, {_sentence(made.errors[part.name])}"
+                if part.name in made.errors
+                else f"{_first_to_look_at(figure, output)} is ready, {figure.title}"
+            )
+            progress(
+                1.0 - left / sum(expected.values()), f"{what}; about {on_the_clock(left)} left"
+            )
+    return made
+
+
+def _finish(figure: PaperFigure, part: ComputedPart, output: Path) -> float:
+    """Draw and judge a part whose panels are computed; the seconds of processor time of it all."""
+    start = time.process_time()
+    data = figure.join(part.panels)
+    _write(figure, data, output)
+    # The data are taken from memory; tests show that reading the file gives the same.
+    claims = figure.claims(data)
+    seconds = part.seconds + time.process_time() - start
+    state.write(figure, output, claims, seconds)
     return seconds
+
+
+def _first_to_look_at(figure: PaperFigure, output: Path) -> Path:
+    return next(
+        output / file
+        for file in figure.files()
+        if not file.endswith(".nc") or len(figure.files()) == 1
+    )
+
+
+def _sentence(error: Exception) -> str:
+    """The error in one line; the name of its class too, unless it is one of saltus, which are
+    sentences.
+    """
+    text = " ".join(str(error).split())
+    return text if isinstance(error, SaltusError) else f"{type(error).__name__}: {text}"
+
+
+def _keep_tracebacks(errors: Mapping[str, Exception], output: Path) -> None:
+    """Write where each part failed, for those who mend it."""
+    if errors:
+        texts = [
+            f"{name}\n{'-' * len(name)}\n{''.join(traceback.format_exception(error))}"
+            for name, error in errors.items()
+        ]
+        save(output / FAILURES, "\n".join(texts))
+    else:
+        (output / FAILURES).unlink(missing_ok=True)
 
 
 def _announced(figures: Mapping[str, PaperFigure], progress: Progress) -> dict[str, float]:
@@ -140,16 +208,15 @@ def _announced(figures: Mapping[str, PaperFigure], progress: Progress) -> dict[s
     return expected
 
 
-def _result(figure: PaperFigure, output: Path, seconds: Mapping[str, float]) -> MadeFigure:
-    files = tuple(output / name for name in figure.files())
-    made = figure.name in seconds
-    claims = tuple(state.claims(figure, output))
+def _result(figure: PaperFigure, output: Path, made: _Progress) -> MadeFigure:
+    error = made.errors.get(figure.name)
     return MadeFigure(
         name=figure.name,
-        made=made,
-        seconds=seconds.get(figure.name, 0.0),
-        files=files,
-        claims=claims,
+        made=figure.name in made.seconds,
+        seconds=made.seconds.get(figure.name, 0.0),
+        files=() if error else tuple(output / name for name in figure.files()),
+        claims=() if error else tuple(state.claims(figure, output)),
+        error=_sentence(error) if error else "",
     )
 
 

@@ -62,8 +62,10 @@ class PaperFigure:
 
     def compute(self, **parameters: Any) -> Any:
         """The data of all panels together, for parameters that need not be the paper's."""
-        ((_, made, _),) = compute_panels({self.name: self.panels(**parameters)})
-        return self.join(made)
+        (part,) = compute_panels({self.name: self.panels(**parameters)})
+        if part.error is not None:
+            raise part.error
+        return self.join(part.panels)
 
     def claims(self, data: Any) -> list[Claim]:
         """The claims that the data bears on, each with its verdict."""
