@@ -144,8 +144,10 @@ class Friction:
         _check_numbers(self, "ground_speed")
         if self.static is not None:
             _check_numbers(self, "static")
-            if _is_number(self.static) and _is_number(self.kinetic) and self.static < self.kinetic:
-                pair = f"kinetic = {self.kinetic:g} and static = {self.static:g}"
+            lowest = _real(self.kinetic)
+            highest = _real(self.static)
+            if _is_number(lowest) and _is_number(highest) and highest < lowest:
+                pair = f"kinetic = {lowest:g} and static = {highest:g}"
                 raise ParameterError(
                     f"the friction {shown(self.name)} must have 0 <= kinetic <= static, got {pair}",
                     "static",
@@ -249,6 +251,10 @@ class Surface:
         return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
 
 
+# the largest imaginary part by which derivatives to a number of a model are taken
+COMPLEX_STEP = 1e-100
+
+
 def _is_number(value: Any) -> bool:
     """Whether a value is given, and is not a parameter of a model whose equations are traced: such
     a symbol can be computed with, and is no array.
@@ -257,10 +263,16 @@ def _is_number(value: Any) -> bool:
     return not symbol or isinstance(value, (Complex, Decimal, timedelta))
 
 
+def _real(value: Any) -> Any:
+    """A value without the imaginary part by which a derivative is taken, which is no part of it."""
+    small = isinstance(value, complex) and 0.0 < abs(value.imag) <= COMPLEX_STEP
+    return value.real if small else value
+
+
 def _check_numbers(part: Contact | Friction | Surface, *names: str, **bounds: Any) -> None:
     """Refuse anything but finite numbers within bounds in the fields of a part of a model."""
     for name in names:
-        value = getattr(part, name)
+        value = _real(getattr(part, name))
         problem = number_problem(value, **bounds) if _is_number(value) else None
         if problem is not None:
             raise ParameterError(f"{name} of {_called(part)} {problem}", name)
