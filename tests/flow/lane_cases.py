@@ -353,7 +353,12 @@ def records(rng, n):
         horizontal=Record(t, fixed.normal(size=30), quantity="force") + Harmonic(0.0),
         vertical=-0.5,
         ground_horizontal=Record(t + 0.1, 0.5 * fixed.normal(size=30), quantity="acceleration"),
-        ground_vertical=Record(t[:12] - 0.3, 0.1 * fixed.normal(size=12), quantity="displacement"),
+        ground_vertical=Record(
+            t[:12] - 0.3,
+            0.1 * fixed.normal(size=12),
+            quantity="displacement",
+            interpolation="spline",
+        ),
     )
     columns = layers(rng, n) | {
         "load.frequency": frequencies(rng, n),

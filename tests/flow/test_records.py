@@ -4,17 +4,20 @@ and without harmonics.
 
 import itertools
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from generated_functions import Generated
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg import expm
 from scipy_motion import by_scipy
 
-from saltus import InelasticImpact
+from saltus import InelasticImpact, Model, ParameterError
 from saltus.flow import EventKind, simulate
 from saltus.systems import (
     EnergyRestitution,
@@ -27,6 +30,7 @@ from saltus.systems import (
     VelocityReduction,
     WallOscillator,
 )
+from saltus.systems.serial import from_dict, to_dict
 
 OMEGA = 1.7
 TIMES = np.array([0.4, 0.7, 1.5, 1.6, 2.9, 4.0])
@@ -306,3 +310,95 @@ def test_records_of_different_spans_and_kinds_are_read_together():
             assert generated.reset(t, -side * 1.2, float(side), piece) == pytest.approx(
                 [float(x) for x in expected], abs=1e-14
             )
+
+
+CORNERS = ([0.0, 0.5, 0.6, 2.0, 2.1, 4.0], [0.0, 0.0, 0.2, 0.2, 0.0, 0.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Carried(Model):
+    """A mass on a spring whose other end is the ground: x'' = -w^2 (x - zeta)."""
+
+    rate: float = 3.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("ground",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        return -(self.rate**2) * (x - load.ground(t))
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-3])
+def test_a_velocity_given_by_its_corners_has_constant_accelerations(width):
+    """r = x - zeta has r'' = -w^2 r - a with a constant a between two corners, a closed form."""
+    time, value = np.array(CORNERS[0]), np.array(CORNERS[1])
+    time[[2, 4]] = time[[1, 3]] + width
+    record = Record(time, value, "velocity", interpolation="linear")
+    load, w = Load(ground=record), 3.0
+    r, rate, at = 0.0, 0.0, 0.0
+    for t, slope in zip(time[1:], np.diff(value) / np.diff(time), strict=True):
+        still = -slope / w**2
+        c, s = math.cos(w * (t - at)), math.sin(w * (t - at))
+        r, rate, at = still + (r - still) * c + rate / w * s, rate * c - w * (r - still) * s, t
+    motion = simulate(System(model=Carried(), load=load), x=0.0, duration=4.0)
+    area = 0.2 * (time[3] - time[1])  # of the trapezoid of velocities
+    assert load.ground(4.0) == pytest.approx(area, rel=1e-12)
+    assert motion.x - area == pytest.approx(r, abs=1e-11)
+    assert motion.velocity == pytest.approx(rate, abs=1e-11)
+    speeds = [load.ground.velocity(t) for t in np.linspace(0, 4, 4001)]
+    assert (min(speeds), max(speeds)) == (0.0, pytest.approx(0.2, abs=1e-15))
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "displacement"])
+def test_a_monotone_record_has_no_extrema_between_its_samples(quantity):
+    """And is SciPy's, by Fritsch and Carlson."""
+    record = Record(*CORNERS, quantity, interpolation="monotone")
+    times = np.linspace(0.0, 4.0, 2001)
+    order = 1 if quantity == "velocity" else 0
+    values = record.derivative(times, None, order)
+    np.testing.assert_allclose(values, PchipInterpolator(*CORNERS)(times), rtol=0, atol=1e-15)
+    assert (values.min(), values.max()) == (0.0, pytest.approx(0.2, abs=1e-15))
+    motion = simulate(System(model=Carried(), load=Load(ground=record)), x=0.0, duration=4.0)
+    state = np.zeros(2)
+    for first, last in itertools.pairwise(CORNERS[0]):
+        found = solve_ivp(
+            lambda t, z: [z[1], -9.0 * (z[0] - record.derivative(t, None))],
+            (first, last),
+            state,
+            "DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+        )
+        state = found.y[:, -1]
+    np.testing.assert_allclose([motion.x, motion.velocity], state, rtol=0, atol=1e-9)
+
+
+def test_a_spline_that_leaves_its_samples_is_refused_and_one_that_does_not_is_taken():
+    """By more than a fifth of their range, wherever it is and in whatever units."""
+    for scale, shift in itertools.product((1e-6, 1.0, 1e6), (0.0, 3.0)):
+        values = scale * np.array(CORNERS[1]) + shift * scale
+        for quantity in ("velocity", "displacement"):
+            with pytest.raises(ParameterError, match="interpolation=") as refusal:
+                Record(CORNERS[0], values, quantity)
+            assert refusal.value.parameter == "interpolation"
+            Record(CORNERS[0], values, quantity, interpolation="spline")
+        waves = scale * (shift + np.sin(np.linspace(0.0, 20.0, 60)))
+        Record(np.linspace(0.0, 20.0, 60), waves, "velocity")
+        Record(np.linspace(0.0, 20.0, 60), np.full(60, shift * scale), "displacement")
+    for quantity, curve in (
+        ("displacement", "linear"),
+        ("force", "spline"),
+        ("acceleration", "monotone"),
+        ("velocity", "cubic"),
+        ("velocity", 3),
+    ):
+        with pytest.raises(ParameterError, match="interpolation of a record of"):
+            Record(*CORNERS, quantity, interpolation=curve)
+
+
+def test_what_is_between_samples_is_kept_with_a_system():
+    record = Record(*CORNERS, "velocity", interpolation="linear")
+    system = System(model=Carried(), load=Load(ground=record))
+    again = from_dict("load", to_dict(system.load))
+    assert again == system.load
+    assert again.channels["ground"].interpolation == "linear"
+    assert system.load != Load(ground=Record(*CORNERS, "velocity", interpolation="monotone"))

@@ -226,4 +226,5 @@ def _record(source: Source, keys: Keys, data: Mapping[str, Any]) -> dict[str, An
         "quantity": record.quantity,
         "scale": scale,
         "source": name,
+        **({"interpolation": record.interpolation} if record.interpolation else {}),
     }

@@ -109,13 +109,7 @@ def _reversed_signal(signal: Signal) -> Signal:
         return Sum(tuple(_reversed_signal(term) for term in signal.terms))
     if isinstance(signal, Record):
         sign = -1.0 if signal.quantity == "velocity" else 1.0
-        return Record(
-            -signal.time[::-1],
-            sign * signal.value[::-1],
-            signal.quantity,
-            signal.scale,
-            signal.source,
-        )
+        return dataclasses.replace(signal, time=-signal.time[::-1], value=sign * signal.value[::-1])
     raise ParameterError(f"a {type(signal).__name__} cannot be run backward")
 
 

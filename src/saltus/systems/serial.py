@@ -276,7 +276,8 @@ def to_dict(part: Any) -> Any:
             "value": part.value.tolist(),
             "quantity": part.quantity,
         }
-        return {**fields, "scale": part.scale, **({"source": part.source} if part.source else {})}
+        named = {name: getattr(part, name) for name in ("interpolation", "source")}
+        return {**fields, "scale": part.scale, **{n: text for n, text in named.items() if text}}
     kind: Any = type(part)
     if hasattr(part, "to_table"):
         return {"type": kind.__name__, **part.to_table()}

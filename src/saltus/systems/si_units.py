@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import mul, truediv
 from typing import Any
 
@@ -75,13 +75,8 @@ class Physical:
                 return Sum(tuple(convert(term, quantity) for term in signal.terms))
             if isinstance(signal, Record):
                 scale = signal.scale * units[signal.quantity] ** power
-                return Record(
-                    by_time(signal.time, units["time"]),
-                    signal.value,
-                    signal.quantity,
-                    scale,
-                    signal.source,
-                )
+                time = by_time(signal.time, units["time"])
+                return replace(signal, time=time, scale=scale)
             if isinstance(signal, Pulse):
                 return in_other_units(
                     signal, by_time, by_rate, units["time"], units[signal.quantity] ** power

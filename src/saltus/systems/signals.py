@@ -158,6 +158,31 @@ QUANTITIES = ("force", "displacement", "velocity", "acceleration")
 QUANTITY_ORDER = {"force": 0, "displacement": 0, "velocity": 1, "acceleration": 2}
 
 
+# what may be between the samples of a quantity
+CURVES = {
+    "force": ("linear",),
+    "acceleration": ("linear",),
+    "velocity": ("spline", "linear", "monotone"),
+    "displacement": ("spline", "monotone"),
+}
+# the share of the range of its samples by which a spline may leave it: those of sampled motions do
+# so by some per cent, those through corners by more
+SWING = 0.2
+
+
+def _extremes(curve: Any) -> tuple[float, float]:
+    """The least and the largest value of a piecewise cubic."""
+    c, b, a = curve.c[-2], 2.0 * curve.c[-3], 3.0 * curve.c[-4]  # of its slope, c + b t + a t^2
+    with np.errstate(all="ignore"):
+        root = np.sqrt(np.where(b * b < 4.0 * a * c, np.nan, b * b - 4.0 * a * c))
+        half = -0.5 * (b + np.copysign(root, b))
+        places = np.stack([half / a, c / half])
+        inside = (places > 0.0) & (places < np.diff(curve.x))
+        turning = curve(np.where(inside, places, 0.0) + curve.x[:-1])
+    values = np.append(turning[np.isfinite(turning)], curve(curve.x))
+    return float(values.min()), float(values.max())
+
+
 def _samples(where: str, name: str, given: Any) -> np.ndarray:
     """The numbers of a list."""
     check_size(given, name)
@@ -180,7 +205,9 @@ class Record(Signal):
     * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the
       first sample.
     * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the
-      acceleration is continuous.
+      acceleration is continuous. Between samples that are corners, as of a trapezoid, a spline
+      swings: one that leaves the range of its samples by more than 20 % is refused, and
+      `interpolation` says what is meant.
 
     Outside its samples a ground record has no acceleration: the ground goes on with the velocity
     that it has there.
@@ -198,11 +225,17 @@ class Record(Signal):
         The factor by which every sample is multiplied.
     source
         The file that it came from.
+    interpolation
+        What is between samples of a velocity or a displacement: "spline"; "linear", of a velocity,
+        whose accelerations are then constant between the samples; or "monotone", a cubic without
+        extrema between the samples (Fritsch and Carlson's). By default a spline, if it stays near
+        to its samples.
 
     Raises
     ------
     ParameterError
-        Fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN.
+        Fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN,
+        a spline that leaves the range of its samples.
 
     Examples
     --------
@@ -217,6 +250,7 @@ class Record(Signal):
     scale: float = 1.0
     once: ClassVar[bool] = True
     source: str = field(default="", compare=False)
+    interpolation: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
@@ -234,7 +268,8 @@ class Record(Signal):
                 f"{where}: time and value must have one length, got {time.size} and {value.size}",
                 "value",
             )
-        least = 4 if self.quantity in ("velocity", "displacement") else 2
+        self._check_interpolation(where)
+        least = 4 if self._curve == "spline" else 2
         if time.size < least:
             raise ParameterError(
                 (
@@ -285,21 +320,60 @@ class Record(Signal):
         value.setflags(write=False)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "value", value)
+        if self._curve == "spline" and not self.interpolation:
+            self._check_range(where)
+
+    @property
+    def _curve(self) -> str:
+        """What is between the samples."""
+        plain = self.quantity in ("force", "acceleration")
+        return self.interpolation or ("linear" if plain else "spline")
+
+    def _check_interpolation(self, where: str) -> None:
+        """Refuse an interpolation that the quantity does not have."""
+        known = CURVES[self.quantity]
+        if self.interpolation != "" and self.interpolation not in known:
+            corners = self.quantity == "displacement" and self.interpolation == "linear"
+            hint = ", as its corners would be jumps of the ground's velocity" * corners
+            raise ParameterError(
+                f"{where}: interpolation of a record of {self.quantity} must be "
+                f"{' or '.join(known)}, got {shown(self.interpolation)}{hint}",
+                "interpolation",
+            )
+
+    def _check_range(self, where: str) -> None:
+        """Refuse a spline that leaves the range of its samples far behind."""
+        low, high = self.value.min(), self.value.max()
+        order = QUANTITY_ORDER[self.quantity]
+        least, most = _extremes(self.polynomials[order])
+        beyond = max(low - least, most - high)
+        if beyond > SWING * (high - low) + 1e-9 * max(abs(low), abs(high)):
+            linear = '"linear", ' * (self.quantity == "velocity")
+            raise ParameterError(
+                f"{where}: the spline through its samples of {self.quantity} in "
+                f"[{low:g}, {high:g}] goes from {least:g} to {most:g}; for corners give "
+                f'interpolation={linear}"monotone", and "spline" where that is meant',
+                "interpolation",
+            )
 
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, Record)
             and (self.quantity, self.scale) == (other.quantity, other.scale)
+            and self._curve == other._curve
             and np.array_equal(self.time, other.time)
             and np.array_equal(self.value, other.value)
         )
 
     def __hash__(self) -> int:
-        return hash((self.quantity, self.scale, self.time.tobytes(), self.value.tobytes()))
+        return hash(
+            (self.quantity, self.scale, self._curve, self.time.tobytes(), self.value.tobytes())
+        )
 
     def __repr__(self) -> str:
         span = f"{self.time.size} samples in [{self.time[0]:g}, {self.time[-1]:g}]"
-        return f"Record({span}, quantity={self.quantity!r}, scale={self.scale!r})"
+        curve = f", interpolation={self.interpolation!r}" if self.interpolation else ""
+        return f"Record({span}, quantity={self.quantity!r}, scale={self.scale!r}{curve})"
 
     @classmethod
     def read(
@@ -313,6 +387,7 @@ class Record(Signal):
         component: int = 1,
         time_scale: float = 1.0,
         source: str | None = None,
+        interpolation: str = "",
     ) -> Record:
         """The record in a file: AT2, VT2 or DT2 of PEER, V2 of CSMIP or COSMOS, or text with two
         columns, time and value.
@@ -342,6 +417,8 @@ class Record(Signal):
             The factor by which the times are multiplied.
         source
             The name of the record; by default its path.
+        interpolation
+            What is between the samples, as of a `Record`.
 
         Raises
         ------
@@ -363,16 +440,18 @@ class Record(Signal):
         return cls(
             **read_record(path, quantity, units, baseline, component, time_scale, source),
             scale=scale,
+            interpolation=interpolation,
         )
 
     @cached_property
     def polynomials(self) -> tuple[Any, Any, Any]:
         """The value and its first two derivatives as SciPy piecewise polynomials, `scale` left out."""
-        from scipy.interpolate import CubicSpline, PPoly
+        from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
-        if self.quantity in ("velocity", "displacement"):
-            spline = CubicSpline(self.time, self.value)
-            base = PPoly(spline.c, spline.x)
+        if self._curve != "linear":
+            kind = CubicSpline if self._curve == "spline" else PchipInterpolator
+            curve = kind(self.time, self.value)
+            base = PPoly(curve.c, curve.x)
         else:
             slope = np.diff(self.value) / np.diff(self.time)
             # older SciPy needs times that can be written
@@ -437,9 +516,7 @@ def scaled(signal: Signal, factor: float) -> Signal:
     if isinstance(signal, Sum):
         return Sum(tuple(scaled(term, factor) for term in signal.terms))
     if isinstance(signal, Record):
-        return Record(
-            signal.time, signal.value, signal.quantity, factor * signal.scale, signal.source
-        )
+        return dataclasses.replace(signal, scale=factor * signal.scale)
     if signal.once:
         return dataclasses.replace(signal, amplitude=factor * signal.amplitude)  # type: ignore[type-var, attr-defined]
     raise ParameterError(f"a {type(signal).__name__} cannot be scaled")
