@@ -13,10 +13,10 @@ from saltus.systems import natural_units
 SCALES = [(1e-9, 1.0), (1e6, 1.0), (1.0, 1e-3), (1.0, 1e6), (1e-6, 1e3)]
 
 
-def stopped(length=1.0, rate=1.0, phase=0.3):
+def stopped(length=1.0, rate=1.0, phase=0.3, force=0.6):
     """An oscillator between stops, in units in which lengths are `length` and rates are `rate`."""
     model = saltus.TwoStops(stiffness=rate**2, damping=0.1 * rate, left=-length, right=1.7 * length)
-    force = saltus.Harmonic(0.6 * rate**2 * length, phase=phase)
+    force = saltus.Harmonic(force * rate**2 * length, phase=phase)
     return saltus.System(
         model=model,
         load=saltus.Load(frequency=0.9 * rate, force=force),
@@ -62,8 +62,9 @@ def test_powers_of_two_are_exact_and_near():
         assert 2.0**-0.5 <= rounded / value <= 2.0**0.5
 
 
-def test_a_shift_of_the_load_changes_nothing():
-    lengths = [natural_units(stopped(phase=phase)).length for phase in (0.0, 0.4, 2.9)]
+@pytest.mark.parametrize("force", [0.6, 0.01])
+def test_a_shift_of_the_load_changes_nothing(force):
+    lengths = [natural_units(stopped(phase=phase, force=force)).length for phase in (0.0, 0.4, 2.9)]
     np.testing.assert_allclose(lengths, lengths[0], rtol=1e-12)
 
 
@@ -108,6 +109,8 @@ def test_origin_order_and_far_contacts_change_nothing():
     usual = units_of()
     assert units_of(walls=Walled.walls[::-1]) == usual
     assert units_of(walls=(Walled.walls[0], (1e6, -1))) == units_of(walls=Walled.walls[:1])
+    far = units_of(walls=((-1e4, 1), (1e5, -1)))
+    assert far == pytest.approx(units_of(walls=()), rel=1e-9)
     assert units_of(origin=1024.0) == pytest.approx(usual, rel=1e-12)
 
 

@@ -216,7 +216,7 @@ def test_its_impacts_solve_the_equations_of_smooth_segments(name):
     speed.
     """
     orbit = orbit_of(name)
-    assert orbit.residual < 1e-13
+    assert orbit.residual < 1e-12  # in natural units, of which a speed is 0.2 at the wall
     assert orbit.defect < 1e-12
 
 

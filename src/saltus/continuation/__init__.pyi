@@ -13,9 +13,11 @@ from .end import EndReason as EndReason
 from .end import Missed as Missed
 from .end import MissedReason as MissedReason
 from .pseudo_arclength import NEWTON as NEWTON
+from .pseudo_arclength import ONES as ONES
 from .pseudo_arclength import STEPS as STEPS
 from .pseudo_arclength import Corrected as Corrected
 from .pseudo_arclength import EquationCurve as EquationCurve
+from .pseudo_arclength import Units as Units
 from .pseudo_arclength import between as between
 from .pseudo_arclength import newton as newton
 from .test_functions import Cut as Cut

@@ -49,6 +49,28 @@ class Evaluation(Protocol):
         """The derivatives of F to all unknowns and parameters, (m, m + 1)."""
 
 
+@dataclass(frozen=True, eq=False)
+class Units:
+    """The natural units of equations: their numbers are compared with thresholds in these."""
+
+    unknowns: Any = 1.0  # of the unknowns, an array or a number
+    residuals: Any = 1.0  # of the residuals, an array (m,) or a number
+    # Which unknowns may move by no more than their unit in a step of Newton's method, an array or
+    # one for all; others, such as the coordinates of a large orbit, by as much as the largest of
+    # them is.
+    bounded: Any = True
+
+    def residual(self, values: np.ndarray) -> float:
+        """The largest of residuals (m,) in their units."""
+        return float(np.abs(values / self.residuals).max(initial=0.0))
+
+    def length(self, step: np.ndarray, place: np.ndarray) -> float:
+        """The largest component of a step from a place, in units of what it may be."""
+        size = np.abs(place / self.unknowns).max(where=~np.asarray(self.bounded), initial=1.0)
+        return float(np.abs(step / self.unknowns / np.where(self.bounded, 1.0, size)).max())
+
+
+ONES = Units()
 E = TypeVar("E", bound=Evaluation)
 Linear = Callable[[E, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -70,6 +92,7 @@ def newton(
     residual_floor: float = 0.0,
     near: bool = False,
     before: float = np.inf,
+    units: Units = ONES,
 ) -> Corrected[E] | None:
     """The zero of a system near a guess, or None where Newton's method does not converge.
 
@@ -92,6 +115,8 @@ def newton(
         Whether the guess itself is probably a solution: it is then evaluated thoroughly at once.
     before
         The residual at the guess where it is known already, up to rounding.
+    units
+        The natural units in which unknowns and residuals are measured.
     """
     place = guess.copy()
     for iteration in range(iterations + 1):
@@ -99,29 +124,32 @@ def newton(
         found = evaluate(place, thorough)
         if found is None:
             return None
-        error = np.abs(found.residual).max()
-        scale = max(1.0, np.abs(place).max())
+        error = units.residual(found.residual)
+        scale = max(1.0, np.abs(place / units.unknowns).max())
         slow = error > NEWTON.slowdown * before
         if error <= NEWTON.converged * scale or (slow and error <= NEWTON.stalled * scale):
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
-        step = _step(*linear(found, place)) if error < NEWTON.diverged else None
+        step = _step(*linear(found, place), units, place) if error < NEWTON.diverged else None
         if step is None:
             return None
-        if slow and error <= residual_floor and np.abs(step).max() <= NEWTON.converged * scale:
+        moved = np.abs(step / units.unknowns).max()
+        if slow and error <= residual_floor and moved <= NEWTON.converged * scale:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
         before, place = error, place + step
     return None
 
 
-def _step(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+def _step(
+    matrix: np.ndarray, right: np.ndarray, units: Units, place: np.ndarray
+) -> np.ndarray | None:
     """Newton's step, shortened where it is too long; None where there is none."""
     try:
         step = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
         return None
-    longest = np.abs(step).max()
+    longest = units.length(step, place)
     if not np.isfinite(longest):
         return None
     return np.asarray(step * min(1.0, NEWTON.longest / longest if longest > 0 else 1.0))
@@ -141,6 +169,24 @@ class EquationCurve(Curve[P]):
     corrector_radius: float = math.inf
     # The largest residual that rounding may leave, where derivatives are large.
     residual_floor: float = 0.0
+
+    @property
+    def units(self) -> Units:
+        """The natural units of the unknowns without the parameters, and of the residuals."""
+        return ONES
+
+    def units_at(self, place: np.ndarray) -> Units:
+        """The units of all components of a place: of a parameter the larger of its size and of the
+        range that its weight stands for.
+        """
+        units = np.ones(len(place))
+        units[: -self.count] = self.units.unknowns
+        ranges = 3.0 / self.weights[-self.count :]
+        units[-self.count :] = np.maximum(np.abs(place[-self.count :]), ranges)
+        bounded = np.append(
+            np.broadcast_to(self.units.bounded, len(place) - self.count), [True] * self.count
+        )
+        return Units(units, self.units.residuals, bounded)
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:
@@ -175,13 +221,15 @@ class EquationCurve(Curve[P]):
         place = guess
         right = bordered(found, 0.0)
         matrix = bordered(self.derivatives_at(point), normal)
-        error = float(np.abs(found).max())
+        units = self.units_at(guess)
+        error = units.residual(found)
         for _ in range(self.iterations_at):
-            step = _step(matrix, -right) if NEWTON.converged < error < NEWTON.diverged else None
+            near = not NEWTON.converged < error < NEWTON.diverged
+            step = None if near else _step(matrix, -right, units, place)
             if step is None or self.norm(place + step - guess) > reach:
                 break
             found = self.residual(place + step)
-            if found is None or not (left := float(np.abs(found).max())) < NEWTON.circling * error:
+            if found is None or not (left := units.residual(found)) < NEWTON.circling * error:
                 break
             place, before, right, error = (
                 place + step,
@@ -216,11 +264,12 @@ class EquationCurve(Curve[P]):
         finite `reach`, in circles. `near` and `before` are those of `newton`."""
         normal = direction * self.weights**2
         errors = list[float]()
+        units = self.units_at(guess)
 
         def within_reach(place: np.ndarray, thorough: bool) -> Evaluation | None:
             found = self.evaluate(place, thorough) if self.norm(place - guess) <= reach else None
             if found is not None:
-                errors.append(float(np.abs(found.residual).max()))
+                errors.append(units.residual(found.residual))
                 if len(errors) > 2 and NEWTON.stalled < errors[-1] > NEWTON.circling * errors[-3]:
                     return None
             return found
@@ -231,7 +280,8 @@ class EquationCurve(Curve[P]):
             )
 
         evaluate = self.evaluate if reach == math.inf else within_reach
-        found = newton(evaluate, linear, guess, self.iterations, self.residual_floor, near, before)
+        floor = self.residual_floor
+        found = newton(evaluate, linear, guess, self.iterations, floor, near, before, units)
         return None if found is None else self.with_tangent(found, direction)
 
     def solve_at(self, guess: np.ndarray, direction: np.ndarray, index: int = -1) -> P | None:
@@ -248,7 +298,10 @@ class EquationCurve(Curve[P]):
         def linear(found: Evaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return found.derivatives()[:, free], -found.residual
 
-        found = newton(evaluate, linear, guess[free], self.iterations_at, self.residual_floor)
+        units = self.units_at(guess)
+        of_free = Units(units.unknowns[free], units.residuals, units.bounded[free])
+        floor = self.residual_floor
+        found = newton(evaluate, linear, guess[free], self.iterations_at, floor, units=of_free)
         if found is None:
             return None
         return self.with_tangent(
@@ -260,9 +313,9 @@ class EquationCurve(Curve[P]):
         tangent; None if it does not.
         """
         evaluation = self.evaluate(place, True)
-        if evaluation is None or not np.abs(evaluation.residual).max() <= NEWTON.stalled * max(
-            1.0, np.abs(place).max()
-        ):
+        units = self.units_at(place)
+        scale = max(1.0, np.abs(place / units.unknowns).max())
+        if evaluation is None or not units.residual(evaluation.residual) <= NEWTON.stalled * scale:
             return None
         return self.point_at(Corrected(place, evaluation, 0), direction / self.norm(direction))
 
@@ -284,7 +337,8 @@ class EquationCurve(Curve[P]):
         """A solution as a point, with its tangent from the kernel of the derivatives, where no
         direction is known.
         """
-        tangent = np.linalg.svd(found.evaluation.derivatives() / self.weights)[2][-1] / self.weights
+        rows = found.evaluation.derivatives() / np.reshape(self.units.residuals, (-1, 1))
+        tangent = np.linalg.svd(rows / self.weights)[2][-1] / self.weights
         return self.point_at(found, tangent / self.norm(tangent))
 
     def advance(self, before: P | None, point: P, step: float) -> P | None:

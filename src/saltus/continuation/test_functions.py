@@ -256,7 +256,8 @@ def _solved(known: list[KnownPlace], share: float) -> Any:
         share * chord - ((guess - first.place) @ (curve.weights**2 * direction)) * direction
     )
     point = curve.solve_beside(guess, direction, low.point)
-    rounding = curve.norm(NEWTON.converged * np.maximum(1.0, np.abs(guess)))
+    units = curve.units_at(guess).unknowns
+    rounding = curve.norm(NEWTON.converged * np.maximum(units, np.abs(guess)))
     near = max(SETTINGS.near * curve.norm(high.point.place - low.point.place), rounding)
     return point if point is not None and curve.norm(point.place - guess) <= near else None
 

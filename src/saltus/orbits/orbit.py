@@ -99,7 +99,9 @@ class PeriodicOrbit(Result):
         return (
             None
             if evaluation is None
-            else PeriodicOrbit(equations, Solution(unknowns, values, evaluation, 0))
+            else PeriodicOrbit(
+                equations, Solution(unknowns, values, evaluation, 0, equations.units)
+            )
         )
 
     @cached_property
@@ -302,8 +304,16 @@ class PeriodicOrbit(Result):
     @cached_property
     def pressing(self) -> float:
         """With several contacts the least of the reactions of closed ones and the times between
-        events; inf with one contact. If it is negative this is no real motion."""
+        events, in natural units; inf with one contact. If it is negative this is no real motion."""
         return self.equations.pressing(self.solution)
+
+    @property
+    def room(self) -> float:
+        """How far it is from not being a motion, in natural units: the least of `clearance`,
+        `slowest` and `pressing`. Below 0 it is none.
+        """
+        natural = self.equations.natural
+        return min(self.clearance / natural.length, self.slowest / natural.speed, self.pressing)
 
     @property
     def admissible(self) -> bool:
@@ -314,9 +324,7 @@ class PeriodicOrbit(Result):
         in_order = (
             np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
         )
-        return min(self.clearance, self.slowest, self.pressing) > -TOLERANCES.touch and bool(
-            in_order.all()
-        )
+        return self.room > -TOLERANCES.touch and bool(in_order.all())
 
     @cached_property
     def margins(self) -> dict[str, float]:
@@ -352,9 +360,10 @@ class PeriodicOrbit(Result):
     @cached_property
     def _has_touch(self) -> bool:
         """Whether one of its impacts has no speed, so that its equations have no derivative there."""
+        speed = abs(self.equations.touching_speed(self.solution))
         return (
             not self.equations.passes_contact
-            and abs(self.equations.touching_speed(self.solution)) < TOLERANCES.touch
+            and speed < TOLERANCES.touch * self.equations.natural.speed
         )
 
     @property
@@ -365,9 +374,8 @@ class PeriodicOrbit(Result):
         False where the contact is no singularity (`ContactRegularity.CONTINUOUS`): multipliers then
         keep their meaning.
         """
-        return self._has_touch or (
-            not self.equations.passes_contact and abs(self.clearance) < TOLERANCES.touch
-        )
+        near = TOLERANCES.touch * self.equations.natural.length
+        return self._has_touch or (not self.equations.passes_contact and abs(self.clearance) < near)
 
     @property
     def isolated(self) -> bool:
@@ -375,7 +383,8 @@ class PeriodicOrbit(Result):
         equations leave a way free.
         """
         near = np.abs(self.multipliers - 1.0).min() < TOLERANCES.isolated
-        return not near or not _free(self.solution.evaluation.derivatives())[0].size
+        rows = self.equations.in_units(self.solution.evaluation.derivatives())
+        return not near or not _free(rows)[0].size
 
     @property
     def stable(self) -> bool:
@@ -579,14 +588,18 @@ def solve(
     def evaluate(place: np.ndarray, thorough: bool) -> OrbitEvaluation | None:
         return equations.evaluate(place, values, with_extremes=thorough)
 
-    def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left, right = _free(matrix := found.jacobian())
-        return matrix + left @ right, -found.residual
+    units = equations.units
 
-    found = newton(evaluate, linear, unknowns, iterations)
-    return (
-        None if found is None else Solution(found.place, values, found.evaluation, found.iterations)
-    )
+    def linear(found: OrbitEvaluation, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        matrix = found.jacobian()
+        left, right = _free(equations.in_units(matrix))
+        tied = np.reshape(units.residuals, (-1, 1)) * (left @ right) / units.unknowns
+        return matrix + tied, -found.residual
+
+    found = newton(evaluate, linear, unknowns, iterations, units=units)
+    if found is None:
+        return None
+    return Solution(found.place, values, found.evaluation, found.iterations, units)
 
 
 def _free(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -102,7 +102,9 @@ def _orbit(
     evaluation = equations.evaluate(unknowns, values, with_extremes=True)
     if evaluation is None:
         raise ParameterError(DAMAGED)
-    return PeriodicOrbit(equations, Solution(unknowns, values, evaluation, iterations))
+    return PeriodicOrbit(
+        equations, Solution(unknowns, values, evaluation, iterations, equations.units)
+    )
 
 
 def _orbit_parts(orbit: PeriodicOrbit) -> tuple[Any, ...]:

@@ -10,11 +10,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.systems.contact_model import normal_forces
+from saltus.systems.contact_model import mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import Jet, each_of
 from saltus.systems.system import System
@@ -22,6 +22,10 @@ from saltus.systems.system import System
 # Instants at which a load is looked at. Mean squares over so many equal parts of a period are exact
 # for harmonics up to the third, whatever the phase.
 INSTANTS = 8
+# A load that moves d by a smaller share of it than this has no part in the unit.
+FARTHEST = 1e-7
+SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
+TINY = float(np.finfo(float).tiny)
 ANGLES = ("rad", "deg")  # units of coordinates that have their own natural unit
 
 
@@ -35,11 +39,12 @@ class NaturalUnits:
     2. They do not depend on the order of contacts and coordinates, on the origin of a coordinate
        along which a contact holds, on a shift of the load by a phase, on friction of 0 or on
        contacts that are farther away than another one.
-    3. `time` is 1 / Omega of the load; without one it is sqrt(d / a) of the distance d and the
+    3. `time` is 1 / Omega of the load, or shorter where an angle moves by 1 rad in less; without one it is sqrt(d / a) of the distance d and the
        acceleration a below, or of the stiffness alone. `lengths` are the distance by which the load
-       and the contacts hold the system away from its equilibrium, d = (abs(J) + Omega^2)^-1 a, where
-       a is the acceleration at rest at a contact, in the mean over a period, J = da/dq, and the
-       contact is the one with the smallest d. A coordinate that is an angle has the unit 1 rad.
+       and the contacts hold the system away from its equilibrium, d = max(abs(J), Omega^2)^-1 a, where
+       a is the acceleration at rest at a contact, in the mean over a period, and J = da/dq. The
+       contact is the one with the smallest d. Where the load moves d by less than d itself, as far
+       from a contact, that is the unit. A coordinate that is an angle has the unit 1 rad.
     4. Where there is no such distance, friction gives one, then the positions of contacts, then a
        ground that moves. What has none at all is 1: the system itself has no unit then.
     5. They are all finite and above 0.
@@ -50,10 +55,13 @@ class NaturalUnits:
         The unit of each coordinate, (n,).
     time
         The unit of time.
+    masses
+        The inertia of each coordinate, (n,): the entry of the mass matrix, 1 where there is none.
     """
 
     lengths: np.ndarray
     time: float
+    masses: np.ndarray
 
     @property
     def length(self) -> float:
@@ -76,6 +84,11 @@ class NaturalUnits:
         return self.lengths / self.time
 
     @cached_property
+    def forces(self) -> np.ndarray:
+        """The unit of the force along each coordinate, (n,)."""
+        return self.masses * self.lengths / self.time**2
+
+    @cached_property
     def state(self) -> np.ndarray:
         """The units of a state, coordinates and then velocities, (2 n,)."""
         return np.concatenate([self.lengths, self.speeds])
@@ -83,7 +96,8 @@ class NaturalUnits:
     @property
     def powers_of_two(self) -> NaturalUnits:
         """These units rounded to the nearest powers of 2, so that scaling by them is exact."""
-        return NaturalUnits(np.exp2(np.round(np.log2(self.lengths))), _power_of_two(self.time))
+        lengths, masses = (np.exp2(np.round(np.log2(x))) for x in (self.lengths, self.masses))
+        return NaturalUnits(lengths, _power_of_two(self.time), masses)
 
 
 def natural_units(system: System) -> NaturalUnits:
@@ -115,23 +129,24 @@ def _found(system: System) -> NaturalUnits:
             found = _held_away(model, load, place, rate, instants)
             if found is None:
                 continue
-            distance, acceleration, stiffness = found
-            stiffest = max(stiffest, stiffness)
-            if distance.any() and (
-                nearest is None or np.linalg.norm(distance) < np.linalg.norm(nearest)
+            stiffest = max(stiffest, found.stiffness)
+            if found.distance.any() and (
+                nearest is None or np.linalg.norm(found.distance) < np.linalg.norm(nearest)
             ):
-                nearest = distance
-                push = acceleration
-        time = _time(rate, nearest, push, stiffest)
+                nearest = found.distance
+                push = found.acceleration
+        angular = np.array([model.unit_of(name) in ANGLES for name in model.coordinates])
+        # a slow load leaves angles to move by themselves within a radian
+        own_rate = math.sqrt(float(np.abs(push).max(where=angular, initial=0.0)))
+        time = _time(max(rate, own_rate if rate > 0.0 else 0.0), nearest, push, stiffest)
         if nearest is None:
             nearest = _other_length(system, load, time)
-    angular = np.array([model.unit_of(name) in ANGLES for name in model.coordinates])
     largest = float(np.max(nearest, where=~angular, initial=0.0))
     first_order = np.arange(len(nearest)) >= len(model.moving)
     lengths = np.where(first_order & (nearest > 0.0), nearest, largest)
     lengths = np.where(angular, 1.0, lengths)
     sound = np.isfinite(lengths) & (lengths > 0.0)
-    return NaturalUnits(np.where(sound, lengths, 1.0), time)
+    return NaturalUnits(np.where(sound, lengths, 1.0), time, _masses(model))
 
 
 def _places(model: Any) -> Iterator[np.ndarray]:
@@ -175,11 +190,19 @@ def _instants(load: Load) -> np.ndarray:
     return np.arange(INSTANTS) * (span / INSTANTS) if span > 0.0 else np.zeros(1)
 
 
+class Held(NamedTuple):
+    """What holds a system away from its equilibrium at a place."""
+
+    distance: np.ndarray  # d, (n,)
+    acceleration: np.ndarray  # a in the mean of squares over a period, (n,)
+    stiffness: float  # the largest one there
+
+
 def _held_away(
     model: Any, load: Any, place: np.ndarray, rate: float, instants: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """d and a (n,) of the docstring of `NaturalUnits` at a place, in the mean of squares over a
-    period, and the largest stiffness there; None where the model has no accelerations.
+) -> Held | None:
+    """d and a of the docstring of `NaturalUnits` at a place; None where the model has no
+    accelerations.
     """
     pushes = []
     for t in instants:
@@ -191,16 +214,34 @@ def _held_away(
         return None
     slopes = _slopes(model, place, model.every_side[0], load)
     left, sizes, right = np.linalg.svd(slopes)
-    shares = sizes + rate**2
+    shares = np.maximum(sizes, rate**2)
     moved = np.array(pushes) @ left
     moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right
-    return _mean(moved), _mean(np.array(pushes)), float(sizes.max())
+    distance = _mean(moved)
+    swing = float(np.linalg.norm(_mean(moved - moved.mean(axis=0))))
+    swing *= SWING / max(float(np.linalg.norm(distance)), TINY)
+    if FARTHEST < swing < 1.0:
+        distance = distance * swing
+    return Held(distance, _mean(np.array(pushes)), float(sizes.max()))
+
+
+def _masses(model: Any) -> np.ndarray:
+    """The entries of the mass matrix, (n,), where all coordinates are 0."""
+    size = len(model.coordinates)
+    if not hasattr(model, "mass_matrix"):
+        return np.ones(size)
+    try:
+        rows = mass_rows(model, 0.0 if size == 1 else (0.0,) * size)
+        masses = np.abs([float(rows[i][i]) for i in range(size)])
+    except Exception:  # a user's own code may raise anything
+        return np.ones(size)
+    return np.where(np.isfinite(masses) & (masses > 0.0), masses, 1.0)
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
     """The root of the mean squares over the first axis."""
     largest = float(np.abs(values).max(initial=0.0))
-    return largest * np.sqrt(((values / (largest or 1.0)) ** 2).mean(axis=0))
+    return np.asarray(largest * np.sqrt(((values / (largest or 1.0)) ** 2).mean(axis=0)))
 
 
 def _acceleration(model: Any, t: float, q: list[Any], side: int, load: Any) -> np.ndarray | None:

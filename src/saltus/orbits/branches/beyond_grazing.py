@@ -29,7 +29,7 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     speed there, or a single one at a wall, which turns the motion round. Impacts that have lost
     their speed are left out of it.
     """
-    changed = removed(point) if point.orbit.slowest < TOLERANCES.touch else inserted(point)
+    changed = removed(point) if is_slow(point) else inserted(point)
     if isinstance(changed, End):
         return changed
     equations, unknowns = changed
@@ -40,6 +40,12 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     return admissible_direction(curve.along_kernel(known)) or End(
         OrbitEnd.NO_DIRECTION, point.parameter
     )
+
+
+def is_slow(point: OrbitPoint) -> bool:
+    """Whether an impact has lost its speed, so that the grazing is not one between impacts."""
+    orbit = point.orbit
+    return orbit.slowest < TOLERANCES.touch * orbit.equations.natural.speed
 
 
 def admissible_direction(
@@ -104,7 +110,7 @@ def removed(point: OrbitPoint) -> tuple[Any, np.ndarray] | End:
     if _turns_round(equations, signature.sides[slow]):
         gone = [slow]
     else:
-        gone = _vanishing_pair(phases, speeds, slow, equations.closing)
+        gone = _vanishing_pair(phases, speeds / equations.natural.speed, slow, equations.closing)
         if not gone:
             return End(OrbitEnd.NOT_UNIQUE, point.parameter)
     kept = [i for i in range(n) if i not in gone]
@@ -117,7 +123,7 @@ def removed(point: OrbitPoint) -> tuple[Any, np.ndarray] | End:
 
 
 def _vanishing_pair(phases: np.ndarray, speeds: np.ndarray, slow: int, closing: float) -> list[int]:
-    """The impact without speed and the neighbour that vanishes with it."""
+    """The impact without speed, in natural units, and the neighbour that vanishes with it."""
     n = len(phases)
     if n < 2:
         return []
@@ -156,7 +162,7 @@ def _without_impacts(point: OrbitPoint, slow: int) -> tuple[Any, np.ndarray] | E
         if (
             state is not None
             and later is not None
-            and np.abs(later - state).max() < TOLERANCES.touching_state
+            and np.abs((later - state) / equations.natural.state).max() < TOLERANCES.touching_state
         ):
             return other, state
     return End(OrbitEnd.NO_MOTION, point.parameter, detail="from")

@@ -284,9 +284,11 @@ def _origin(special: SpecialPoint) -> End:
     return End(OrbitEnd.BORN, special.parameter, special.kind)
 
 
-def _kernel(matrix: np.ndarray) -> np.ndarray:
-    vector: np.ndarray = np.linalg.svd(matrix)[2][-1]
-    return vector
+def _kernel(point: OrbitPoint) -> np.ndarray:
+    """The perturbation of the unknowns that returns with the other sign after a (half) period."""
+    equations = point.orbit.equations
+    rows = equations.in_units(point.evaluation.jacobian(-1.0))
+    return np.asarray(np.linalg.svd(rows)[2][-1] * equations.units.unknowns)
 
 
 def _doubled(point: OrbitPoint) -> OrbitPoint | None:
@@ -295,7 +297,7 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
     signature = point.orbit.signature
     if 2 * signature.period > MOST_DOUBLED:
         return None
-    direction = equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
+    direction = equations.alternating(_kernel(point))
     return _along(
         point,
         equations.with_signature(signature.repeated()),
@@ -307,7 +309,7 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     """The symmetric orbit over its full period, and the two directions in which its halves differ."""
     orbit = full_period(point.orbit)
-    direction = point.orbit.equations.alternating(_kernel(point.evaluation.jacobian(-1.0)))
+    direction = point.orbit.equations.alternating(_kernel(point))
     return tuple(
         _along(point, orbit.equations, orbit.solution.unknowns, sign * direction)
         for sign in (1.0, -1.0)
@@ -329,7 +331,8 @@ def _crossing_branch(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
     two-dimensional kernel that is orthogonal to the branch's own."""
     curve = point.curve
     own = point.tangent * curve.weights
-    kernel = np.linalg.svd(point.evaluation.derivatives() / curve.weights)[2][-2:]
+    rows = point.evaluation.derivatives() / np.reshape(curve.units.residuals, (-1, 1))
+    kernel = np.linalg.svd(rows / curve.weights)[2][-2:]
     other = kernel[int(np.argmin(np.abs(kernel @ own)))]
     other = other - (other @ own) * own
     tangent = other / curve.weights

@@ -58,7 +58,7 @@ class BranchLimits:
     # `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    # An orbit grows without end if its amplitude exceeds this, and exceeds that of the first orbit
+    # An orbit grows without end if its amplitude exceeds this in natural units, and exceeds that of the first orbit
     # of the branch by this factor: a thousand of the longest steps lead there.
     largest: float = 1e2
     # A fold and a crossing of branches whose parameters differ by less than this are one point.
@@ -83,9 +83,10 @@ class OrbitEvents(Events):
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or that grows without end."""
         amplitude = ahead.orbit.amplitude
-        if amplitude > SETTINGS.largest * max(1.0, run.points[0].orbit.amplitude):
+        length = ahead.orbit.equations.natural.length
+        if amplitude > SETTINGS.largest * max(length, run.points[0].orbit.amplitude):
             return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{amplitude:.3g}")
-        if amplitude >= SHRUNK_TO_REST:
+        if amplitude >= SHRUNK_TO_REST * length:
             return None
         lost = ahead.orbit.equations.lost_ahead(ahead)
         if lost is None:
@@ -352,7 +353,8 @@ def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:
     last = b.halves
     assert first is not None
     assert last is not None
-    lengths = [float(np.linalg.norm(both[1] - both[0])) for both in (first, last)]
+    units = equations.units.unknowns
+    lengths = [float(np.linalg.norm((both[1] - both[0]) / units)) for both in (first, last)]
     share = lengths[0] / sum(lengths)
     between = (first + share * (last - first)).mean(axis=0)
     curve = a.curve.with_equations(equations)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.continuation import End, TestFunction
+from saltus.continuation import End, TestFunction, Units
 from saltus.flow import SegmentColumn
 from saltus.orbits.branches.beyond_grazing import removed
 from saltus.orbits.branches.orbit_curve import curve_test, scaled_determinant
@@ -59,8 +59,8 @@ class ConditionValue:
 
     value: float
     gradient: np.ndarray
-    right: np.ndarray  # u, empty where there is none
-    left: np.ndarray  # d
+    right: np.ndarray  # u in natural units, empty where there is none
+    left: np.ndarray  # d, in these units too
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,8 @@ class Singular:
     @classmethod
     def near(cls, orbit: PeriodicOrbit, closing: float) -> Singular:
         """The condition bordered by the null vectors of an orbit at which it nearly holds."""
-        left, _, right = np.linalg.svd(orbit.solution.evaluation.jacobian(closing))
+        rows = orbit.equations.in_units(orbit.solution.evaluation.jacobian(closing))
+        left, _, right = np.linalg.svd(rows)
         return cls(orbit.equations, closing, (left[:, -1], right[-1]))
 
     def moved(self, at: ConditionValue) -> Singular:
@@ -87,7 +88,8 @@ class Singular:
         """g and its derivatives, or None where the motion cannot be followed."""
         n = self.equations.size
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n] = solution.evaluation.jacobian(self.closing)
+        equations = self.equations
+        matrix[:n, :n] = equations.in_units(solution.evaluation.jacobian(self.closing))
         (matrix[:n, n], matrix[n, :n]) = self.border
         unit = np.append(np.zeros(n), 1.0)
         try:
@@ -102,7 +104,9 @@ class Singular:
         bend = (beside[0].derivatives() - beside[1].derivatives()) / (2.0 * step)
         if not np.isfinite(bend).all():
             return None
-        return ConditionValue(float(right[n]), -left[:n] @ bend, right[:n], left[:n])
+        gradient = -left[:n] @ equations.in_units(bend)
+        gradient[:n] /= equations.units.unknowns
+        return ConditionValue(float(right[n]), gradient, right[:n], left[:n])
 
     def curvature(self, solution: Solution, vector: np.ndarray) -> np.ndarray | None:
         """The second derivative of the equations along a perturbation of length 1, which returns as
@@ -111,16 +115,20 @@ class Singular:
         beside = self.beside(solution, SETTINGS.shift * vector)
         if beside is None:
             return None
-        ahead, behind = (evaluation.jacobian(self.closing) @ vector for evaluation in beside)
+        ahead, behind = (
+            self.equations.in_units(evaluation.jacobian(self.closing)) @ vector
+            for evaluation in beside
+        )
         return np.asarray((ahead - behind) / (2.0 * SETTINGS.shift))
 
     def beside(
         self, solution: Solution, shift: np.ndarray
     ) -> tuple[OrbitEvaluation, OrbitEvaluation] | None:
-        """The equations of two motions that begin at +shift and -shift from an orbit, and return
-        shifted as `closing` says.
+        """The equations of two motions that begin at +shift and -shift, in natural units, from an
+        orbit, and return shifted as `closing` says.
         """
-        both = (solution.unknowns + shift, solution.unknowns - shift)
+        moved = shift * self.equations.units.unknowns
+        both = (solution.unknowns + moved, solution.unknowns - moved)
         ends = both if self.closing > 0 else both[::-1]
         ahead, behind = (
             self.equations.evaluate(y, solution.values, later=end)
@@ -154,9 +162,9 @@ class Slow:
 Condition = Singular | Slow
 
 
-def quadratic(at: ConditionValue) -> float:
+def quadratic(at: ConditionValue, units: Units) -> float:
     """The quadratic coefficient d^T F_yy u u of a fold (LP only); 0 at a cusp."""
-    return -float(at.gradient[: at.right.size] @ at.right)
+    return -float((at.gradient[: at.right.size] * units.unknowns) @ at.right)
 
 
 def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
@@ -175,7 +183,8 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
     if curvature is None:
         return math.nan
     try:
-        h = np.linalg.solve(solution.evaluation.jacobian(), -curvature)
+        matrix = condition.equations.in_units(solution.evaluation.jacobian())
+        h = np.linalg.solve(matrix, -curvature)
     except np.linalg.LinAlgError:
         return math.nan
     step = min(
@@ -186,13 +195,16 @@ def cubic(condition: Singular, solution: Solution, at: ConditionValue) -> float:
         return math.nan
 
     def third(a: float) -> float:
-        one, other = (solution.unknowns + s * a * u + 0.5 * a**2 * h for s in (1, -1))
+        units = condition.equations.units
+        one, other = (
+            solution.unknowns + units.unknowns * (s * a * u + 0.5 * a**2 * h) for s in (1, -1)
+        )
         first = condition.equations.evaluate(one, solution.values, later=other)
         second = condition.equations.evaluate(other, solution.values, later=one)
         return (
             math.nan
             if first is None or second is None
-            else 3.0 * float(d @ (first.residual - second.residual)) / a**3
+            else 3.0 * float(d @ ((first.residual - second.residual) / units.residuals)) / a**3
         )
 
     return (4.0 * third(step) - third(2.0 * step)) / 3.0
@@ -207,7 +219,12 @@ def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
     multiplier +1 and with one -1 lie arbitrarily near to the grazing.
     """
     if kind == SpecialKind.LP:
-        return [curve_test(SpecialKind.CP, lambda point: quadratic(point.condition_value))]
+        return [
+            curve_test(
+                SpecialKind.CP,
+                lambda point: quadratic(point.condition_value, point.curve.equations.units),
+            )
+        ]
     if kind in (SpecialKind.PD, SpecialKind.BPC):
         return [
             curve_test(SpecialKind.GPD if kind == SpecialKind.PD else SpecialKind.DBPC, normal_form)
@@ -218,7 +235,9 @@ def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
         curve_test(SpecialKind[f"{flip}_GR"], lambda point: without(point, -1.0)),
         curve_test(
             SpecialKind[f"LP_{flip}_GR"],
-            lambda point: scaled_determinant(point.evaluation.jacobian(1.0)),
+            lambda point: scaled_determinant(
+                point.curve.equations.in_units(point.evaluation.jacobian(1.0))
+            ),
         ),
     ]
 
@@ -239,9 +258,11 @@ def room(point: SpecialCurvePoint) -> float:
     orbit = point.orbit
     touching = point.touching
     n = len(orbit.signature.sides)
+    natural = orbit.equations.natural
     speeds = np.delete(point.solution.unknowns[1::2], touching) if n else np.empty(0)
+    speeds = speeds / natural.speed
     extremes = point.evaluation.extremes
-    humps = extremes[:, SegmentColumn.LOWEST_GAP]
+    humps = extremes[:, SegmentColumn.LOWEST_GAP] / natural.length
     phases = extremes[:, SegmentColumn.LOWEST_GAP_TIME] * orbit.frequency
     if touching:
         touch = point.solution.unknowns[2 * touching[0]]
@@ -260,7 +281,10 @@ def without(point: SpecialCurvePoint, closing: float) -> float:
     or with the other sign (-1).
     """
     other = removed(point)
-    evaluation = (
-        None if isinstance(other, End) else other[0].evaluate(other[1], point.solution.values)
-    )
-    return 1.0 if evaluation is None else scaled_determinant(evaluation.jacobian(closing))
+    if isinstance(other, End):
+        return 1.0
+    equations, unknowns = other
+    evaluation = equations.evaluate(unknowns, point.solution.values)
+    if evaluation is None:
+        return 1.0
+    return scaled_determinant(equations.in_units(evaluation.jacobian(closing)))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.bounds import area_contraction
-from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction
+from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction, Units
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
@@ -21,7 +21,8 @@ from saltus.orbits.orbit import PeriodicOrbit
 # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved
 # for.
 STEEPEST = 1e8
-SHRUNK_TO_REST = 1e-7  # An orbit of an amplitude below this has shrunk to rest.
+# An orbit of an amplitude below this, in natural units, has shrunk to rest.
+SHRUNK_TO_REST = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,8 @@ class OrbitPoint(Point):
     def solution(self) -> Solution:
         """The solution of the orbit's equations."""
         n = self.curve.equations.size
-        return Solution(self.place[:n], self.place[n:], self.evaluation, self.iterations)
+        units = self.curve.equations.units
+        return Solution(self.place[:n], self.place[n:], self.evaluation, self.iterations, units)
 
     @cached_property
     def orbit(self) -> PeriodicOrbit:
@@ -58,11 +60,13 @@ class OrbitPoint(Point):
 @dataclass(frozen=True, eq=False)
 class OrbitCurve(EquationCurve[OrbitPoint]):
     """The orbits of one problem along its parameters, measured by a norm that depends neither on
-    the number of impacts nor on the units of the parameters."""
+    the number of impacts nor on units: of the parameters, of length or of time."""
 
     equations: OrbitEquations
     scales: tuple[float, ...]  # of the parameters
     symmetric: bool = False  # whether the system has the mirror symmetry all along it
+    # how much larger than natural its first orbit is; states are measured in so many natural units
+    stretch: float = 1.0
 
     @property
     def count(self) -> int:  # type: ignore[override]
@@ -83,7 +87,13 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
     def weights(self) -> np.ndarray:
         """The weights of the unknowns and the parameters in the norm."""
         n = self.equations.size
-        return np.append(np.full(n, (2.0 / n) ** 0.5), 1.0 / np.array(self.scales))
+        stretch = np.where(self.equations.is_phase, 1.0, self.stretch)
+        units = self.equations.units.unknowns * stretch
+        return np.append((2.0 / n) ** 0.5 / units, 1.0 / np.array(self.scales))
+
+    @property
+    def units(self) -> Units:
+        return self.equations.units
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Any:
         """The orbit's equations, with the extrema between the impacts if `thorough`."""
@@ -127,7 +137,7 @@ class OrbitCurve(EquationCurve[OrbitPoint]):
 
     def with_equations(self, equations: OrbitEquations) -> OrbitCurve:
         """The curve of another problem of the same system."""
-        return OrbitCurve(equations, self.scales, self.symmetric)
+        return OrbitCurve(equations, self.scales, self.symmetric, self.stretch)
 
     def known(self, unknowns: np.ndarray, values: np.ndarray) -> Corrected[OrbitEvaluation] | None:
         """An orbit whose unknowns are known, with its equations evaluated there; None where its
@@ -160,8 +170,8 @@ def _seen_from(a: OrbitPoint, b: OrbitPoint) -> OrbitPoint:
 
 def start(orbit: PeriodicOrbit, symmetric: bool, scale: float) -> OrbitPoint:
     """A known orbit as the first point of its curve, to be followed towards larger parameters."""
-    curve = OrbitCurve(orbit.equations, (scale,), symmetric)
     solution = orbit.solution
+    curve = OrbitCurve(orbit.equations, (scale,), symmetric, orbit.equations.stretch(solution))
     found = Corrected(
         np.append(solution.unknowns, solution.values), solution.evaluation, solution.iterations
     )
@@ -180,7 +190,8 @@ def fold(point: OrbitPoint) -> float:
 @lru_cache(maxsize=4)  # a point ends one step and begins the next
 def flip(point: OrbitPoint) -> float:
     """The determinant of the equations for perturbations that change their sign each (half) period."""
-    return scaled_determinant(point.evaluation.jacobian(-1.0))
+    equations = point.curve.equations
+    return scaled_determinant(equations.in_units(point.evaluation.jacobian(-1.0)))
 
 
 @lru_cache(maxsize=4)
@@ -190,6 +201,7 @@ def crossing(point: OrbitPoint) -> float:
     """
     return scaled_determinant(
         np.vstack([point.evaluation.derivatives(), point.tangent * point.curve.weights**2])
+        / point.curve.weights
     )
 
 
@@ -252,18 +264,14 @@ def never_torus(orbit: PeriodicOrbit) -> bool:
 
 
 def grazing(point: OrbitPoint) -> float:
-    """The least of the impacts' speeds, of the gap's minima between impacts, and of `pressing`:
-    where it is negative the solution of the equations is no motion.
+    """The least of the impacts' speeds, of the gap's minima between impacts, and of `pressing`, in
+    natural units: where it is negative the solution of the equations is no motion.
 
     Where the contact is no singularity, orbits exist on both sides of a grazing and a branch need
     not stop there: inf.
     """
     orbit = point.orbit
-    return (
-        math.inf
-        if orbit.equations.passes_contact
-        else min(orbit.slowest, orbit.clearance, orbit.pressing)
-    )
+    return math.inf if orbit.equations.passes_contact else orbit.room
 
 
 def touching(point: OrbitPoint) -> float:
@@ -272,7 +280,8 @@ def touching(point: OrbitPoint) -> float:
     orbit = point.orbit
     extremes = point.evaluation.extremes
     pairs = int(extremes[:, SegmentColumn.CROSSINGS].sum()) // 2
-    return float((-1) ** pairs * min(FARTHEST, orbit.clearance, orbit.shallowest))
+    least = min(orbit.clearance, orbit.shallowest) / orbit.equations.natural.length
+    return float((-1) ** pairs * min(FARTHEST, least))
 
 
 # Multipliers smaller than the largest one by this factor are rounding errors of 0: their products

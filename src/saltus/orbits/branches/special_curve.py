@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.continuation import Corrected, Course
+from saltus.continuation import Corrected, Course, Units
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch import multiplier_columns, solution_columns
 from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
@@ -58,7 +58,8 @@ class SpecialCurvePoint(OrbitPoint):
     @property
     def residual(self) -> float:
         """The largest residual of the orbit's equations and of the curve's condition."""
-        return max(self.solution.residual, abs(self.condition_value.value))
+        last = float(self.curve.units.residuals[-1])
+        return max(self.solution.residual, abs(self.condition_value.value) / last)
 
     @property
     def touching(self) -> list[int]:
@@ -79,6 +80,13 @@ class ConditionedCurve(OrbitCurve):
 
     condition: Condition
 
+    @property
+    def units(self) -> Units:
+        """Those of the orbit's equations, and behind them that of the condition: a speed, or 1."""
+        known = self.equations.units
+        last = self.equations.natural.speed if isinstance(self.condition, Slow) else 1.0
+        return Units(known.unknowns, np.append(known.residuals, last), known.bounded)
+
     def evaluate(self, place: np.ndarray, thorough: bool) -> Conditioned | None:
         """The orbit's equations and the condition."""
         n = self.equations.size
@@ -86,7 +94,9 @@ class ConditionedCurve(OrbitCurve):
         value = (
             None
             if evaluation is None
-            else self.condition.evaluate(Solution(place[:n], place[n:], evaluation, 0))
+            else self.condition.evaluate(
+                Solution(place[:n], place[n:], evaluation, 0, self.equations.units)
+            )
         )
         return None if value is None else Conditioned(evaluation, value)
 

@@ -58,7 +58,8 @@ def _half_a_period_later(one: Load, other: Load, name: str) -> bool:
         return False
     orders = {*first, *second} - ({0} if name.startswith("ground") else set())
     pairs = [(first.get(n, 0.0), (-1) ** n * second.get(n, 0.0)) for n in orders]
-    return all(abs(a - b) <= TOLERANCES.load * (1.0 + abs(b)) for a, b in pairs)
+    largest = max((abs(amplitude) for pair in pairs for amplitude in pair), default=0.0)
+    return all(abs(a - b) <= TOLERANCES.load * largest for a, b in pairs)
 
 
 def _harmonics(signal: Signal) -> dict[int, complex] | None:
@@ -99,12 +100,15 @@ NEAR_THE_END = (0.99, 0.95, 0.9)
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
-    """The difference of an orbit's image from the orbit itself.
+    """The difference of an orbit's image from the orbit itself, in natural units.
 
     None where the signature rules out that the orbit is its own image, or its equations imply it (a
     symmetric signature).
     """
-    return None if point.halves is None else np.asarray(point.halves[1] - point.halves[0])
+    if point.halves is None:
+        return None
+    units = point.curve.equations.halved.units.unknowns
+    return np.asarray((point.halves[1] - point.halves[0]) / units)
 
 
 def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
@@ -123,7 +127,7 @@ def on_family(point: OrbitPoint, parent: OrbitPoint) -> OrbitPoint | None:
     equations = parent.orbit.equations
     assert difference is not None
     unknowns = equations.repeated(parent.solution.unknowns)
-    tangent = equations.alternating(difference)
+    tangent = equations.alternating(difference * equations.units.unknowns)
     found = point.curve.known(unknowns, parent.solution.values)
     if found is None:
         return None
@@ -222,13 +226,15 @@ def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     equations = orbit.equations
     solution = orbit.solution
     both = equations.halves(solution, mirrored=True) if orbit.period % 2 else None
-    if both is None or np.abs(both[1] - both[0]).max() > TOLERANCES.halves:
+    units = equations.halved.units.unknowns
+    if both is None or np.abs((both[1] - both[0]) / units).max() > TOLERANCES.halves:
         return None
     found = PeriodicOrbit.near(equations.halved, both[0], solution.values)
     if found is None or orbit.signature.sides or orbit.signature.events:
         return found
     # without a list of events Newton's method may have found another orbit
-    return found if np.abs(found.solution.unknowns - both[0]).max() < TOLERANCES.halves else None
+    moved = np.abs((found.solution.unknowns - both[0]) / units).max()
+    return found if moved < TOLERANCES.halves else None
 
 
 def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
@@ -242,10 +248,10 @@ def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
             continue
         shorter = orbit.equations.with_signature(short)
         found = PeriodicOrbit.near(shorter, unknowns[: shorter.size], orbit.solution.values)
-        if (
-            found is not None
-            and np.abs(found.solution.unknowns - unknowns[: shorter.size]).max() < TOLERANCES.halves
-        ):
+        if found is None:
+            continue
+        moved = found.solution.unknowns - unknowns[: shorter.size]
+        if np.abs(moved / shorter.units.unknowns).max() < TOLERANCES.halves:
             return found
     return None
 

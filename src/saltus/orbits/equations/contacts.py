@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
+from saltus.continuation import Bounds, Cut, End, TestFunction, Units, Zero
 from saltus.errors import MotionError
 from saltus.flow import (
     EventCode,
@@ -188,6 +188,27 @@ class ContactsEquations(OrbitEquations):
     def following(self) -> np.ndarray:
         return np.zeros(0, dtype=int)  # they are no unknowns
 
+    @cached_property
+    def units(self) -> Units:
+        """State and phases; guards, which are gaps and reactions, and the state."""
+        natural = self.natural
+        state = natural.state[self._free]
+        places = self._run.trace.contact_coordinates
+        guards = [
+            (natural.lengths if kind == EventCode.IMPACT else natural.forces)[places[contact]]
+            for kind, contact in self.plan[: len(self.signature.events), 1:3].tolist()
+        ]
+        unknowns = np.append(state, np.ones(len(guards)))
+        return Units(unknowns, np.append(guards, state), self.is_phase)
+
+    @cached_property
+    def is_phase(self) -> np.ndarray:
+        return np.arange(self.size) >= len(self._free)
+
+    @cached_property
+    def is_velocity(self) -> np.ndarray:
+        return np.append(self._free >= self.own, np.zeros(len(self.signature.events), dtype=bool))
+
     def split(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The state at the start, with 0 for coordinates and velocities that are held, and the
         phases of the events.
@@ -225,14 +246,12 @@ class ContactsEquations(OrbitEquations):
         """
         phases = self.split(solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        columns = [
-            SegmentExtremes.FORCE,
-            SegmentExtremes.PULL,
-            SegmentExtremes.TAIL,
-            SegmentExtremes.BESIDE,
-        ]
+        columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]
         evaluation: Any = solution.evaluation
-        return float(min(evaluation.seen[:, columns].min(), apart.min(initial=math.inf)))
+        seen = evaluation.seen
+        reactions = seen[:, columns].min() / self.natural.forces.max()
+        gaps = seen[:, SegmentExtremes.BESIDE].min() / self.natural.length
+        return float(min(reactions, gaps, apart.min(initial=math.inf)))
 
     def nearest(
         self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
+from saltus.continuation import ONES, Bounds, Cut, End, TestFunction, Units, Zero
 from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.signature import Signature
-from saltus.systems import System, numbers
+from saltus.systems import NaturalUnits, System, natural_units, numbers
 from saltus.taylor import FREQUENCY, record_table
 
 # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to
@@ -114,11 +114,12 @@ class Solution:
     values: np.ndarray  # of the parameters
     evaluation: OrbitEvaluation
     iterations: int
+    units: Units = ONES  # the natural units of the unknowns and of the residuals
 
     @property
     def residual(self) -> float:
-        """The largest residual."""
-        return float(np.abs(self.evaluation.residual).max())
+        """The largest residual, in natural units."""
+        return self.units.residual(self.evaluation.residual)
 
 
 class Restart(NamedTuple):
@@ -332,8 +333,9 @@ class OrbitEquations(ABC):
         return float(self.impacts(solution)[1].min(initial=math.inf))
 
     def pressing(self, solution: Solution) -> float:
-        """A quantity that is negative if a contact that the equations take for closed would open,
-        or one that they take for open is passed at the section; inf without either."""
+        """A quantity, in natural units, that is negative if a contact that the equations take for
+        closed would open, or one that they take for open is passed at the section; inf without
+        either."""
         return math.inf
 
     # --- 5. halving and repeating --------------------------------------------
@@ -444,6 +446,43 @@ class OrbitEquations(ABC):
         return None
 
     # --- what follows --------------------------------------------------------
+
+    @cached_property
+    def natural(self) -> NaturalUnits:
+        """The natural units of the system, in which thresholds are numbers."""
+        return natural_units(self.system)
+
+    @cached_property
+    def units(self) -> Units:
+        """The natural units of the unknowns and of the residuals; those of a state at a section,
+        if a kind has no others.
+        """
+        return Units(self.natural.state, self.natural.state, self.is_phase)
+
+    @cached_property
+    def is_phase(self) -> np.ndarray:
+        """Which unknowns are phases of the load, (n,); the others are coordinates and velocities."""
+        return np.zeros(self.size, dtype=bool)
+
+    def stretch(self, solution: Solution) -> float:
+        """How much larger than natural an orbit is, at least 1: the largest of its velocities among
+        the unknowns, in natural units."""
+        moving = self.is_velocity & ~self.is_phase
+        found = np.abs(solution.unknowns / self.units.unknowns)
+        return float(found.max(where=moving, initial=1.0))
+
+    @cached_property
+    def is_velocity(self) -> np.ndarray:
+        """Which unknowns are velocities, (n,)."""
+        return np.arange(self.size) >= self.own
+
+    def in_units(self, rows: np.ndarray) -> np.ndarray:
+        """Derivatives of the residuals to the unknowns, and to parameters behind them, (m, n + k),
+        as those of numbers in natural units."""
+        n = self.size
+        scaled = rows / np.reshape(self.units.residuals, (-1, 1))
+        scaled[:, :n] *= self.units.unknowns
+        return scaled
 
     @property
     def values(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.continuation import Cut, End, TestFunction, Zero
+from saltus.continuation import Cut, End, TestFunction, Units, Zero
 from saltus.flow import (
     ContactRegularity,
     EventKind,
@@ -106,7 +106,8 @@ class OneContactEquations(OrbitEquations):
         if self.signature.sides or not self.has_contact or self.passes_contact:
             return math.inf
         model: Any = self.system_at(solution.values).model
-        return float(model.gap(solution.unknowns[0], self.signature.side))
+        gap = float(model.gap(solution.unknowns[0], self.signature.side))
+        return gap / self.natural.length
 
     @cached_property
     def passes_contact(self) -> bool:  # type: ignore[override]
@@ -125,6 +126,20 @@ class OneContactEquations(OrbitEquations):
     @property
     def size(self) -> int:
         return 2 * (len(self.signature.sides) or self.own)
+
+    @cached_property
+    def units(self) -> Units:
+        """Phases and speeds of impacts; gaps and speeds at their ends."""
+        count = len(self.signature.sides)
+        if not count:
+            return super().units
+        length, speed = self.natural.state
+        return Units(np.tile([1.0, speed], count), np.tile([length, speed], count), self.is_phase)
+
+    @cached_property
+    def is_phase(self) -> np.ndarray:
+        places = np.arange(self.size)
+        return np.asarray((places % 2 == 0) & bool(self.signature.sides))
 
     def start(self, solution: Solution) -> dict[str, Any]:
         """Just after the first impact or, without impacts, at phase 0."""
@@ -193,7 +208,7 @@ class OneContactEquations(OrbitEquations):
             pairs[:, :, 0] -= 2.0 * math.pi * periods * np.arange(len(pairs))[:, None]
             if (
                 signature.sides == signature.sides[:part] * len(pairs)
-                and np.ptp(pairs, axis=0).max() < within
+                and (np.ptp(pairs, axis=0) / self.units.unknowns[:2]).max() < within
             ):
                 return periods
         return None
@@ -229,7 +244,7 @@ class OneContactEquations(OrbitEquations):
                 continue
             rolled = later[turn : turn + n].copy()
             rolled[:, 0] += 2.0 * math.pi * round((goal[0, 0] - rolled[0, 0]) / (2.0 * math.pi))
-            distance = float(np.abs(rolled - goal).max())
+            distance = float(np.abs((rolled - goal) / self.units.unknowns[:2]).max())
             if distance < least:
                 best = rolled.ravel()
                 least = distance
@@ -247,7 +262,7 @@ class OneContactEquations(OrbitEquations):
     def touched(self, special: Zero) -> tuple[Signature, np.ndarray] | None:
         point = special.point
         # its own signature has the impact, and the gap has a minimum
-        if point.orbit.slowest < TOLERANCES.touch:
+        if point.orbit.slowest < TOLERANCES.touch * self.natural.speed:
             return point.orbit.signature, point.solution.unknowns
         equations, unknowns = inserted(point)
         return equations.signature, unknowns

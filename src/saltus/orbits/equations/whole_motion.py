@@ -399,7 +399,8 @@ class WholeMotionEquations(OrbitEquations):
         states = np.where(
             later[:, None], image_of(self.system.model, states) if later.any() else states, states
         )
-        return np.asarray(states[np.abs(states - near).max(axis=1).argmin()])
+        apart = np.abs((states - near) / self.natural.state).max(axis=1)
+        return np.asarray(states[apart.argmin()])
 
     @cached_property
     def smooth_surfaces(self) -> frozenset[int]:
