@@ -233,7 +233,8 @@ def test_every_orbit_of_a_branch_of_both_layers_is_a_motion(mirrored: saltus.Bra
     At the grazing of small loads the motions beside it have such an impact at once, which throws
     the closed layer open.
     """
-    for orbit in mirrored.orbits:
+    # at a grazing itself rounding decides whether the motion has an impact there
+    for orbit in (orbit for orbit in mirrored.orbits if not orbit.grazes):
         assert orbit.defect < 1e-10 * (1 + np.abs(orbit.multipliers).max())
     assert mirrored.ends[0].reason is OrbitEnd.TWO_AT_ONCE
 

@@ -25,7 +25,6 @@ INSTANTS = 8
 # A load that moves d by a smaller share of it than this has no part in the unit.
 FARTHEST = 1e-7
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
-TINY = float(np.finfo(float).tiny)
 ANGLES = ("rad", "deg")  # units of coordinates that have their own natural unit
 
 
@@ -39,12 +38,13 @@ class NaturalUnits:
     2. They do not depend on the order of contacts and coordinates, on the origin of a coordinate
        along which a contact holds, on a shift of the load by a phase, on friction of 0 or on
        contacts that are farther away than another one.
-    3. `time` is 1 / Omega of the load, or shorter where an angle moves by 1 rad in less; without one it is sqrt(d / a) of the distance d and the
-       acceleration a below, or of the stiffness alone. `lengths` are the distance by which the load
-       and the contacts hold the system away from its equilibrium, d = max(abs(J), Omega^2)^-1 a, where
-       a is the acceleration at rest at a contact, in the mean over a period, and J = da/dq. The
-       contact is the one with the smallest d. Where the load moves d by less than d itself, as far
-       from a contact, that is the unit. A coordinate that is an angle has the unit 1 rad.
+    3. `time` is 1 / Omega of the load, or shorter where an angle moves by 1 rad in less; without a
+       load it is sqrt(d / a) of the distance d and the acceleration a below, or that of the
+       stiffness alone. `lengths` are the range through which the load moves the equilibrium, or
+       through which the inertia of the mass lets it move: that of d = max(abs(J), Omega^2)^-1 a,
+       where a is the acceleration at rest at a contact and J = da/dq. Under a constant load it is d
+       itself, the distance of the equilibrium from the contact. The contact is the one with the
+       smallest unit. A coordinate that is an angle has the unit 1 rad.
     4. Where there is no such distance, friction gives one, then the positions of contacts, then a
        ground that moves. What has none at all is 1: the system itself has no unit then.
     5. They are all finite and above 0.
@@ -218,10 +218,9 @@ def _held_away(
     moved = np.array(pushes) @ left
     moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right
     distance = _mean(moved)
-    swing = float(np.linalg.norm(_mean(moved - moved.mean(axis=0))))
-    swing *= SWING / max(float(np.linalg.norm(distance)), TINY)
-    if FARTHEST < swing < 1.0:
-        distance = distance * swing
+    swing = SWING * _mean(moved - moved.mean(axis=0))
+    if np.linalg.norm(swing) > FARTHEST * np.linalg.norm(distance):
+        distance = swing
     return Held(distance, _mean(np.array(pushes)), float(sizes.max()))
 
 
