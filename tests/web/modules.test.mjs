@@ -7,7 +7,7 @@ import { linkOf, stateOf } from "../../src/saltus/web/page/link.js";
 import { firstState, goesOn, prepared, tamed } from "../../src/saltus/web/page/description.js";
 import { cellPoints } from "../../src/saltus/web/page/cell_drawing.js";
 import { amplitudeOf } from "../../src/saltus/web/page/settling.js";
-import { jumpsOf } from "../../src/saltus/web/page/sweep.js";
+import { changesOf, halve } from "../../src/saltus/web/page/sweep.js";
 import { runs, shade } from "../../src/saltus/web/page/results_view.js";
 import { wideEnough } from "../../src/saltus/web/page/plot.js";
 
@@ -130,11 +130,27 @@ test("bars of a cell keep their length, and the halves of a diagonal theirs", ()
   }
 });
 
-test("jumps are where the amplitude leaps", () => {
-  const points = Array.from({ length: 41 }, (_, i) => ({ value: i / 40, amplitude: i < 25 ? 0.1 + i * 0.002 : 0.9 - i * 0.002, state: [], stop: "horizon" }));
-  const jumps = jumpsOf(points);
-  assert.equal(jumps.length, 1);
-  assert.deepEqual([jumps[0].from.value, jumps[0].to.value], [24 / 40, 25 / 40]);
+/** The jumps that a sweep finds among points of a curve, with the motions between them from the curve itself. */
+function jumpsAlong(values, amplitude, steady = () => true) {
+  const point = (value) => ({ value, amplitude: amplitude(value), state: [], stop: "horizon", steady: steady(value) });
+  const points = values.map(point);
+  const least = 0.02 * Math.max(...points.map((p) => p.amplitude));
+  return changesOf(points, least).filter((step) => {
+    for (let k = 0; k < 8 && step.change > least; k++) halve(step, point((step.from.value + step.to.value) / 2));
+    return step.change > least;
+  });
+}
+
+test("a jump is what stays in ever smaller steps, and no flank of a resonance is one", () => {
+  const values = Array.from({ length: 41 }, (_, i) => 0.4 + i / 40);
+  const resonance = (w) => 1 / Math.hypot(1 - w * w, 0.05 * w);
+  assert.equal(jumpsAlong(values, resonance).length, 0);
+  const broken = (w) => (w < 0.8137 ? 1 : 0.4) * resonance(w);
+  const [jump, ...others] = jumpsAlong(values, broken);
+  assert.equal(others.length, 0);
+  assert.ok(jump.from.value < 0.8137 && 0.8137 < jump.to.value && jump.to.value - jump.from.value < 1.01e-4);
+  const rough = (w) => 1 + Math.sin(1e5 * w);
+  assert.equal(jumpsAlong(values, rough, () => false).length, 0); // it never settles
 });
 
 test("a branch is drawn in stretches of one stability, which meet", () => {

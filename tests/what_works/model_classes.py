@@ -9,7 +9,7 @@ the first periods.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 
@@ -32,9 +32,11 @@ class TwoMasses(saltus.Model):
     def acceleration(self, t, position, velocity, side, load):
         (x, y), (u, v) = position, velocity
         pull = 0.3 * (x - y)
-        return load.force(
-            t
-        ) - self.damping * u - x - 0.4 * x**3 - pull, -self.damping * v - y + pull
+        push = load.force(t) - self.damping * u - x - 0.4 * x**3 - pull
+        return push, -self.damping * v - y + pull
+
+    def kinetic_energy(self, t, position, velocity, side, load):
+        return 0.5 * sum(v**2 for v in velocity)
 
 
 @saltus.register
@@ -165,13 +167,16 @@ class ModelClass:
     """A class of models: its system, the state at the start, and what a reader calls it."""
 
     name: str
+    # what the documentation calls it
+    label: str
     system: Callable[[], System]
     start: dict[str, Any]
     # a number of the model or of its law, for derivatives and fits
     parameter: str = "model.damping"
     # the coordinate that is observed
     observed: str = "x"
-    options: dict[str, Any] = field(default_factory=dict)
+    # half the width of the window in which attractors are looked for
+    reach: float = 0.3
 
     @property
     def whole_start(self) -> dict[str, Any]:
@@ -216,8 +221,8 @@ def _two_stops() -> System:
 
 def _impact_pair() -> System:
     return System(
-        model=saltus.ImpactPair(damping=0.2, mass_ratio=0.2, clearance=0.5),
-        load=_pushed(),
+        model=saltus.ImpactPair(damping=0.2, mass_ratio=0.1, clearance=0.5),
+        load=_pushed(0.3, 1.0),
         impact=NewtonImpact(0.6),
     )
 
@@ -268,22 +273,49 @@ def _harvester() -> System:
 
 
 CLASSES = (
-    ModelClass("smooth", lambda: System(model=TwoMasses(), load=_pushed()), {"x": 0.1, "y": 0.0}),
-    ModelClass("one contact", _metainterface, {"theta": 0.3}, observed="theta"),
-    ModelClass("rocking block", _rocking_block, {"theta": 0.05}, "model.alpha", "theta"),
-    ModelClass("wall", _wall, {"x": 0.1}),
-    ModelClass("two stops", _two_stops, {"x": 0.1}),
-    ModelClass("impact pair", _impact_pair, {"z": 0.1, "x": 0.1}),
-    ModelClass("both layers", _both_layers, {"theta_1": 0.2, "theta_2": 0.0}, observed="theta_1"),
+    ModelClass(
+        "smooth",
+        "a smooth model of your own, `Model`",
+        lambda: System(model=TwoMasses(), load=_pushed()),
+        {"x": 0.1, "y": 0.0},
+    ),
+    ModelClass(
+        "one contact",
+        "`Metainterface`, one contact",
+        _metainterface,
+        {"theta": 0.3},
+        observed="theta",
+    ),
+    ModelClass(
+        "rocking block",
+        "`RockingBlock`",
+        _rocking_block,
+        {"theta": 0.05},
+        "model.alpha",
+        "theta",
+        0.05,
+    ),
+    ModelClass("wall", "`WallOscillator`", _wall, {"x": 0.1}),
+    ModelClass("two stops", "`TwoStops`", _two_stops, {"x": 0.1}),
+    ModelClass("impact pair", "`ImpactPair`", _impact_pair, {"z": 0.1, "x": 0.1}),
+    ModelClass(
+        "both layers",
+        "`TwoLayer`",
+        _both_layers,
+        {"theta_1": 0.2, "theta_2": 0.0},
+        observed="theta_1",
+    ),
     ModelClass(
         "chain of cells",
+        "`CellChain`",
         _chain,
         {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0},
         observed="lower_1",
     ),
-    ModelClass("belt", _belt, {"x": 0.0, "velocity": 0.05}),
+    ModelClass("belt", "`BeltOscillator`", _belt, {"x": 0.0, "velocity": 0.05}),
     ModelClass(
         "structure with a contact",
+        "`Structure` with a contact",
         _structure,
         {"displacement": (0.1, 0.0, 0.0)},
         "model.contacts.stop.position",
@@ -291,22 +323,37 @@ CLASSES = (
     ),
     ModelClass(
         "structure with a soft stop",
+        "`Structure` with a soft stop",
         _structure_with_soft_stop,
         {"displacement": (0.1, 0.0, 0.0)},
         "model.surfaces.stop.stiffness",
         "c",
     ),
-    ModelClass("own, gaps between bodies", _two_bodies, {"x": 0.1, "y": 0.0}),
     ModelClass(
-        "own, with surfaces", lambda: System(model=SoftStop(), load=_pushed()), {"x": 0.1, "y": 0.0}
+        "own, gaps between bodies",
+        "your own: gaps between bodies",
+        _two_bodies,
+        {"x": 0.1, "y": 0.0},
+    ),
+    ModelClass(
+        "own, with surfaces",
+        "your own: surfaces",
+        lambda: System(model=SoftStop(), load=_pushed()),
+        {"x": 0.1, "y": 0.0},
     ),
     ModelClass(
         "own, friction in a contact",
+        "your own: friction in a contact",
         lambda: System(model=RubbingBlock(), load=_pushed(), impact=NewtonImpact(0.3)),
         {"x": 0.1, "y": 0.1},
     ),
-    ModelClass("own, curved gaps", _curved, {"x": 0.1, "y": 0.1}),
-    ModelClass("own, first order", _harvester, {"x": 0.1, "voltage": 0.0}),
+    ModelClass("own, curved gaps", "your own: curved gaps", _curved, {"x": 0.1, "y": 0.1}),
+    ModelClass(
+        "own, first order",
+        "your own: a coordinate of first order",
+        _harvester,
+        {"x": 0.1, "voltage": 0.0},
+    ),
 )
 NAMES = tuple(each.name for each in CLASSES)
 

@@ -38,7 +38,7 @@ TRIED_WHOLE = (173.0, 7017.0, 7017017.0)
 
 
 def accepted(system: System) -> dict[str, dict[str, Any]]:
-    """For each path of a number: `least` and `most`, as far as there is a bound, each with
+    """For each path of a number that a reader may change: `least` and `most`, as far as there is a bound, each with
 
     * `end`, the last value, and `taken`, whether it is taken itself;
     * `of`, the path of the number that it is, if another number of the system bounds this one;
@@ -52,7 +52,10 @@ def accepted(system: System) -> dict[str, dict[str, Any]]:
     system
         The system; its own numbers are taken.
     """
-    return {path: _NumberBounds(system, path, value).bounds() for path, value in numbers(system)}
+    return {
+        path: _NumberBounds(system, path, value).bounds()
+        for path, value in numbers(system, given=True)
+    }
 
 
 class _NumberBounds:
@@ -112,7 +115,7 @@ class _NumberBounds:
         while self.whole and abs(taken - refused) > 1:
             middle = float(math.floor((taken + refused) / 2))
             taken, refused = (middle, refused) if self.refusal(middle) is None else (taken, middle)
-        others = [x for path, x in numbers(self.system) if path != self.path]
+        others = [x for path, x in numbers(self.system, given=True) if path != self.path]
         simple = [
             x
             for x in (float(round(taken)), math.pi, math.pi / 2, *others)
@@ -151,7 +154,7 @@ class _NumberBounds:
 
     def _follow(self, bound: dict[str, Any]) -> None:
         """Find out whether another number of the system is the bound: then the bound moves with it."""
-        for path, value in numbers(self.system):
+        for path, value in numbers(self.system, given=True):
             if (
                 path == self.path
                 or value == 0.0

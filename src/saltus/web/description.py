@@ -53,7 +53,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
     units = [model.unit_of(name) for name in model.coordinates]
 
     def below(part: Any, where: str) -> list[str]:
-        return [path for path, _ in numbers(part, where)]
+        return [path for path, _ in numbers(part, where, given=True)]
 
     frequency = (
         [{"channel": "", "kind": "frequency", "parameters": [FREQUENCY]}]

@@ -311,10 +311,23 @@ def _page(
     system: System, motion: Mapping[str, Any], title: str, results: list[Any], **more: bool
 ) -> str:
     """The text of a page that begins with a motion and has results laid over it."""
+    content, described = page_content(system, motion, title, results)
+    return one_file(described | more, content)
+
+
+def page_content(
+    system: System, motion: Mapping[str, Any], title: str, results: list[Any]
+) -> tuple[bytes, dict[str, Any]]:
+    """The WebAssembly of a page and all that it is told."""
     content, described = page_parts(system)
     bounds = accepted(system)
-    described |= {
-        "numbers": [entry | {"accepted": bounds[entry["path"]]} for entry in described["numbers"]],
+    fixed = {path for path, bound in bounds.items() if _has_one_value(bound)}
+    for part in (described["model"], described["impact"], *described["load"]):
+        part["parameters"] = [path for path in part["parameters"] if path not in fixed]
+    return content, described | {
+        "numbers": [
+            entry | {"accepted": bounds.get(entry["path"], {})} for entry in described["numbers"]
+        ],
         "title": title or type(system.model).__name__,
         "start": _agreed(system, motion)["start"],
         "study": {
@@ -324,7 +337,11 @@ def _page(
         "digest": digest(system),
         "results": results,
     }
-    return one_file(described | more, content)
+
+
+def _has_one_value(bound: Mapping[str, Any]) -> bool:
+    """Whether a number may have one value alone, as the restitution of a model without impacts."""
+    return {"least", "most"} <= set(bound) and bound["least"]["end"] == bound["most"]["end"]
 
 
 def _agreed(system: System, motion: Mapping[str, Any]) -> dict[str, Any]:

@@ -66,3 +66,15 @@ export function withinBounds(entry) {
   const high = most && !most.taken && most_ === most.end ? most_ - aside : most_;
   return low < high ? { ...entry, low, high } : entry;
 }
+
+/**
+ * The range of a slider where another number of the system bounds this one: it moves with that number.
+ * @param {NumberEntry} entry @param {(path: string) => number} valueOf @param {[number, number]} range @returns {[number, number]}
+ */
+export function withinOthers(entry, valueOf, [low, high]) {
+  const { least, most } = entry.accepted ?? {};
+  const aside = (high - low) / ASIDE;
+  const from = least?.of === undefined ? low : Math.max(low, valueOf(least.of) + (least.taken ? 0 : aside));
+  const to = most?.of === undefined ? high : Math.min(high, valueOf(most.of) - (most.taken ? 0 : aside));
+  return from < to ? [from, to] : [low, high];
+}

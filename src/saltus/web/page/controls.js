@@ -1,5 +1,6 @@
 /** Every number of the system: a slider, a field to type in, its unit, a range that can be changed, a reset, and what is refused. */
 
+import { withinOthers } from "./checks.js";
 import { allDigits, clamp, degreesOf, radians, typedNumber } from "./numbers.js";
 import { asElement, isLetter, parameterName, parameterSymbol } from "./symbols.js";
 
@@ -134,7 +135,8 @@ export class NumberField {
     const chosen = this.host.range(this.entry.path);
     if (chosen) return chosen;
     const value = this.host.value(this.entry.path);
-    return [Math.min(this.entry.low, value), Math.max(this.entry.high, value)];
+    const [low, high] = withinOthers(this.entry, (path) => this.host.value(path), [this.entry.low, this.entry.high]);
+    return [Math.min(low, value), Math.max(high, value)];
   }
 
   /** @param {string} text */

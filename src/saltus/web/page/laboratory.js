@@ -4,7 +4,6 @@ import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
 import { rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
 import { SWEPT, goesOn } from "./description.js";
-import { jumpsOf } from "./sweep.js";
 import { button } from "./transport.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -12,6 +11,8 @@ import { button } from "./transport.js";
 /** @typedef {import("./basins.js").Basins} Basins */
 /** @typedef {import("./views.js").View} View */
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
+
+const MOST_JUMPS = 12; // that are listed
 
 /** The settings of a sweep. @param {HTMLElement} host @param {Session} session @param {NumberEntry[]} entries @param {Sweep} sweep */
 export function sweepControls(host, session, entries, sweep) {
@@ -67,13 +68,13 @@ export function sweepSaid(result) {
   if (result.refusal) return `It ended: ${result.refusal}`;
   if (!result.done) return `${result.up.length + result.down.length} values so far.`;
   if (!result.up.length) return "";
-  const jumps = [...jumpsOf(result.up).map((jump) => ["up", jump]), ...jumpsOf(result.down).map((jump) => ["down", jump])];
-  if (!jumps.length) return "No jump on the way up or down.";
-  const parts = jumps.slice(0, 6).map(([way, jump]) => {
-    const { from, to } = /** @type {any} */ (jump);
-    return `${way} between ${shortly(from.value, 5)} and ${shortly(to.value, 5)}`;
-  });
-  return `Jumps on the way ${parts.join("; ")}.`;
+  const unsettled = [...result.up, ...result.down].filter(({ steady, amplitude }) => Number.isFinite(amplitude) && !steady).length;
+  const beside = unsettled ? ` At ${unsettled} value${unsettled === 1 ? "" : "s"} the motion has not settled.` : "";
+  if (!result.jumps.length) return `No jump on the way up or down.${beside}`;
+  const digits = 5;
+  const parts = result.jumps.slice(0, MOST_JUMPS).map(({ way, from, to }) => `${way} at ${shortly((from.value + to.value) / 2, digits)}`);
+  const more = result.jumps.length - parts.length;
+  return `Jumps on the way ${parts.join("; ")}${more > 0 ? `; and ${more} more` : ""}.${beside}`;
 }
 
 /** The picture of a sweep. @param {Session} session @param {Sweep} sweep @param {(path: string, value: number, state: number[]|null) => void} show @returns {View} */

@@ -1,6 +1,6 @@
 /**
  * A sweep as in a laboratory: the amplitude of the settled motion against a parameter, up and then down, the motion carried along.
- * It is computed in slices between pictures, so that the page stays alive, and a jump is where the amplitude leaps.
+ * It is computed in slices between pictures, so that the page stays alive. A jump is a change of the amplitude that stays in ever smaller steps.
  */
 
 import { goesOn } from "./description.js";
@@ -10,11 +10,14 @@ import { amplitudeOf } from "./settling.js";
 
 const SLICE = 10; // milliseconds of work between two pictures
 const WATCHED = 4; // periods at the end of each value over which the amplitude is taken
-const LEAP = 5; // times the usual change from value to value: more is a jump
-const LEAST_LEAP = 0.02; // of the largest amplitude
+const LEAST_LEAP = 0.02; // of the largest amplitude: what a jump changes at least
+const JUMP_HALVINGS = 8; // of a step between two values, in which a smooth change becomes small and a jump stays
+const MORE_TIMES = 3; // a motion that has not settled is followed for as long again
+const STEADY = 0.01; // of its amplitude: what a motion that has settled changes at most from some periods to the next
 
-/** @typedef {{value: number, amplitude: number, state: number[], stop: string}} SweepPoint */
-/** @typedef {{up: SweepPoint[], down: SweepPoint[], done: boolean, refusal: string}} SweepResult */
+/** @typedef {{value: number, amplitude: number, state: number[], stop: string, steady: boolean}} SweepPoint */
+/** @typedef {{way: "up"|"down", from: SweepPoint, to: SweepPoint}} Jump */
+/** @typedef {{up: SweepPoint[], down: SweepPoint[], jumps: Jump[], done: boolean, refusal: string}} SweepResult */
 
 export class Sweep {
   /** @param {Session} session @param {(result: SweepResult) => void} tell */
@@ -22,7 +25,7 @@ export class Sweep {
     this.session = session;
     this.tell = tell;
     /** @type {SweepResult} */
-    this.result = { up: [], down: [], done: true, refusal: "" };
+    this.result = { up: [], down: [], jumps: [], done: true, refusal: "" };
     this.running = 0;
   }
 
@@ -37,29 +40,51 @@ export class Sweep {
     const ticket = ++this.running;
     const { store, engine } = this.session;
     const { values, start, sweep, coordinate } = store.state;
-    this.result = { up: [], down: [], done: false, refusal: "" };
+    this.result = { up: [], down: [], jumps: [], done: false, refusal: "" };
     if (!goesOn(this.session.description)) {
       this.result = { ...this.result, done: true, refusal: "a sweep needs a load that repeats itself or is constant" };
       return this.tell(this.result);
     }
     const steps = Math.max(2, Math.round(sweep.count));
     const along = Array.from({ length: steps }, (_, i) => sweep.low + ((sweep.high - sweep.low) * i) / (steps - 1));
-    /** @type {Record<string, number>} */
-    let state = { ...start, time: 0 };
+    const settle = (/** @type {number} */ value, /** @type {Record<string, number>} */ state) => {
+      const refused = this.session.refusalOf({ ...values, [sweep.path]: value });
+      if (refused) throw new Error(refused.message);
+      const follow = (/** @type {Record<string, number>} */ begin) => settled(engine, value, { ...values, [sweep.path]: value }, begin, sweep.periods, coordinate);
+      let found = follow(state);
+      // beside a jump motions settle slowly
+      for (let k = 0; k < MORE_TIMES && !found.point.steady && !found.ended; k++) found = follow(named(this.session, found.point.state));
+      return found;
+    };
     let from = performance.now();
+    const isCurrent = async () => {
+      if (performance.now() - from < SLICE) return true;
+      this.tell(this.result);
+      await new Promise((resolve) => setTimeout(resolve, 0));
+      from = performance.now();
+      return ticket === this.running;
+    };
     try {
+      /** @type {Record<string, number>} */
+      let state = { ...start, time: 0 };
       for (const [name, list] of /** @type {const} */ ([["up", along], ["down", [...along].reverse()]])) {
         for (const value of list) {
-          const refused = this.session.refusalOf({ ...values, [sweep.path]: value });
-          if (refused) throw new Error(refused.message);
-          const point = settled(this.session, engine, { ...values, [sweep.path]: value }, state, sweep.periods, coordinate);
-          state = point.next;
-          this.result[name].push({ value, amplitude: point.amplitude, state: point.state, stop: point.stop });
-          if (performance.now() - from < SLICE) continue;
-          this.tell(this.result);
-          await new Promise((resolve) => setTimeout(resolve, 0));
-          if (ticket !== this.running) return;
-          from = performance.now();
+          const { point, ended } = settle(value, state);
+          if (!ended) state = named(this.session, point.state);
+          this.result[name].push(point);
+          if (!(await isCurrent())) return;
+        }
+      }
+      const least = LEAST_LEAP * Math.max(...[...this.result.up, ...this.result.down].map(({ amplitude }) => amplitude || 0));
+      for (const way of /** @type {const} */ (["up", "down"])) {
+        for (const step of changesOf(this.result[way], least)) {
+          for (let k = 0; k < JUMP_HALVINGS && step.change > least; k++) {
+            const middle = settle((step.from.value + step.to.value) / 2, named(this.session, step.from.state)).point;
+            if (!(await isCurrent())) return;
+            if (!middle.steady) break; // too near to the jump to settle
+            halve(step, middle);
+          }
+          if (step.change > least) this.result.jumps.push({ way, from: step.from, to: step.to });
         }
       }
     } catch (error) {
@@ -70,33 +95,54 @@ export class Sweep {
   }
 }
 
+/** The state at the start of a motion, by the names of its variables. @param {Session} session @param {number[]} state */
+function named(session, state) {
+  /** @type {Record<string, number>} */
+  const start = { time: 0 };
+  session.coordinates.forEach((each, i) => {
+    start[each.name] = state[i] ?? 0;
+    start[each.velocity] = state[i + session.coordinates.length] ?? 0;
+  });
+  return start;
+}
+
 /**
- * The motion after so many periods from a state: its amplitude, and the state at its end.
- * @param {Session} session @param {import("./types.js").Engine} engine @param {Record<string, number>} values
- * @param {Record<string, number>} start @param {number} periods @param {number} coordinate
+ * The motion after so many periods from a state: its amplitude, the state at its end, and whether it has settled.
+ * @param {import("./types.js").Engine} engine @param {number} value @param {Record<string, number>} values
+ * @param {Record<string, number>} start @param {number} periods @param {number} coordinate @returns {{point: SweepPoint, ended: boolean}}
  */
-function settled(session, engine, values, start, periods, coordinate) {
+function settled(engine, value, values, start, periods, coordinate) {
   const system = engine.system(values);
   const period = system.period ?? 2 * Math.PI;
   const motion = engine.simulate(system, start, periods * period, system.period ? { periods } : {});
   const { first, last } = motion.time;
   const state = Array.from(motion.state(last));
-  /** @type {Record<string, number>} */
-  const next = { time: 0 };
-  session.coordinates.forEach((each, i) => {
-    next[each.name] = state[i] ?? 0;
-    next[each.velocity] = state[i + session.coordinates.length] ?? 0;
-  });
   const ended = motion.stop !== "horizon" && motion.stop !== "rest";
-  const amplitude = ended ? NaN : amplitudeOf(motion, coordinate, Math.max(first, last - WATCHED * period), period);
-  return { amplitude, state, stop: motion.stop, next: ended ? start : next };
+  const watched = (/** @type {number} */ before) => amplitudeOf(motion, coordinate, Math.max(first, last - before * WATCHED * period), period);
+  const amplitude = ended ? NaN : watched(1);
+  const steady = !ended && watched(2) - amplitude <= STEADY * amplitude;
+  return { point: { value, amplitude, state, stop: motion.stop, steady }, ended };
 }
 
-/** The places between two values at which the amplitude jumps. @param {SweepPoint[]} points */
-export function jumpsOf(points) {
-  const changes = points.slice(1).map((point, i) => Math.abs(point.amplitude - (points[i]?.amplitude ?? NaN)));
-  const usual = [...changes].filter(Number.isFinite).sort((a, b) => a - b)[Math.floor(changes.length / 2)] ?? 0;
-  const most = points.reduce((high, point) => Math.max(high, point.amplitude || 0), 0);
-  const least = Math.max(LEAP * usual, LEAST_LEAP * most);
-  return changes.flatMap((change, i) => (change > least ? [{ from: points[i], to: points[i + 1] }] : []));
+/** @typedef {{from: SweepPoint, to: SweepPoint, change: number}} Step */
+
+/** How much the amplitude changes between two motions that have settled, else 0. @param {SweepPoint} from @param {SweepPoint} to */
+const changed = (from, to) => (from.steady && to.steady ? Math.abs(to.amplitude - from.amplitude) : 0);
+
+/** The steps of a sweep in which the amplitude changes by more than a jump does at least. @param {SweepPoint[]} points @param {number} least @returns {Step[]} */
+export function changesOf(points, least) {
+  const steps = points.slice(1).map((to, i) => {
+    const from = /** @type {SweepPoint} */ (points[i]);
+    return { from, to, change: changed(from, to) };
+  });
+  return steps.filter(({ change }) => change > least);
+}
+
+/** Replace a step by the half in which the amplitude changes more. @param {Step} step @param {SweepPoint} middle the motion between, begun from the first one */
+export function halve(step, middle) {
+  const before = changed(step.from, middle);
+  const behind = changed(middle, step.to);
+  if (before > behind) step.to = middle;
+  else step.from = middle;
+  step.change = Math.max(before, behind);
 }

@@ -29,6 +29,7 @@
  * @typedef {object} Motion
  * @property {{first: number, last: number}} time
  * @property {string} stop
+ * @property {string} [limit]  The margin that has ended it.
  * @property {string} [reason]
  * @property {(t: number) => ArrayLike<number>} state  Coordinates, then velocities; at an impact those after it.
  * @property {(times: Float64Array) => Record<string, Float64Array>} sample

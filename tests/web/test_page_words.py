@@ -1,0 +1,164 @@
+"""What pages say, read in node for each kind of page: a block that overturns, a structure, a model
+of one's own; which numbers have sliders, and between which ends; and the jumps of a sweep.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from test_agreement import NODE, run_node
+from what_works.model_classes import NAMES, model_class, system_of
+from what_works.refused import REFUSED
+
+import saltus
+from saltus.web import one_file
+from saltus.web.study_page import _motion, page_content
+
+pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed here")
+WITH_PAGES = [name for name in NAMES if (name, "page") not in REFUSED]
+
+
+def words(tasks, folder):
+    """What pages say, each given by its system, its start, its length and maybe a sweep."""
+    given = []
+    for system, start, length, sweep in tasks:
+        state = dict(start)
+        asked = {"periods": None, "duration": None} | length
+        motion = _motion(system, state.pop("velocity", 0.0), state, asked, 1e-12, 0.0)
+        wasm, description = page_content(system, motion, "", [])
+        given.append({"wasm": wasm, "description": description, "sweep": sweep})
+    return run_node("words.mjs", one_file.PAGE.as_uri(), given, folder)
+
+
+def overturning(amplitude=0.5):
+    pulse = saltus.OneSine(amplitude=amplitude, frequency=4.0, start=0.5, quantity="acceleration")
+    return saltus.System(
+        model=saltus.RockingBlock(alpha=np.deg2rad(15)),
+        load=saltus.Load(ground_horizontal=pulse),
+        impact=saltus.VelocityReduction(e=0.9),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swing(saltus.OneContactModel):
+    """A pendulum at a wall that ends where it is upright, with a landmark on its way."""
+
+    wall: float = -0.3
+    restitution: float = 0.8
+
+    coordinates = ("phi",)
+    channels = ("torque",)
+    sides = (1,)
+    stops = ("upright",)
+    margin_kinds = {  # noqa: RUF012
+        "upright": saltus.systems.MarginKind.LIMIT,
+        "level": saltus.systems.MarginKind.LANDMARK,
+    }
+
+    def __post_init__(self):
+        if not 0.0 <= self.restitution <= 1.0:
+            raise ValueError(f"restitution must lie in [0, 1], got {self.restitution!r}")
+
+    @property
+    def contact(self):
+        return self.wall
+
+    def margins(self, t, phi, velocity, acceleration, side, load):
+        return {"upright": np.pi - phi, "level": np.pi / 2 - phi}
+
+    def margin_names(self, load):
+        return ("upright", "level")
+
+    def acceleration(self, t, phi, velocity, side, load):
+        return load.torque(t) - np.sin(phi)
+
+    def gap(self, phi, side):
+        return phi - self.wall
+
+    def reset(self, t, velocity, side, load, impact):
+        return side, -self.restitution * velocity
+
+
+def swinging():
+    return saltus.System(model=Swing(), load=saltus.Load(torque=0.0))
+
+
+def test_a_block_that_overturns_says_so(tmp_path):
+    system = overturning()
+    motion = saltus.simulate(system, theta=0.0, duration=20.0)
+    (said,) = words([(system, {"theta": 0.0}, {"duration": 20.0}, None)], tmp_path)
+    assert motion.limit == "overturned"
+    assert f"The block overturns at {motion.time:.6g}." in said["summary"]
+    assert said["atEnd"] == {"kind": "limit", "text": "The block overturns here: the motion ends."}
+    assert said["atStart"]["kind"] == "fine"
+    for wrong in ("respected", "no such mechanism", "margin"):
+        assert wrong not in said["summary"] + said["atEnd"]["text"]
+
+
+def test_a_block_that_stands_says_that_its_margin_is_respected(tmp_path):
+    (said,) = words([(overturning(0.4), {"theta": 0.0}, {"duration": 20.0}, None)], tmp_path)
+    assert "overturned respected." in said["summary"]
+    assert "overturns" not in said["summary"]
+
+
+def test_a_model_of_ones_own_names_the_margin_that_ends_it_and_passes_others(tmp_path):
+    system = swinging()
+    start = {"phi": 0.0, "velocity": 2.5}  # more than 2, with which it would come to rest upright
+    motion = saltus.simulate(system, **start, duration=20.0)
+    (said,) = words([(system, start, {"duration": 20.0}, None)], tmp_path)
+    assert motion.limit == "upright"
+    assert (
+        f"It ends at {motion.time:.6g}, where the margin “upright” reaches zero." in said["summary"]
+    )
+    assert f"level passed first at {motion.validity.first['level']:.6g}" in said["summary"]
+    assert said["atEnd"]["text"] == "The margin “upright” is zero here: the motion ends."
+    ends = {slider["path"]: (slider["low"], slider["high"]) for slider in said["sliders"]}
+    assert ends["model.restitution"] == (0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def pages_of_all_classes(tmp_path_factory):
+    tasks = [
+        (system_of(name), model_class(name).whole_start, {"periods": 1}, None)
+        for name in WITH_PAGES
+    ]
+    return dict(zip(WITH_PAGES, words(tasks, tmp_path_factory.mktemp("pages")), strict=True))
+
+
+@pytest.mark.parametrize("name", WITH_PAGES)
+def test_sliders_are_the_numbers_of_the_system_within_what_it_takes(name, pages_of_all_classes):
+    system, sliders = system_of(name), pages_of_all_classes[name]["sliders"]
+    without = {"impact.e"} if name in ("smooth", "belt") else set()  # nothing is struck there
+    assert {slider["path"] for slider in sliders} == set(system.parameters) - without
+    for slider in sliders:
+        assert slider["low"] < slider["high"], slider
+        assert slider["refused"] == ["", "", ""], slider
+
+
+@pytest.mark.parametrize("name", WITH_PAGES)
+def test_a_page_says_how_many_impacts_there_are(name, pages_of_all_classes):
+    motion = saltus.simulate(system_of(name), **model_class(name).whole_start, periods=1)
+    counted = sum(str(event.kind) == "impact" for event in motion.events)
+    said = pages_of_all_classes[name]["summary"]
+    assert said.startswith(f"{counted} impact{'' if counted == 1 else 's'} up to time ")
+
+
+def test_the_jumps_of_a_page_s_sweep_are_those_of_python(tmp_path):
+    """The metainterface of Fig. 9b, whose resonance has a jump each way and a smooth flank."""
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=saltus.Load(frequency=0.85, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
+    )
+    sweep = {"path": "load.frequency", "low": 0.7, "high": 1.1, "count": 17, "periods": 60}
+    (said,) = words([(system, {"theta": 0.3}, {"periods": 5}, sweep)], tmp_path)
+    swept = said["swept"]
+    known = saltus.frequency_sweep(system, np.linspace(0.7, 1.1, 17), theta=0.3)
+    places = zip(known.jump_direction, known.jump_before, known.jump_after, strict=True)
+    expected = [(str(way.values), float(low), float(high)) for way, low, high in places]
+    assert len(swept["jumps"]) == len(expected) > 0
+    for (way, one, other), (known_way, low, high) in zip(
+        sorted(swept["jumps"]), sorted(expected), strict=True
+    ):
+        assert way == known_way
+        assert abs((one + other) / 2 - (low + high) / 2) < 2e-3
+    assert swept["said"].startswith("Jumps on the way up at ")
