@@ -195,6 +195,7 @@ def good(made):
         "saltus.plot": {"result": made["motion"]},
         "saltus.phase_portrait": {"system": UNFORCED},
         "saltus.register": {"cls": saltus.Metainterface},
+        "saltus.prove": {"result": orbit},
         "saltus.response_spectrum": {"system": SYSTEM},
         "saltus.search_orbits": {**along, "values": [1.0]},
         "saltus.sensitivities": {**one, "periods": 1},

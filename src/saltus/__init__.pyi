@@ -57,6 +57,7 @@ from .orbits.finding.search import search_orbits as search_orbits
 from .orbits.free_orbits import FreeOrbit as FreeOrbit
 from .orbits.free_orbits import backbone as backbone
 from .orbits.free_orbits import free_orbit as free_orbit
+from .orbits.proofs.proving import prove as prove
 from .plots.animation import animate as animate
 from .plots.any_result import plot as plot
 from .progress import show_progress as show_progress

@@ -20,6 +20,8 @@ from .finding.search import Search as Search
 from .orbit import PeriodicOrbit as PeriodicOrbit
 from .orbits_as_json import as_json as as_json
 from .orbits_as_json import from_json as from_json
+from .proofs.orbit_proof import OrbitProof as OrbitProof
+from .proofs.special_proof import SpecialProof as SpecialProof
 from .signature import Signature as Signature
 from .verify import closing_distances as closing_distances
 from .verify import closing_rows as closing_rows

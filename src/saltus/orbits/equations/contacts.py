@@ -39,6 +39,8 @@ from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.branches.symmetry import full_point
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.equations.event_sequence import STAYS, read_signature
+from saltus.orbits.proofs.contact_segments import contact_segments
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System, arguments_of, held_values, image_of, mass_rows
 from saltus.taylor import FREQUENCY
@@ -281,6 +283,38 @@ class ContactsEquations(OrbitEquations):
 
     def curve_barrier(self, kind: str, point: Any) -> TestFunction:
         return curve_test(SpecialKind[f"{kind}_GR"], grazing)
+
+    def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
+        return self._to_prove(solution)
+
+    def touching_segments(self, point: OrbitPoint) -> OrbitSegments | CannotProve:
+        """An impact that has lost its speed becomes the touch, or the lowest minimum of a gap."""
+        solution = point.solution
+        _, phases = self.split(solution.unknowns)
+        rates = -np.roll(solution.evaluation.ends[:, SegmentEnd.RATE], 1)[: phases.size]
+        if phases.size and rates.min() < TOLERANCES.touch:
+            return self._to_prove(solution, touching=int(np.argmin(rates)))
+        return CannotProve("the grazing between the events of several contacts is not proved yet")
+
+    def _to_prove(
+        self, solution: Solution, touching: int | None = None
+    ) -> OrbitSegments | CannotProve:
+        state, phases = self.split(solution.unknowns)
+        first = SegmentEnd.NUMBERS + 4 * self.own
+        ends = solution.evaluation.ends[:, first : first + 2 * self.own]
+        # segment i ends with event i + 1
+        before = np.roll(ends, 1, axis=0) if phases.size else state[None]
+        if phases.size and self.signature.symmetric:
+            before[0] *= -1.0
+        return contact_segments(
+            self.system_at(solution.values),
+            self.signature,
+            self.images,
+            phases,
+            before,
+            self.frequency(solution.values),
+            touching,
+        )
 
     def evaluate(
         self,

@@ -16,6 +16,7 @@ import numpy as np
 from saltus.continuation import ONES, Bounds, Cut, End, TestFunction, Units, Zero
 from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.systems import NaturalUnits, System, natural_units, numbers
 from saltus.taylor import FREQUENCY, record_table
@@ -200,6 +201,9 @@ class OrbitEquations(ABC):
        where no step leads on;
     9. **curves of special points**: `curve_barrier`, and `touched`, the equations with the impact
        that a grazing begins with.
+
+    10. **proof**: `segments_to_prove` and, at a grazing, `touching_segments`: the segments of an
+       orbit with their events as expressions, from which it is proved (`proofs/`).
 
     A kind whose orbits have more to tell than their signature and unknowns say adds fields to
     `Signature`, which has the columns in datasets (`signature_columns`) and reads them back.
@@ -444,6 +448,21 @@ class OrbitEquations(ABC):
         """Of the two signatures that meet at a grazing, the one with more impacts, and the orbit's
         unknowns in it; None if curves of grazings are not followed."""
         return None
+
+    # --- 10. proof -----------------------------------------------------------
+
+    def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
+        """The segments of an orbit, with their events as expressions, or why this kind of orbit
+        cannot be proved yet.
+        """
+        return CannotProve(
+            "orbits with rests, sticking, dependent gaps or coordinates that follow their events "
+            "are not proved yet"
+        )
+
+    def touching_segments(self, point: Any) -> OrbitSegments | CannotProve:
+        """The same of the orbit at a grazing, with the touch as an event without a jump."""
+        return CannotProve("grazings of this kind of orbit are not proved yet")
 
     # --- what follows --------------------------------------------------------
 

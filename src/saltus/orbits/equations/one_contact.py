@@ -18,6 +18,7 @@ symmetric orbit cover half a period, after which it is its mirror image.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,15 +28,18 @@ from saltus.continuation import Cut, End, TestFunction, Units, Zero
 from saltus.flow import (
     ContactRegularity,
     EventKind,
+    SegmentColumn,
     SegmentValue,
     contact_regularity,
     load_segments,
 )
-from saltus.orbits.branches.beyond_grazing import inserted, other_side
+from saltus.orbits.branches.beyond_grazing import inserted, other_side, removed
 from saltus.orbits.branches.conditions import room
 from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test
 from saltus.orbits.branches.special_point import SpecialKind
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.proofs.one_contact_segments import one_contact_segments
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.systems import System, arguments_of, state_of
 from saltus.taylor import FREQUENCY
@@ -266,6 +270,32 @@ class OneContactEquations(OrbitEquations):
             return point.orbit.signature, point.solution.unknowns
         equations, unknowns = inserted(point)
         return equations.signature, unknowns
+
+    def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
+        return self._to_prove(solution, None)
+
+    def touching_segments(self, point: OrbitPoint) -> OrbitSegments | CannotProve:
+        """In the signature with fewer impacts."""
+        orbit = point.orbit
+        if orbit.slowest >= TOLERANCES.touch:
+            extremes = point.evaluation.extremes
+            segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
+            time = float(extremes[segment, SegmentColumn.LOWEST_GAP_TIME])
+            return self._to_prove(point.solution, time)
+        phases, speeds = self.impacts(point.solution)
+        time = float(phases[int(np.argmin(speeds))]) / orbit.frequency
+        shorter = removed(point)
+        if isinstance(shorter, End):
+            return CannotProve("the impacts that lose their speed leave no orbit without them")
+        fewer: OneContactEquations = shorter[0]
+        return fewer._to_prove(replace(point.solution, unknowns=shorter[1]), time)
+
+    def _to_prove(self, solution: Solution, touch: float | None) -> OrbitSegments | CannotProve:
+        if self.passes_contact:
+            return CannotProve("orbits that pass through their contact are not proved yet")
+        system = self.system_at(solution.values)
+        frequency = self.frequency(solution.values)
+        return one_contact_segments(system, self.signature, solution.unknowns, frequency, touch)
 
     def evaluate(
         self,

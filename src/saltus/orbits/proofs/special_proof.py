@@ -1,0 +1,250 @@
+"""The proof of a special point: a fold, a period doubling, a symmetry breaking or a grazing, with
+an enclosure of its parameter."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.bounds import (
+    Ball,
+    NotProved,
+    ProvedZero,
+    Shooting,
+    ShootingSettings,
+    Unknowns,
+    prove_zero,
+    rounded_ball,
+    rounded_down,
+    varied,
+)
+from saltus.bounds import only_one as only_one_of
+from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.proofs.orbit_proof import ASSUMPTIONS, MIRROR, shooting_of
+from saltus.orbits.proofs.segments import CannotProve
+from saltus.result import Result, result_dataset
+
+if TYPE_CHECKING:
+    import xarray
+
+MEANINGS = {
+    SpecialKind.LP: "a simple quadratic fold",
+    SpecialKind.PD: "a multiplier that passes -1 with speed",
+    SpecialKind.BPC: "a multiplier of the half period that passes -1 with speed",
+    SpecialKind.GR: "a quadratic contact without speed that the branch passes with speed",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpecialProof(Result):
+    """What is proved of a special point.
+
+    Attributes
+    ----------
+    proved
+        True, or None where it was not shown.
+    reason
+        Why it is not proved, or the empty text.
+    kind
+        The kind of the point.
+    path
+        The parameter along the branch.
+    parameter
+        Middle and radius of its value, (2,).
+    unique_within
+        No other orbit with this property has its parameter, times, speeds and kernel vector within
+        this.
+    only_within
+        The same, whatever the kernel vector: (parameter, unknowns); 0 where it was not shown.
+    assumptions
+        What is taken for granted.
+    seconds
+        The processor time.
+
+    Examples
+    --------
+    >>> saltus.prove(branch.special[0]).proved
+    True
+    """
+
+    proved: bool | None
+    reason: str
+    kind: str
+    path: str
+    parameter: np.ndarray
+    unique_within: float
+    only_within: float
+    assumptions: tuple[str, ...]
+    seconds: float
+    special: SpecialPoint = field(repr=False)
+    shooting: Shooting | None = field(default=None, repr=False)
+    zero: ProvedZero | None = field(default=None, repr=False)
+
+    def _facts(self) -> dict[str, Any]:
+        facts: dict[str, Any] = {"kind": self.kind, "proved": self.proved}
+        if self.reason:
+            facts["reason"] = self.reason
+        if self.zero is not None:
+            facts[self.path] = rounded_ball(*self.parameter)
+        return facts
+
+    @property
+    def statement(self) -> str:
+        """The theorem in one paragraph, all of its numbers rounded outward."""
+        if not self.proved:
+            return f"Nothing is proved: {self.reason}."
+        meaning = MEANINGS[SpecialKind[self.kind]]
+        model = type(self.special.orbit.system.model).__name__
+        orbit = self.special.orbit
+        return (
+            f"{model} has a periodic orbit of {orbit.period} forcing "
+            f"period{'s' * (orbit.period > 1)} with {meaning} ({self.kind}) at {self.path} = "
+            f"{rounded_ball(*self.parameter)}. No other one of this signature has its parameter, "
+            f"times, speeds and kernel vector within {rounded_down(self.unique_within, 2)} of it."
+        )
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The enclosure as a Dataset, with the statement as an attribute."""
+        columns = {
+            "parameter": ((), self.parameter[0], "1", "parameter"),
+            "parameter_radius": ((), self.parameter[1], "1", "its radius"),
+            "unique_within": ((), self.unique_within, "1", "radius of uniqueness"),
+        }
+        facts = {
+            "proved": "undecided" if self.proved is None else "true",
+            "special_kind": self.kind,
+            "path": self.path,
+            "reason": self.reason,
+            "statement": self.statement,
+            "assumptions": "; ".join(self.assumptions),
+        }
+        return result_dataset("special_proof", columns, system=self.special.orbit.system, **facts)
+
+
+def prove_special(
+    point: SpecialPoint,
+    within: dict[str, float] | None = None,
+    steps: ShootingSettings | None = None,
+) -> SpecialProof:
+    """The proof of a special point; `prove` says what it is."""
+    began = time.process_time()
+    orbit = point.orbit
+    paths = orbit.equations.paths
+    kinds = [kind.value for kind in MEANINGS]
+    path = paths[0] if paths else ""
+    if point.kind not in kinds:
+        reason = f"a {point.kind} is not proved yet; proved are {', '.join(kinds)}"
+        return _unproved(point, path, reason, began)
+    if len(paths) != 1:
+        return _unproved(point, path, "a point in two parameters is not proved yet", began)
+    grazes = point.kind == SpecialKind.GR
+    made = (
+        _touching(point, path, within, steps)
+        if grazes
+        else _singular(orbit, 1.0 if point.kind == SpecialKind.LP else -1.0, path, within, steps)
+    )
+    if isinstance(made, CannotProve):
+        return _unproved(point, path, made.reason, began)
+    zero = prove_zero(made)
+    if isinstance(zero, NotProved):
+        return _unproved(point, path, zero.reason, began)
+    opened = made.is_open(zero.enclosure, zero.box)
+    only = 0.0
+    if opened and not grazes:
+        box = only_one_of(made, zero)
+        only = 0.0 if box is None else float(box[: made.event_unknowns : made.event_size].min())
+    return SpecialProof(
+        proved=True if opened else None,
+        reason="" if opened else "the contact was not shown to be open between impacts",
+        kind=str(point.kind),
+        path=path,
+        parameter=np.array([zero.middle[-1], zero.radius[-1]]),
+        unique_within=float(zero.unique.min()),
+        only_within=only,
+        assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
+        seconds=time.process_time() - began,
+        special=point,
+        shooting=made,
+        zero=zero,
+    )
+
+
+def _singular(
+    orbit: PeriodicOrbit,
+    theta: float,
+    path: str,
+    within: dict[str, float] | None,
+    steps: ShootingSettings | None,
+) -> Shooting | CannotProve:
+    """The equations of an orbit with the multiplier `theta` at an unknown parameter, together with
+    its kernel vector, which one row pins (Moore and Spence 1980).
+    """
+    made = orbit.equations.segments_to_prove(orbit.solution)
+    if isinstance(made, CannotProve):
+        return made
+    kernel = _kernel(shooting_of(orbit, made, settings=steps), theta)
+    events, size = made.guess.shape
+    guess = np.concatenate([made.guess, kernel[: made.guess.size].reshape(events, size)], axis=1)
+    unknowns = Unknowns(orbit.equations.system_at(orbit.solution.values), made.free_time)
+    segments = [varied(segment, unknowns, 1.0) for segment in made.segments[:-1]]
+    segments.append(varied(made.segments[-1], unknowns, theta))
+    larger = replace(made, segments=tuple(segments), guess=guess)
+    probe = shooting_of(orbit, larger, path=path, within=within, pins=[], settings=steps)
+    row = np.zeros(probe.size)
+    for i in range(events):
+        row[2 * size * i + size : 2 * size * (i + 1)] = guess[i, size:]
+    probe.pins = [(row, float(row @ row))]
+    return probe
+
+
+def _kernel(plain: Shooting, theta: float) -> np.ndarray:
+    """The kernel vector of the equations that are closed with a factor `theta`; its largest entry
+    of an event is 1.
+    """
+    enclosure = plain.enclose(Ball(plain.x0))
+    matrix = enclosure.open_jacobian.middle.copy()
+    width = plain.event_size
+    matrix[:, :width] = theta * matrix[:, :width] + enclosure.start_jacobian.middle
+    kernel = np.linalg.svd(matrix)[2][-1]
+    return np.asarray(kernel / np.abs(kernel[: plain.event_unknowns]).max())
+
+
+def _touching(
+    point: SpecialPoint,
+    path: str,
+    within: dict[str, float] | None,
+    steps: ShootingSettings | None,
+) -> Shooting | CannotProve:
+    """The equations of an orbit that touches its contact at an unknown parameter: one event has no
+    jump, and one row pins its speed to 0.
+    """
+    orbit = point.orbit
+    equations: Any = orbit.equations
+    made = equations.touching_segments(point.point)
+    if isinstance(made, CannotProve):
+        return made
+    probe = shooting_of(orbit, made, path=path, within=within, pins=[], settings=steps)
+    assert made.touching is not None
+    row = np.zeros(probe.size)
+    row[made.guess.shape[1] * made.touching + 1] = 1.0
+    probe.pins = [(row, 0.0)]
+    return probe
+
+
+def _unproved(point: SpecialPoint, path: str, reason: str, began: float) -> SpecialProof:
+    return SpecialProof(
+        proved=None,
+        reason=reason,
+        kind=str(point.kind),
+        path=path,
+        parameter=np.array([point.parameter, np.inf]),
+        unique_within=0.0,
+        only_within=0.0,
+        assumptions=ASSUMPTIONS,
+        seconds=time.process_time() - began,
+        special=point,
+    )
