@@ -118,6 +118,15 @@ def test_the_page_refuses_what_python_refuses_in_the_same_sentence():
     assert 200 < refused < counted - 200
 
 
+def test_the_ends_of_a_restitution_are_0_and_1_whatever_else_is_1():
+    """The order of a harmonic is 1, too, and takes no fractions."""
+    for name in ("cell", "block", "stops", "pair"):
+        (path,) = [path for path in BOUNDS[name] if path.startswith("impact.e")]
+        for side, end in (("least", 0.0), ("most", 1.0)):
+            bound = BOUNDS[name][path][side]
+            assert (bound["end"], bound["taken"], bound.get("of")) == (end, True, None)
+
+
 def test_bounds_that_move_with_another_number_name_it():
     stops, cell = BOUNDS["stops"], BOUNDS["cell"]
     assert stops["model.left"]["most"]["of"] == "model.right"

@@ -162,8 +162,12 @@ class _NumberBounds:
             ):
                 continue
             moved = value + math.copysign(0.0625, self.value - value)
-            if self.refusal(value + 2 * (moved - value)) is None and _refusal(
-                self.system, {path: moved, self.path: 0.5 * (value + moved)}
+            beyond = {path: moved, self.path: 0.5 * (value + moved)}
+            # the other number alone may be moved there, unlike the order of a harmonic
+            if (
+                _refusal(self.system, {path: moved}) is None
+                and self.refusal(value + 2 * (moved - value)) is None
+                and _refusal(self.system, beyond)
             ):
                 bound |= {
                     "of": path,
