@@ -36,6 +36,6 @@ for (const { wasm, description: written, sweep } of JSON.parse(readFileSync(file
     const { up, down, jumps } = laboratory.result;
     swept = { said: sweepSaid(laboratory.result), up, down, jumps: jumps.map(({ way, from, to }) => [way, from.value, to.value]) };
   }
-  out.push({ ...said, sliders, swept });
+  out.push({ ...said, end: [...motion.end], stop: motion.stop, sliders, swept });
 }
 console.log(JSON.stringify(out));
