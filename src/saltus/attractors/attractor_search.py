@@ -266,7 +266,7 @@ class KnownAttractors:
 
     def _image(self, member: Attractor) -> int | None:
         """The label of the mirror image of an attractor."""
-        states = image_of(self.system.model, section_states(self.system, member.states, 0.5)[:, 0])
+        states = image_of(self.system, section_states(self.system, member.states, 0.5)[:, 0])
         if member.target.dense:
             for other in (known.target for known in self.members if known.target.dense):
                 if np.median(other.distance(states)) < other.grain:

@@ -16,6 +16,10 @@ from .load import Channel as Channel
 from .load import DeclaredLoad as DeclaredLoad
 from .load import Load as Load
 from .metainterface import Metainterface as Metainterface
+from .mirror import Mirror as Mirror
+from .mirror import image_of as image_of
+from .mirror import is_its_image_later as is_its_image_later
+from .mirror import mirror_of as mirror_of
 from .model import MarginKind as MarginKind
 from .model import Model as Model
 from .oscillators import RockingBlock as RockingBlock
@@ -67,6 +71,5 @@ from .states import states_beside as states_beside
 from .states import within_window as within_window
 from .system import System as System
 from .system import check_system as check_system
-from .system import image_of as image_of
 from .system_units import NaturalUnits as NaturalUnits
 from .system_units import natural_units as natural_units

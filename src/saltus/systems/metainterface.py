@@ -13,7 +13,7 @@ import numpy as np
 from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import MarginKind, Model, OneContactModel
+from saltus.systems.model import IMAGE_ROUNDING, MarginKind, Model, OneContactModel
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
 
 
@@ -201,7 +201,10 @@ class Metainterface(LayeredCell, OneContactModel):
         """
         ratio = 1 + self.mass_ratio
         channels = load.channels
-        same = self.stiffness_ratio == ratio and self.dissipation_ratio == ratio
+        same = all(
+            math.isclose(of_layers, ratio, rel_tol=IMAGE_ROUNDING)
+            for of_layers in (self.stiffness_ratio, self.dissipation_ratio)
+        )
         if not same or not all(
             _proportional(channels.get(f"lower_{name}"), channels.get(name), self.mass_ratio)
             for name in ("horizontal", "vertical")

@@ -29,6 +29,10 @@ class MarginKind(StrEnum):
     LIMIT = "limit"  #: the mechanism has no such positions
 
 
+# Numbers of mirror images may differ by this, relatively: through rounding alone.
+IMAGE_ROUNDING = 1e-11
+
+
 class Count(int):
     """A whole number of a part of a system that says how many of something there are, such as
     cells: it belongs to the structure, as names do, and is none of the numbers that have dotted

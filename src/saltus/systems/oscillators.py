@@ -13,7 +13,7 @@ from saltus.errors import ParameterError
 from saltus.systems.contact_model import Contact, ContactModel, Friction
 from saltus.systems.impact_laws import ImpactLaw, InelasticImpact
 from saltus.systems.load import Load, reversed_load
-from saltus.systems.model import MarginKind, OneContactModel
+from saltus.systems.model import IMAGE_ROUNDING, MarginKind, OneContactModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +142,8 @@ class TwoStops(ContactModel):
 
     def mirror(self, load: Load) -> Load | None:
         """The load with the force and the ground reversed, for d_1 = -d_2; None otherwise."""
-        return reversed_load(load, "force", "ground") if self.left == -self.right else None
+        same = math.isclose(-self.left, self.right, rel_tol=IMAGE_ROUNDING)
+        return reversed_load(load, "force", "ground") if same else None
 
     def kinetic_energy(self, t: Any, x: Any, velocity: Any, side: Any, load: Load) -> Any:
         """x'^2 / 2, of the motion relative to the ground."""

@@ -239,27 +239,14 @@ class System:
         ParameterError
             A `mirror` of the model that is no such symmetry, as a test at one state shows.
         """
-        load = self.model.mirror(self.load)
-        inner = self.in_gap_coordinates
-        if inner is not self:
-            return (
-                None
-                if inner.mirrored() is None
-                else System(model=self.model, load=load, impact=self.impact)
-            )
-        if load is None or self.contact_images is None:
-            return None
-        mirrored = System(model=self.model, load=load, impact=self.impact)
-        for side in self.model.every_side:
-            check_mirror(self, mirrored, side)
-        return mirrored
+        from saltus.systems.mirror import mirror_of
 
-    @property
-    def contact_images(self) -> tuple[int, ...] | None:
-        """The number of the mirror image of each contact, then of each friction; None if one has no
-        image or the laws differ.
-        """
-        return _contact_images(self.model, self.impact)
+        mirror = mirror_of(self)
+        return (
+            None
+            if mirror is None
+            else System(model=self.model, load=mirror.load, impact=self.impact)
+        )
 
     @property
     def one_contact(self) -> OneContactModel:
@@ -511,66 +498,6 @@ def image_places(model: Model) -> list[int]:
     is.
     """
     return [model.coordinates.index(name) for name in model.images]
-
-
-def image_of(model: Model, states: np.ndarray) -> np.ndarray:
-    """The mirror images of states (..., 2 coordinates), coordinates and then velocities."""
-    places = image_places(model)
-    n = len(model.coordinates)
-    return np.asarray(-states[..., [*places, *(n + place for place in places)]])
-
-
-def _contact_images(model: Model, impact: ImpactLaw) -> tuple[int, ...] | None:
-    """The index of the mirror image of each contact, then of each friction; None if one has no
-    image or the laws differ.
-    """
-    if model.surfaces or (isinstance(model, ContactModel) and model.jumps):
-        return None  # those of surfaces and of jumps are not looked for
-    contacts = model.contacts
-    frictions = model.frictions
-    count = len(model.contacts)
-    found = []
-    names = [contact.name for contact in contacts]
-    for contact in contacts:
-        wanted = (
-            model.images[model.coordinates.index(contact.coordinate)],
-            -contact.sign,
-            -float(contact.position),
-        )
-        same = [
-            i for i, c in enumerate(contacts) if (c.coordinate, c.sign, float(c.position)) == wanted
-        ]
-        found += same
-    for friction in frictions:
-        numbers = (
-            float(friction.kinetic),
-            float(friction.most),
-            friction.stribeck_speed,
-            -float(friction.ground_speed),
-        )
-        image = (model.images[model.coordinates.index(friction.coordinate)], *numbers)
-        for i, f in enumerate(frictions):
-            own = (
-                f.coordinate,
-                float(f.kinetic),
-                float(f.most),
-                f.stribeck_speed,
-                float(f.ground_speed),
-            )
-            pressed = [
-                names.index(each.contact) if each.contact else None for each in (friction, f)
-            ]
-            image_of_its_own = (
-                None if pressed[0] is None else dict(enumerate(found)).get(pressed[0], -1)
-            )
-            alike = image_of_its_own == pressed[1]
-            found += [count + i] if own == image and alike else []
-    if len(found) < count + len(frictions):
-        return None
-    if not count:
-        return tuple(found)  # frictions have no impact law
-    law = np.array(impact.restitution_matrix(model), dtype=float).reshape(count, count)
-    return tuple(found) if np.array_equal(law, law[np.ix_(found[:count], found[:count])]) else None
 
 
 def check_mirror(system: Any, mirrored: Any, side: int) -> None:

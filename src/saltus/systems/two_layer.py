@@ -15,7 +15,7 @@ from saltus.checks import check_count, settle_numbers
 from saltus.systems.contact_model import MOST_CONTACTS, Contact, ContactModel, reactions
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.metainterface import LayeredCell
-from saltus.systems.model import Count, MarginKind
+from saltus.systems.model import IMAGE_ROUNDING, Count, MarginKind
 from saltus.systems.signals import vanishes
 
 CONTACTS = (
@@ -101,8 +101,8 @@ class TwoLayer(LayeredCell, ContactModel):
         if (
             lower
             or self.mass_ratio != 0.0
-            or self.stiffness_ratio != 1.0
-            or self.dissipation_ratio != 1.0
+            or not math.isclose(self.stiffness_ratio, 1.0, rel_tol=IMAGE_ROUNDING)
+            or not math.isclose(self.dissipation_ratio, 1.0, rel_tol=IMAGE_ROUNDING)
         ):
             return None
         return reversed_load(load, "horizontal")

@@ -209,9 +209,7 @@ def _image(orbit: PeriodicOrbit) -> list[PeriodicOrbit]:
     """The mirror image of an orbit that is not its own."""
     if orbit.symmetric or not is_symmetric(orbit.system):
         return []
-    state = image_of(
-        orbit.system.model, section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0]
-    )
+    state = image_of(orbit.system, section_states(orbit.system, np.array([orbit.state]), 0.5)[0, 0])
     image = solved_orbit(orbit.system, state, orbit.period)
     return [] if image is None else [image]
 

@@ -18,7 +18,15 @@ from saltus.errors import ParameterError
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
-from saltus.systems import Constant, Harmonic, Load, Signal, System, check_system
+from saltus.systems import (
+    Constant,
+    Harmonic,
+    Load,
+    Signal,
+    System,
+    check_system,
+    is_its_image_later,
+)
 
 
 @answered
@@ -26,8 +34,8 @@ def is_symmetric(system: System) -> bool:
     """Whether the mirror image of every motion, half a forcing period later, is a motion too:
     -theta(t + T/2) for theta(t).
 
-    It is if the model has a mirror symmetry and the mirrored load is the load half a period later
-    (errata 18).
+    It is if the system has a mirror symmetry, declared by its model or found in its equations, and
+    the mirrored load is the load half a period later (errata 18).
 
     Parameters
     ----------
@@ -43,9 +51,10 @@ def is_symmetric(system: System) -> bool:
     mirrored = system.mirrored()
     if mirrored is None or system.load.period is None:
         return False
-    return all(
+    alike = all(
         _half_a_period_later(mirrored.load, system.load, name) for name in system.load.channels
     )
+    return alike and is_its_image_later(system)
 
 
 def _half_a_period_later(one: Load, other: Load, name: str) -> bool:

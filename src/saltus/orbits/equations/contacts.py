@@ -42,7 +42,7 @@ from saltus.orbits.equations.event_sequence import STAYS, read_signature
 from saltus.orbits.proofs.contact_segments import contact_segments
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
-from saltus.systems import System, arguments_of, held_values, image_of, mass_rows
+from saltus.systems import System, arguments_of, held_values, mass_rows
 from saltus.taylor import FREQUENCY
 
 # power of the time with which the gap grows after an impact with e = 0; after a release it is
@@ -419,8 +419,8 @@ class ContactsEquations(OrbitEquations):
         after = ends[-1, last : last + 2 * own]
         if self.signature.symmetric:
             slope, after = (
-                image_of(self.system.model, slope.T).T,
-                image_of(self.system.model, after),
+                self.image_of(slope.T).T,
+                self.image_of(after),
             )
         total = np.vstack([rows, slope[free]])
         here = total[:, :end_phase]
@@ -495,7 +495,7 @@ class ContactsEquations(OrbitEquations):
         state, phases = self.split(unknowns)
         place = SegmentEnd.NUMBERS + 8 * self.own
         later = solution.evaluation.ends[half - 1, place : place + 2 * self.own]
-        later = image_of(self.system.model, later) if odd else later
+        later = self.image_of(later) if odd else later
         first = self.joined(state, phases[:half])
         second = self.joined(later, phases[half:] - np.pi * signature.period)
         return np.stack([first, second])

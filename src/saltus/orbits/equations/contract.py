@@ -18,7 +18,7 @@ from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
-from saltus.systems import NaturalUnits, System, natural_units, numbers
+from saltus.systems import Mirror, NaturalUnits, System, mirror_of, natural_units, numbers
 from saltus.taylor import FREQUENCY, record_table
 
 # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to
@@ -565,11 +565,21 @@ class OrbitEquations(ABC):
         return type(self)(self.given, signature, self.paths, self.tol)
 
     @cached_property
+    def mirror(self) -> Mirror | None:
+        """The mirror symmetry of its system; None without one."""
+        return mirror_of(self.system)
+
+    @property
     def images(self) -> tuple[int, ...]:
-        """The number of the mirror image of each contact and friction; none where there is no such
-        symmetry.
+        """The number of the mirror image of each contact, friction and surface; none where there is
+        no such symmetry.
         """
-        return self.system.contact_images or ()
+        return () if self.mirror is None else self.mirror.parts
+
+    def image_of(self, states: np.ndarray) -> np.ndarray:
+        """The mirror images of states (..., 2 coordinates)."""
+        assert self.mirror is not None, "asked for where the symmetry is known alone"
+        return self.mirror.of(states)
 
     @cached_property
     def halved(self) -> Self:

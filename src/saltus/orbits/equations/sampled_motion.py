@@ -84,7 +84,7 @@ class SideModes:
 
     def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
         """The mirror images of the parts and the mode of an event; `images` are the numbers of the
-        images of contacts and frictions."""
+        images of contacts, frictions and surfaces."""
         return parts, 4 - mode
 
     def groups(self, position: Any, smooth: frozenset[int] = frozenset()) -> tuple[Group, ...]:
@@ -180,9 +180,19 @@ class ContactModes(SideModes):
         return modes_of(self.system.model, side)[1]
 
     def image(self, parts: int, mode: int, images: Sequence[int]) -> tuple[int, int]:
+        model = self.system.contact_model
         closed = self.closed(np.array(mode))
-        slides = self.slides(np.array(mode))
         count = len(closed)
+        # a surface is passed from its other side in the image: the direction along the coordinate
+        slides = [
+            *self.slides(np.array(mode)),
+            *(
+                surface.sign * side
+                for surface, side in zip(
+                    model.surfaces, modes_of(model, np.array(mode))[2], strict=True
+                )
+            ),
+        ]
         found = 1
         for is_closed, image in zip(closed, images[:count], strict=True):
             found += int(is_closed) << image

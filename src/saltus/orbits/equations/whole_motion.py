@@ -57,7 +57,7 @@ from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.progress import silent
-from saltus.systems import System, arguments_of, held_values, image_of, substitute
+from saltus.systems import System, arguments_of, held_values, substitute
 from saltus.taylor import FREQUENCY
 
 # A contact is closed at the section if its gap and the gap's rate are smaller than this there.
@@ -155,7 +155,7 @@ class WholeMotionEquations(OrbitEquations):
         if middle is None:
             found = self.halved.evaluate(unknowns, solution.values)
             return None if found is None else np.stack([unknowns, unknowns + found.residual])
-        return np.stack([unknowns, image_of(self.system.model, middle) if odd else middle])
+        return np.stack([unknowns, self.image_of(middle) if odd else middle])
 
     def nearest(
         self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
@@ -319,7 +319,7 @@ class WholeMotionEquations(OrbitEquations):
         if motion.limit is not None:
             return None
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
-        after = image_of(system.model, after) if self.signature.symmetric else after
+        after = self.image_of(after) if self.signature.symmetric else after
         after[self.following] = 0.0
         return np.asarray(after - unknowns)
 
@@ -346,7 +346,7 @@ class WholeMotionEquations(OrbitEquations):
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
-            before = image_of(system.model, rates) if self.signature.symmetric else rates
+            before = self.image_of(rates) if self.signature.symmetric else rates
             parameters[:, self.paths.index(FREQUENCY)] -= (
                 (rates - found.state @ before) * phase / frequency**2
             )
@@ -357,7 +357,7 @@ class WholeMotionEquations(OrbitEquations):
             state, parameters = state @ by_unknowns, parameters + state @ by_parameters
         if self.signature.symmetric:
             after, state, parameters = (
-                image_of(system.model, numbers.T).T for numbers in (after, state, parameters)
+                self.image_of(numbers.T).T for numbers in (after, state, parameters)
             )
         here = state[None].copy()
         there = -np.eye(len(after))[None]
@@ -396,9 +396,7 @@ class WholeMotionEquations(OrbitEquations):
             ]
         )
         states[:, self.following] = 0.0
-        states = np.where(
-            later[:, None], image_of(self.system.model, states) if later.any() else states, states
-        )
+        states = np.where(later[:, None], self.image_of(states) if later.any() else states, states)
         apart = np.abs((states - near) / self.natural.state).max(axis=1)
         return np.asarray(states[apart.argmin()])
 

@@ -509,9 +509,7 @@ def _section(orbit: PeriodicOrbit) -> np.ndarray:
     states = _at(motion, times)
     if not is_symmetric(orbit.system):
         return states
-    return np.concatenate(
-        [states, image_of(orbit.system.model, _at(motion, times + 0.5 * forcing))]
-    )
+    return np.concatenate([states, image_of(orbit.system, _at(motion, times + 0.5 * forcing))])
 
 
 def _at(motion: Motion, times: np.ndarray) -> np.ndarray:

@@ -1,0 +1,415 @@
+"""The mirror symmetry of a system: declared by its model and checked, or found from its equations."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import SaltusError
+from saltus.systems.contact_model import ContactModel, mass_rows, normal_forces
+from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.model import IMAGE_ROUNDING, Model
+from saltus.systems.signals import Constant, Harmonic, Signal, scaled
+from saltus.systems.system import System, check_mirror
+from saltus.systems.system_units import natural_units
+
+# Coordinates that a mirror image may swap are looked for among all pairings up to this number; of
+# more, the pairing of the first with the last one, of the second with the last but one, ... is
+# tried alone.
+MOST_PAIRED = 5
+PROBES = 128  # states at which the equations of an image are compared
+DECADES = 6.0  # their sizes lie so many powers of ten below and above the natural units
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A mirror symmetry, under which -q(t), with some coordinates swapped, is a motion under the
+    load `load` wherever q(t) is one of the system.
+
+    Attributes
+    ----------
+    load
+        The load of the mirror image.
+    places
+        For each coordinate of an image, the index of the original one whose negative it is.
+    parts
+        The number of the image of each contact, then of each friction, then of each surface.
+    """
+
+    load: Load
+    places: tuple[int, ...]
+    parts: tuple[int, ...]
+
+    def of(self, states: np.ndarray) -> np.ndarray:
+        """The images of states (..., 2 coordinates), coordinates and then velocities.
+
+        Parameters
+        ----------
+        states
+            The states.
+        """
+        n = len(self.places)
+        return np.asarray(-states[..., [*self.places, *(n + place for place in self.places)]])
+
+
+def mirror_of(system: System) -> Mirror | None:
+    """The mirror symmetry of a system, in its own coordinates; None without one. It is found once.
+
+    A model may declare it (`Model.mirror`); else it is looked for: contacts, frictions and surfaces
+    must be images of one another, and the equations must be those of the image at many states of
+    all sizes.
+
+    Parameters
+    ----------
+    system
+        What moves: as it was given, or `in_gap_coordinates`.
+
+    Raises
+    ------
+    ParameterError
+        A `mirror` of the model that is no such symmetry, as a test at one state shows.
+    """
+    found: Mirror | None = system._remembered(mirror_of, lambda: _mirror_of(system))
+    return found
+
+
+def image_of(system: System, states: np.ndarray) -> np.ndarray:
+    """The mirror images of states (..., 2 coordinates) of a system that has the symmetry.
+
+    Parameters
+    ----------
+    system
+        The system.
+    states
+        Coordinates, and then velocities.
+    """
+    mirror = mirror_of(system)
+    assert mirror is not None, "a system without mirror symmetry has no images"
+    return mirror.of(states)
+
+
+def is_its_image_later(system: System) -> bool:
+    """Whether the image of every motion, half a forcing period later, is a motion under the same
+    load, by the equations alone. Whether the loads are alike is for the caller to ask.
+
+    Parameters
+    ----------
+    system
+        What moves, with a mirror symmetry and under a load with a frequency.
+    """
+    inner = system.in_gap_coordinates
+    mirror = mirror_of(inner)
+    period = system.load.period
+    assert mirror is not None, "asked for a system with the symmetry alone"
+    assert period is not None, "asked for a load with a frequency alone"
+    if _is_declared(inner.model):
+        return True
+    same = Mirror(inner.load, mirror.places, mirror.parts)
+    return _moves_as_image(inner, same, 0.5 * period)
+
+
+def _mirror_of(system: System) -> Mirror | None:
+    model = system.model
+    inner = system.in_gap_coordinates
+    if _is_declared(model):
+        load = model.mirror(system.load)
+        if load is None:
+            return None
+        places = tuple(model.coordinates.index(name) for name in model.images)
+        if inner is not system:
+            known = mirror_of(inner)
+            return None if known is None else Mirror(load, places, known.parts)
+        parts = _images_of_parts(system, places)
+        if parts is None:
+            return None
+        mirrored = System(model=model, load=load, impact=system.impact)
+        for side in model.every_side:
+            check_mirror(system, mirrored, side)
+        mirror = Mirror(load, places, parts)
+        is_simple = not (model.surfaces or (isinstance(model, ContactModel) and model.jumps))
+        return mirror if is_simple or _moves_as_image(system, mirror) else None
+    if inner is not system:
+        return _of_given(system, inner)
+    for places in _pairings(model):
+        parts = _images_of_parts(system, places)
+        if parts is None:
+            continue
+        for load in _loads(system.load):
+            mirror = Mirror(load, places, parts)
+            if _moves_as_image(system, mirror):
+                return mirror
+    return None
+
+
+def _of_given(system: System, inner: System) -> Mirror | None:
+    """The mirror symmetry of a system in its own coordinates, from that of its gaps."""
+    known = None if getattr(inner.model, "is_nonlinear", False) else mirror_of(inner)
+    if known is None:
+        return None
+    n = len(system.model.coordinates)
+    gaps = np.random.default_rng(2).normal(size=2 * len(inner.model.coordinates))
+    state = np.concatenate(system.from_gaps(0.3, *np.split(gaps, 2)))
+    # the sums that follow from others are those of this state
+    gaps = np.concatenate(system.to_gaps(0.3, *np.split(state, 2)))
+    twin = System(model=system.model, load=known.load, impact=system.impact)
+    image = np.concatenate(twin.from_gaps(0.3, *np.split(known.of(gaps), 2)))
+    for places in _pairings(system.model):
+        mirror = Mirror(known.load, places, known.parts)
+        if np.abs(image - mirror.of(state)).max() < IMAGE_ROUNDING * n * np.abs(state).max():
+            return mirror
+    return None
+
+
+def _is_declared(model: Model) -> bool:
+    """Whether the class of a model has its own `mirror`."""
+    return bool(getattr(model, "own_class", type(model)).mirror is not Model.mirror)
+
+
+def _pairings(model: Model) -> Iterator[tuple[int, ...]]:
+    """Ways to swap coordinates, those that swap fewer first; those of first order are swapped
+    among themselves."""
+    n = len(model.coordinates)
+    moving = len(model.moving)
+    identity = tuple(range(n))
+    yield identity
+    if n > MOST_PAIRED:
+        yield (*reversed(range(moving)), *reversed(range(moving, n)))
+        return
+    pairings = (
+        places
+        for places in itertools.permutations(range(n))
+        if places != identity
+        and all(places[places[i]] == i for i in range(n))
+        and all((places[i] < moving) == (i < moving) for i in range(n))
+    )
+    yield from sorted(pairings, key=lambda places: sum(i != j for i, j in enumerate(places)))
+
+
+def _loads(load: Load) -> Iterator[Load]:
+    """Loads under which an image may move: each channel reversed, unless it is the same half a
+    period later; then all channels reversed."""
+    kept = {name for name, signal in load.channels.items() if _has_even_orders_alone(signal)}
+    for names in [kept, set()] if kept else [kept]:
+        signals = {
+            name: signal if name in names else scaled(signal, -1.0)
+            for name, signal in load.channels.items()
+        }
+        yield Load(frequency=load.frequency, **signals)
+
+
+def _has_even_orders_alone(signal: Signal) -> bool:
+    if isinstance(signal, Constant):
+        return True
+    if isinstance(signal, Harmonic):
+        return signal.order % 2 == 0 or not signal.amplitude
+    terms = getattr(signal, "terms", ())
+    return bool(terms) and all(_has_even_orders_alone(term) for term in terms)
+
+
+# --- contacts, frictions and surfaces ----------------------------------------
+
+
+def _images_of_parts(system: System, places: tuple[int, ...]) -> tuple[int, ...] | None:
+    """The number of the mirror image of each contact, friction and surface; None if one has no
+    image or the laws differ."""
+    model: Any = system.model
+    lengths = natural_units(system).lengths
+    names = model.coordinates
+
+    def same(a: Any, b: Any, size: float) -> bool:
+        rounding = IMAGE_ROUNDING * (abs(float(a)) + abs(float(b)) + IMAGE_ROUNDING * size)
+        return abs(float(a) - float(b)) <= rounding
+
+    def images_of(parts: Any, is_image: Callable[[Any, Any, int], bool]) -> list[int] | None:
+        """Each of the parts has another image; `is_image` knows the place of the coordinate."""
+        found = list[int]()
+        for part in parts:
+            # `places` is its own inverse: what acts on q_i acts on the coordinate of its image
+            place = places[names.index(part.coordinate)]
+            alike = (
+                number
+                for number, other in enumerate(parts)
+                if number not in found
+                and names.index(other.coordinate) == place
+                and is_image(part, other, place)
+            )
+            number = next(alike, None)
+            if number is None:
+                return None
+            found.append(number)
+        return found
+
+    def is_image_of_contact(one: Any, other: Any, place: int) -> bool:
+        return bool(one.sign == -other.sign) and same(-one.position, other.position, lengths[place])
+
+    def is_image_of_surface(one: Any, other: Any, place: int) -> bool:
+        return same(-one.position, other.position, lengths[place])
+
+    contacts = images_of(model.contacts, is_image_of_contact)
+    surfaces = images_of(model.surfaces, is_image_of_surface)
+    if contacts is None or surfaces is None:
+        return None
+    speed = natural_units(system).speed
+    contact_names = [contact.name for contact in model.contacts]
+
+    def is_image_of_friction(one: Any, other: Any, place: int) -> bool:
+        pressed = [
+            contact_names.index(friction.contact) if friction.contact else None
+            for friction in (one, other)
+        ]
+        image = None if pressed[0] is None else contacts[pressed[0]]
+        stribeck = [friction.stribeck_speed for friction in (one, other)]
+        return (
+            image == pressed[1]
+            and same(one.kinetic, other.kinetic, 0.0)
+            and same(one.most, other.most, 0.0)
+            and same(-one.ground_speed, other.ground_speed, speed)
+            and (stribeck[0] is None) == (stribeck[1] is None)
+            and (stribeck[0] is None or same(stribeck[0], stribeck[1], 0.0))
+        )
+
+    frictions = images_of(model.frictions, is_image_of_friction)
+    if frictions is None:
+        return None
+    count = len(contacts)
+    if count:
+        law = np.array(system.impact.restitution_matrix(model), dtype=float).reshape(count, count)
+        if not np.allclose(law, law[np.ix_(contacts, contacts)], rtol=IMAGE_ROUNDING, atol=0.0):
+            return None
+    later = count + len(frictions)
+    return (*contacts, *(count + i for i in frictions), *(later + i for i in surfaces))
+
+
+# --- equations ---------------------------------------------------------------
+
+
+def _moves_as_image(system: System, mirror: Mirror, later: float = 0.0) -> bool:
+    """Whether the equations at images of states, a time `later`, are the images of those at the
+    states, at many states of all sizes."""
+    try:
+        model = system.model
+        twin = System(model=model, load=mirror.load, impact=system.impact)
+        model.check_load(mirror.load)
+        with np.errstate(all="ignore"):
+            return all(
+                (-side in model.sides or not model.sides)
+                and _is_image(system, twin, mirror, side, later)
+                for side in model.every_side
+            )
+    # What cannot be evaluated at arrays, or is refused, has no symmetry that could be known.
+    except (SaltusError, ArithmeticError, TypeError, ValueError, IndexError):
+        return False
+
+
+def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: float) -> bool:
+    model: Any = system.model
+    n = len(model.coordinates)
+    units = natural_units(system)
+    random = np.random.default_rng(1)
+    t, sizes, speeds = (random.uniform(size=PROBES) for _ in range(3))
+    t = t * (units.time if system.load.period is None else system.load.period)
+    around = np.zeros(n)
+    if model.has_one_contact:
+        around[0] = float(model.contact)
+        if abs(around[0]) > IMAGE_ROUNDING * units.length:
+            return False  # the contact of an image is another one
+    q = random.normal(size=(n, PROBES)) * 10.0 ** (DECADES * (2.0 * sizes - 1.0))
+    v = random.normal(size=(n, PROBES)) * 10.0 ** (DECADES * (2.0 * speeds - 1.0))
+    q = q * units.lengths[:, None]
+    v = v * units.speeds[:, None]
+    inward = float(model.inward(side)) if model.sides else 1.0
+    if model.sides:
+        q = inward * np.abs(q)
+    places = list(mirror.places)
+    load, image_load = (DeclaredLoad(one.load, model) for one in (system, twin))
+    there = (t, _of(q), _of(v))
+    image = (t + later, _of(-q[places]), _of(-v[places]))
+    image_side = -side if model.sides else side
+    own = _rows(model.acceleration(*there, side, load), n)
+    other = _rows(model.acceleration(*image, image_side, image_load), n)
+    if not _alike(own[places], -other):
+        return False
+    if isinstance(model, ContactModel):
+        masses = [
+            np.array([_rows(row, n) for row in mass_rows(model, at, time, own_load)])
+            for time, at, own_load in ((t, there[1], load), (t + later, image[1], image_load))
+        ]
+        if not _alike(masses[0][np.ix_(places, places)], masses[1]):
+            return False
+        count = len(model.contacts)
+        pressing = _rows(normal_forces(model, *there, load), len(model.frictions))
+        pressed = _rows(normal_forces(model, *image, image_load), len(model.frictions))
+        frictions = [place - count for place in mirror.parts[count : count + len(model.frictions)]]
+        if not _alike(pressing, pressed[frictions]):
+            return False
+        if model.jumps and not _jumps_are_images(model, mirror, there, image):
+            return False
+    elif model.sides:
+        gaps = [_rows(model.gap(x, s), 1) for x, s in ((there[1], side), (image[1], image_side))]
+        if not _alike(*gaps):
+            return False
+        for i in range(0, PROBES, PROBES // 8):
+            speed = -inward * abs(float(v[0, i]))
+            after = model.reset(float(t[i]), speed, side, load, system.impact)
+            turned = model.reset(float(t[i]) + later, -speed, image_side, image_load, twin.impact)
+            if after[0] != -turned[0] or not _alike(_rows(after[1], 1), -_rows(turned[1], 1)):
+                return False
+    return _margins_are_alike(
+        model, (*there, _of(own), side, load), (*image, _of(other), image_side, image_load)
+    )
+
+
+def _jumps_are_images(model: Any, mirror: Mirror, there: Any, image: Any) -> bool:
+    """Whether coordinates of first order jump as their images at the impacts of all contacts."""
+    moving = len(model.moving)
+    later = [place - moving for place in mirror.places[moving:]]
+    for number, contact in enumerate(model.contacts):
+        other = model.contacts[mirror.parts[number]]
+        after = _rows(model.after_impact(contact.name, *there[1:]), len(later))
+        turned = _rows(model.after_impact(other.name, *image[1:]), len(later))
+        if not _alike(after[later], -turned):
+            return False
+    return True
+
+
+def _margins_are_alike(model: Any, there: Any, image: Any) -> bool:
+    """Whether each of the model's margins has the value of its image: half a period of an orbit
+    that is its own image then has its least values."""
+    own, other = model.margins(*there), model.margins(*image)
+    return all(_alike(_rows(own[name], 1), _rows(other[name], 1)) for name in own)
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether values (..., probes) are equal up to rounding of the largest one at each probe, and
+    nearly everywhere up to their own. Probes that are not finite do not count, but half of them
+    must be."""
+    if not one.size:
+        return True
+    one, other = (values.reshape(-1, values.shape[-1]) for values in (one, other))
+    sound = np.isfinite(one).all(axis=0) & np.isfinite(other).all(axis=0)
+    if 2 * np.count_nonzero(sound) < len(sound):
+        return False
+    apart = np.abs(one - other)[:, sound]
+    size = np.abs(one)[:, sound]
+    # a value that is a small difference of large ones has their rounding
+    by_own = np.count_nonzero(apart <= IMAGE_ROUNDING * size, axis=1)
+    return bool(
+        (apart <= IMAGE_ROUNDING * size.max(axis=0)).all()
+        and (10 * by_own >= 9 * size.shape[1]).all()
+    )
+
+
+def _of(values: np.ndarray) -> Any:
+    return values[0] if len(values) == 1 else tuple(values)
+
+
+def _rows(values: Any, count: int) -> np.ndarray:
+    """Numbers or arrays of one or several coordinates as rows (count, probes)."""
+    rows = values if isinstance(values, (tuple, list)) else [values]
+    return np.array(
+        [np.broadcast_to(np.asarray(row, dtype=float), PROBES) for row in rows]
+    ).reshape(count, PROBES)
