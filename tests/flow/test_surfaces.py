@@ -354,4 +354,4 @@ def test_surfaces_without_meaning_are_refused_when_the_system_is_made():
         )
     with pytest.raises(saltus.ParameterError, match="the sign of the surface 'a'"):
         Surface(name="a", coordinate="x", sign=0)
-    assert WELL.mirrored() is None
+    assert WELL.mirrored() == WELL

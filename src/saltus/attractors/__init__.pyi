@@ -20,3 +20,4 @@ from .phase_plane import equilibria as equilibria
 from .phase_plane import separatrices as separatrices
 from .saddle_manifolds import Manifold as Manifold
 from .saddle_manifolds import unstable_manifold as unstable_manifold
+from .stroboscopic_section import approached_orbit as approached_orbit

@@ -85,6 +85,7 @@ class CertificateSettings:
     defect: float = 1e-6
     # The largest distance from the states of a motion that approaches it slowly.
     slow: float = 1e-3
+    approach: int = 64  # Forcing periods over which such a motion must come nearer to it.
     neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
 
 
@@ -162,6 +163,38 @@ def certify(
         return Certificate(None, np.inf, within)
     apart = np.abs(states[:q] - orbit.section_state).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
+
+
+def approached_orbit(
+    system: System, state: np.ndarray, max_period: int, within: float
+) -> PeriodicOrbit | None:
+    """The stable orbit to which a motion from a state (d,) at phase 0 comes slowly, as beside a
+    period doubling or a torus; None where Newton's method finds none.
+
+    The motion must be near the orbit and come nearer to it.
+
+    Parameters
+    ----------
+    system
+        What moves, under a load with a frequency.
+    state
+        The state.
+    max_period
+        The longest period of the orbit, in forcing periods.
+    within
+        How far the motion may be from the orbit, as a share of the orbit's amplitude.
+    """
+    later = section_states(system, state[None], SETTINGS.approach, tol=1e-12)[0]
+    states = np.concatenate([[state], later])
+    orbit = solved_orbit(system, state, nearest_return(states[::-1], max_period))
+    if orbit is None or not orbit.stable or orbit.period > max_period:
+        return None
+    q = orbit.period
+    apart = np.abs(states - orbit.section_state).max(axis=1)
+    apart = apart[int(np.argmin(apart[:q])) :: q]  # at the phase of the orbit's own state
+    quarter = max(1, len(apart) // 4)
+    is_near = apart[0] <= within * orbit.amplitude
+    return orbit if is_near and apart[-quarter:].max() < apart[:quarter].max() else None
 
 
 def solved_orbit(

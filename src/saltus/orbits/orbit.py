@@ -381,10 +381,18 @@ class PeriodicOrbit(Result):
     def isolated(self) -> bool:
         """Whether no others lie beside it at the same parameters: there a multiplier is 1 and the
         equations leave a way free.
+
+        Beside a symmetric orbit there may be others that are not symmetric: two multipliers are 1
+        then, as where a mass flies freely, while it is one at a loss of the symmetry.
         """
-        near = np.abs(self.multipliers - 1.0).min() < TOLERANCES.isolated
-        rows = self.equations.in_units(self.solution.evaluation.derivatives())
-        return not near or not _free(rows)[0].size
+        near = np.count_nonzero(np.abs(self.multipliers - 1.0) < TOLERANCES.isolated)
+        evaluation = self.solution.evaluation
+        if not near:
+            return True
+        matrices = [evaluation.derivatives()]
+        if self.symmetric and near > 1:
+            matrices.append(evaluation.jacobian(-1.0))
+        return not any(_free(self.equations.in_units(matrix))[0].size for matrix in matrices)
 
     @property
     def stable(self) -> bool:

@@ -5,23 +5,29 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.errors import SaltusError
+from saltus.errors import ParameterError, SaltusError
 from saltus.systems.contact_model import ContactModel, mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import IMAGE_ROUNDING, Model
 from saltus.systems.signals import Constant, Harmonic, Signal, scaled
-from saltus.systems.system import System, check_mirror
 from saltus.systems.system_units import natural_units
+
+if TYPE_CHECKING:
+    from saltus.systems.system import System
 
 # Coordinates that a mirror image may swap are looked for among all pairings up to this number; of
 # more, the pairing of the first with the last one, of the second with the last but one, ... is
 # tried alone.
 MOST_PAIRED = 5
 PROBES = 128  # states at which the equations of an image are compared
+# An arbitrary time, gap and velocity, at which a declared mirror is tested, and the relative
+# differences that rounding may make there.
+PROBE = (0.3711, 0.2931, 0.6173)
+DECLARED_ROUNDING = 1e-9
 DECADES = 6.0  # their sizes lie so many powers of ten below and above the natural units
 
 
@@ -106,7 +112,7 @@ def is_its_image_later(system: System) -> bool:
     period = system.load.period
     assert mirror is not None, "asked for a system with the symmetry alone"
     assert period is not None, "asked for a load with a frequency alone"
-    if _is_declared(inner.model):
+    if declares_mirror(inner.model):
         return True
     same = Mirror(inner.load, mirror.places, mirror.parts)
     return _moves_as_image(inner, same, 0.5 * period)
@@ -115,7 +121,7 @@ def is_its_image_later(system: System) -> bool:
 def _mirror_of(system: System) -> Mirror | None:
     model = system.model
     inner = system.in_gap_coordinates
-    if _is_declared(model):
+    if declares_mirror(model):
         load = model.mirror(system.load)
         if load is None:
             return None
@@ -126,9 +132,9 @@ def _mirror_of(system: System) -> Mirror | None:
         parts = _images_of_parts(system, places)
         if parts is None:
             return None
-        mirrored = System(model=model, load=load, impact=system.impact)
+        mirrored = system.with_(load=load)
         for side in model.every_side:
-            check_mirror(system, mirrored, side)
+            _check_declared(system, mirrored, side)
         mirror = Mirror(load, places, parts)
         is_simple = not (model.surfaces or (isinstance(model, ContactModel) and model.jumps))
         return mirror if is_simple or _moves_as_image(system, mirror) else None
@@ -155,7 +161,7 @@ def _of_given(system: System, inner: System) -> Mirror | None:
     state = np.concatenate(system.from_gaps(0.3, *np.split(gaps, 2)))
     # the sums that follow from others are those of this state
     gaps = np.concatenate(system.to_gaps(0.3, *np.split(state, 2)))
-    twin = System(model=system.model, load=known.load, impact=system.impact)
+    twin = system.with_(load=known.load)
     image = np.concatenate(twin.from_gaps(0.3, *np.split(known.of(gaps), 2)))
     for places in _pairings(system.model):
         mirror = Mirror(known.load, places, known.parts)
@@ -164,8 +170,14 @@ def _of_given(system: System, inner: System) -> Mirror | None:
     return None
 
 
-def _is_declared(model: Model) -> bool:
-    """Whether the class of a model has its own `mirror`."""
+def declares_mirror(model: Model) -> bool:
+    """Whether the class of a model has its own `mirror`.
+
+    Parameters
+    ----------
+    model
+        The model.
+    """
     return bool(getattr(model, "own_class", type(model)).mirror is not Model.mirror)
 
 
@@ -292,7 +304,7 @@ def _moves_as_image(system: System, mirror: Mirror, later: float = 0.0) -> bool:
     states, at many states of all sizes."""
     try:
         model = system.model
-        twin = System(model=model, load=mirror.load, impact=system.impact)
+        twin = system.with_(load=mirror.load)
         model.check_load(mirror.load)
         with np.errstate(all="ignore"):
             return all(
@@ -413,3 +425,71 @@ def _rows(values: Any, count: int) -> np.ndarray:
     return np.array(
         [np.broadcast_to(np.asarray(row, dtype=float), PROBES) for row in rows]
     ).reshape(count, PROBES)
+
+
+# --- declared ----------------------------------------------------------------
+
+
+def _check_declared(system: System, mirrored: System, side: int) -> None:
+    """Refuse a mirrored system in which the mirror image of a state does not move as the mirror
+    image of the state's motion.
+
+    Raises
+    ------
+    ParameterError
+        The error names the class of the model.
+    """
+    model: Any = system.model
+    (t, distance, v) = PROBE
+    count = len(model.coordinates)
+    places = [model.coordinates.index(name) for name in model.images]
+    if count == 1:
+        into = model.inward(side) if model.sides else 1.0
+        at = [model.contact + into * distance]
+    else:
+        at = [distance / (1 + i) for i in range(count)]
+    rates = [v / (1 + i) for i in range(count)]
+    there = _each(
+        model.acceleration(t, _scalar_or_tuple(at), _scalar_or_tuple(rates), side, system.load)
+    )
+    image = _each(
+        model.acceleration(
+            t,
+            _scalar_or_tuple([-at[i] for i in places]),
+            _scalar_or_tuple([-rates[i] for i in places]),
+            -side,
+            mirrored.load,
+        )
+    )
+    pairs = [(there[i], x) for i, x in zip(places, image, strict=True)]
+    names = [friction.coordinate for friction in model.frictions]
+    pressing = normal_forces(model, t, _scalar_or_tuple(at), _scalar_or_tuple(rates), system.load)
+    pressed = normal_forces(
+        model,
+        t,
+        _scalar_or_tuple([-at[i] for i in places]),
+        _scalar_or_tuple([-rates[i] for i in places]),
+        mirrored.load,
+    )
+    pairs += [
+        (pressing[names.index(model.images[model.coordinates.index(c)])], -n)
+        for c, n in zip(names, pressed, strict=True)
+    ]
+    if model.sides:
+        pairs.append((model.gap(at[0], side), -model.gap(-at[0], -side)))
+        inward = -into * v
+        one = model.reset(t, inward, side, system.load, system.impact)
+        pairs += zip(one, model.reset(t, -inward, -side, mirrored.load, system.impact), strict=True)
+    if any(abs(float(a) + float(b)) > DECLARED_ROUNDING * (1.0 + abs(float(a))) for a, b in pairs):
+        raise ParameterError(
+            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of coordinate, velocity and side "
+            "turned, the load that it returns does not turn the sign of the acceleration; return None where there is none"
+        )
+
+
+def _scalar_or_tuple(values: list[Any]) -> Any:
+    return values[0] if len(values) == 1 else tuple(values)
+
+
+def _each(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (tuple, list)) else [value]

@@ -307,6 +307,9 @@ class Model:
         """The load under which -theta(t) is a motion wherever theta(t) is one under `load`, or None
         without such a symmetry.
 
+        A class that does not define it has its symmetry found from its equations
+        (`saltus.systems.mirror_of`).
+
         a(t, -theta, -theta', -side, mirrored load) = -a(t, theta, theta', side, load) must hold,
         and the same for the reset; this is checked at one state, and a mirror for which it does not
         hold is refused.

@@ -15,10 +15,11 @@ from saltus.checks import Numbers
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.progress import html_table
-from saltus.systems.contact_model import ContactModel, normal_forces
+from saltus.systems.contact_model import ContactModel
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.mirror import mirror_of
 from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_works
 from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
@@ -239,8 +240,6 @@ class System:
         ParameterError
             A `mirror` of the model that is no such symmetry, as a test at one state shows.
         """
-        from saltus.systems.mirror import mirror_of
-
         mirror = mirror_of(self)
         return (
             None
@@ -485,71 +484,3 @@ def check_system(
             f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
             "system",
         )
-
-
-# An arbitrary time, gap and velocity, at which equations that differ have different values.
-PROBE = (0.3711, 0.2931, 0.6173)
-# Accelerations and velocities of mirror images may differ by this, relatively, through rounding.
-MIRROR_ROUNDING = 1e-9
-
-
-def image_places(model: Model) -> list[int]:
-    """For each coordinate of a mirror image, the index of the original coordinate whose negative it
-    is.
-    """
-    return [model.coordinates.index(name) for name in model.images]
-
-
-def check_mirror(system: Any, mirrored: Any, side: int) -> None:
-    """Refuse a mirrored system in which the mirror image of a state does not move as the mirror
-    image of the state's motion.
-
-    Raises
-    ------
-    ParameterError
-        The error names the class of the model.
-    """
-    model = system.model
-    (t, distance, v) = PROBE
-    count = len(model.coordinates)
-    places = image_places(model)
-    if count == 1:
-        into = model.inward(side) if model.sides else 1.0
-        at = [model.contact + into * distance]
-    else:
-        at = [distance / (1 + i) for i in range(count)]
-    rates = [v / (1 + i) for i in range(count)]
-    there = _each(model.acceleration(t, _of(at), _of(rates), side, system.load))
-    image = _each(
-        model.acceleration(
-            t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), -side, mirrored.load
-        )
-    )
-    pairs = [(there[i], x) for i, x in zip(places, image, strict=True)]
-    names = [friction.coordinate for friction in model.frictions]
-    pressing = normal_forces(model, t, _of(at), _of(rates), system.load)
-    pressed = normal_forces(
-        model, t, _of([-at[i] for i in places]), _of([-rates[i] for i in places]), mirrored.load
-    )
-    pairs += [
-        (pressing[names.index(model.images[model.coordinates.index(c)])], -n)
-        for c, n in zip(names, pressed, strict=True)
-    ]
-    if model.sides:
-        pairs.append((model.gap(at[0], side), -model.gap(-at[0], -side)))
-        inward = -into * v
-        one = model.reset(t, inward, side, system.load, system.impact)
-        pairs += zip(one, model.reset(t, -inward, -side, mirrored.load, system.impact), strict=True)
-    if any(abs(float(a) + float(b)) > MIRROR_ROUNDING * (1.0 + abs(float(a))) for a, b in pairs):
-        raise ParameterError(
-            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of coordinate, velocity and side "
-            "turned, the load that it returns does not turn the sign of the acceleration; return None where there is none"
-        )
-
-
-def _of(values: list[Any]) -> Any:
-    return values[0] if len(values) == 1 else tuple(values)
-
-
-def _each(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, (tuple, list)) else [value]

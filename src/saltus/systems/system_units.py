@@ -10,14 +10,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from saltus.systems.contact_model import mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import Jet, each_of
-from saltus.systems.system import System
+
+if TYPE_CHECKING:
+    from saltus.systems.system import System
 
 # Instants at which a load is looked at. Mean squares over so many equal parts of a period are exact
 # for harmonics up to the third, whatever the phase.

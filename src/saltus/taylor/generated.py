@@ -22,7 +22,7 @@ import llvmlite
 from llvmlite import binding, ir
 
 from saltus.errors import SaltusError
-from saltus.systems import System
+from saltus.systems import System, declares_mirror
 from saltus.taylor import graph, load_tables, memory, numba_types, rules, series, vectors
 from saltus.taylor.cache import digest, kept_bytes, loading, source_of, structure_key
 from saltus.taylor.graph import LEAVES, Expr
@@ -459,8 +459,9 @@ _known: dict[Any, dict[str, str]] = {}
 
 def _other_parts(system: System) -> dict[str, str]:
     """The digests of the parts that are not traced."""
-    mirrored = system.mirrored()
     model = system.model
+    # a symmetry that is found follows from the other parts
+    mirrored = system.mirrored() if declares_mirror(model) else None
     names = (model.coordinates, model.units, model.channels, model.sides, model.stops)
     return {
         "mirror": digest(repr(mirrored and mirrored.to_dict()["load"])),

@@ -14,7 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from saltus.attractors import JUDGEMENT, EarlierJudgement, Judged, JudgementSettings, judge
+from saltus.attractors import (
+    JUDGEMENT,
+    EarlierJudgement,
+    Judged,
+    JudgementSettings,
+    SettledLater,
+    approached_orbit,
+    judge,
+)
 from saltus.flow import Ending, Recurrence
 from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import (
@@ -62,6 +70,7 @@ class CellVerdicts:
             found.settled,
         )
         self._confirm(request, parameters, found)
+        self._solve_slow(request, parameters, found)
         longer = np.unique(self.settled.question[self.settled.period > request.max_period])
         # A transient to an orbit of a longer period than the chart looks for leads to none of its
         # motions.
@@ -102,6 +111,34 @@ class CellVerdicts:
             self.settled = self.settled.joined(
                 replace(again.settled, question=rows[again.settled.question])
             )
+
+    def _solve_slow(
+        self, request: ChartRequest, parameters: Mapping[str, np.ndarray], found: Judged
+    ) -> None:
+        """Solve for the orbits to which motions come that have not settled and whose exponent is
+        not surely positive: beside a period doubling or a torus they take thousands of periods.
+
+        An orbit counts if it is stable, near the motion's last state, and nearer to its states
+        later.
+        """
+        no_period = (self.verdict == Ending.UNDECIDED) | (
+            (self.verdict == Ending.PERIODIC) & (found.period == 0)
+        )
+        asked = no_period & (self.exponent - self.error <= 0.0)
+        asked[self.settled.question] = False
+        for row in np.flatnonzero(asked):
+            system = request.system.with_(
+                {path: float(values[row]) for path, values in parameters.items()}
+            )
+            orbit = approached_orbit(system, found.states[row, 0], request.max_period, ALIKE.alike)
+            if orbit is not None:
+                self.verdict[row] = Ending.PERIODIC
+                found.period[row] = orbit.period
+                self.settled = self.settled.joined(
+                    SettledLater(
+                        np.array([row]), orbit.section_state[None], np.array([orbit.period])
+                    )
+                )
 
     def _beside_no_chaos(self, shape: tuple[int, int]) -> np.ndarray:
         """Whether there is chaos in a cell, and none in one of the four beside it."""

@@ -1,0 +1,227 @@
+"""The mirror symmetry of a system, found from its equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus.orbits import is_symmetric
+from saltus.systems import image_of, mirror_of
+from saltus.systems.load import reversed_load
+
+STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Absorber(saltus.ContactModel):
+    """A mass on a spring with a mass between two stops in it."""
+
+    mass: float = 0.2
+    left: float = 0.4
+    right: float = 0.4
+    static: float = 0.0
+    even: float = 0.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        apart = {"y": 1.0, "x": -1.0}
+        return (
+            saltus.Contact(name="left", coordinate=apart, position=-self.left),
+            saltus.Contact(name="right", coordinate=apart, position=self.right, sign=-1),
+        )
+
+    def mass_matrix(self, q: Any) -> Any:
+        return [[1.0, 0.0], [0.0, self.mass]]
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        push = 0.2 * (q[0] - q[1]) + 0.01 * (v[0] - v[1])
+        own = -q[0] - 0.05 * v[0] - self.even * q[0] ** 2
+        return load.force(t) + self.static + own - push, push
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declared(Absorber):
+    def mirror(self, load: Any) -> Any:
+        return reversed_load(load, "force")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swapped(saltus.ContactModel):
+    """Two alike masses, each before a stop of its own: the mirror swaps them."""
+
+    second: float = 1.0
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        return (
+            saltus.Contact(name="low", coordinate="a", position=-1.0),
+            saltus.Contact(name="high", coordinate="b", position=self.second, sign=-1),
+        )
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        (a, b), push = q, load.force(t)
+        return push - a + 0.3 * (b - a) - 0.1 * v[0], push - b + 0.3 * (a - b) - 0.1 * v[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Smooth(saltus.Model):
+    """A Duffing oscillator with a further force far away, beyond `stop`."""
+
+    even: float = 0.0
+    far: float = 0.0
+    stop: float = 2000.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def acceleration(self, t: Any, x: Any, velocity: Any, side: Any, load: Any) -> Any:
+        beyond = 1.0 + np.tanh(x - self.stop)
+        return load.force(t) - 0.1 * velocity - x - x**3 - self.even * x**2 - self.far * beyond
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rubbing(saltus.ContactModel):
+    """Two masses on a floor, with friction on it and between them."""
+
+    speed: float = 0.0
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        return (
+            saltus.Friction(
+                name="floor", coordinate="x", kinetic=0.1, static=0.2, ground_speed=self.speed
+            ),
+            saltus.Friction(name="joint", coordinate={"y": 1.0, "x": -1.0}, kinetic=0.1),
+        )
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        return load.force(t) - q[0], -q[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walls(saltus.ContactModel):
+    """A mass between two walls that move with the ground."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("ground",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        apart = {"x": 1.0, "ground": -1.0}
+        return (
+            saltus.Contact(name="left", coordinate=apart, position=-1.0),
+            saltus.Contact(name="right", coordinate=apart, position=1.0, sign=-1),
+        )
+
+    def force(self, t: Any, x: Any, velocity: Any, load: Any) -> Any:
+        return -0.1 * velocity - x
+
+
+def structure(stiffness: float = 0.3, right: float = 0.5) -> saltus.Structure:
+    """Two masses between hard stops and springs with a gap."""
+    return saltus.Structure(
+        mass=np.eye(2),
+        damping=0.05 * STIFFNESS,
+        stiffness=STIFFNESS,
+        contacts=[
+            saltus.Contact(name="left", coordinate=1, position=-0.5),
+            saltus.Contact(name="right", coordinate=1, position=right, sign=-1),
+        ],
+        surfaces=[
+            saltus.Surface(name="one", coordinate=0, position=-0.3, sign=-1, stiffness=0.3),
+            saltus.Surface(name="other", coordinate=0, position=0.3, stiffness=stiffness),
+        ],
+        forces={"force": 1},
+    )
+
+
+def under(model: Any, channel: str = "force", **signal: float) -> saltus.System:
+    load = {channel: saltus.Harmonic(**{"amplitude": 0.3} | signal)}
+    law = {"impact": saltus.NewtonImpact(e=0.7)} if getattr(model, "contacts", ()) else {}
+    return saltus.System(model=model, load=saltus.Load(frequency=0.7, **load), **law)
+
+
+SYMMETRIC = {
+    "two contacts of a sum": under(Absorber()),
+    "rounded": under(Absorber(left=0.4 * (1 + 1e-13), right=0.4 * (1 - 1e-13))),
+    "two stops, rounded": under(saltus.TwoStops(left=-1.0, right=1.0 + 1e-13)),
+    "swapped": under(Swapped()),
+    "smooth": under(Smooth()),
+    "third harmonic": under(Smooth(), order=3),
+    "frictions": under(Rubbing()),
+    "walls that move": under(Walls(), "ground"),
+    "structure": under(structure()),
+}
+OTHER = {
+    "stops": under(Absorber(left=0.41)),
+    "static force": under(Absorber(static=1e-9)),
+    "even spring": under(Absorber(even=1e-6)),
+    "mean of the load": under(Absorber(), mean=1e-9),
+    "second harmonic": under(Absorber(), order=2),
+    "stop of one of two": under(Swapped(second=1.1)),
+    "even term": under(Smooth(even=1e-3)),
+    "force far away": under(Smooth(far=1.0)),
+    "belt that moves": under(Rubbing(speed=1e-3)),
+    "walls beside the middle": under(Walls(), "ground", mean=0.2),
+    "soft stops": under(structure(stiffness=0.31)),
+    "hard stops": under(structure(right=0.51)),
+    "laws": under(Absorber()).with_(impact=saltus.NewtonImpact(e=(0.7, 0.6))),
+}
+
+
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_the_image_of_a_motion_half_a_period_later_is_a_motion(name: str) -> None:
+    system = SYMMETRIC[name]
+    assert is_symmetric(system)
+    n = len(system.model.coordinates)
+    state = np.random.default_rng(5).uniform(-0.2, 0.2, 2 * n)
+    period = system.load.period
+    ends = []
+    for begin, time in ((state, 0.0), (image_of(system, state), 0.5 * period)):
+        names = dict(zip(system.model.coordinates, begin[:n].tolist(), strict=True))
+        velocity = begin[n] if n == 1 else tuple(begin[n:].tolist())
+        motion = saltus.simulate(system, **names, velocity=velocity, time=time, periods=3)
+        ends.append(motion.final_state)
+    np.testing.assert_allclose(image_of(system, ends[0]), ends[1], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_what_breaks_the_symmetry_is_seen(name: str) -> None:
+    assert not is_symmetric(OTHER[name])
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e6])
+def test_units_do_not_matter(scale: float) -> None:
+    """Lengths in other units: the same answers, for a mean that is 1e-9 of the amplitude too."""
+    model = saltus.TwoStops(left=-scale, right=scale)
+    assert is_symmetric(under(model, amplitude=0.3 * scale))
+    assert not is_symmetric(under(model, amplitude=0.3 * scale, mean=0.3e-9 * scale))
+    assert not is_symmetric(under(saltus.TwoStops(left=-scale, right=1.001 * scale)))
+
+
+def test_a_mirror_that_is_found_is_the_one_that_is_declared() -> None:
+    found, declared = mirror_of(under(Absorber())), mirror_of(under(Declared()))
+    assert found == declared
+    assert found is not None
+    assert found.parts == (1, 0)
+
+
+def test_a_declared_mirror_that_is_none_is_refused_and_one_that_is_not_given_is_kept() -> None:
+    with pytest.raises(saltus.errors.ParameterError, match="no symmetry of its equations"):
+        mirror_of(under(Declared(even=0.3)))
+
+    @dataclass(frozen=True, kw_only=True)
+    class Without(Absorber):
+        def mirror(self, load: Any) -> Any:
+            return None
+
+    assert mirror_of(under(Without())) is None
