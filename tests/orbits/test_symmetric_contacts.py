@@ -166,7 +166,9 @@ def test_motions_that_leave_walls_without_speed_fold_stick_and_graze_where_the_c
     assert [place for place, _ in found] == pytest.approx(
         [place for place, _ in expected], abs=1e-10
     )
-    assert [end.reason for end in branch.ends] == [CurveEnd.BOUND] * 2
+    # without an impact the mass may move anywhere between the walls
+    assert [end.reason for end in branch.ends] == [OrbitEnd.NOT_ISOLATED, CurveEnd.BOUND]
+    assert branch.ends[0].parameter == pytest.approx(1.0, abs=1e-10)
     for other in branch.orbits:
         # that which touches a wall at phase 0 can be started there, too
         assert other.grazes or other.defect < 1e-9
