@@ -372,6 +372,32 @@ def test_a_rod_that_slides_is_refused_where_painleves_paradox_begins(mu):
     assert bool(refused) == (mu > 4.0 / 3.0)
 
 
+@pytest.mark.parametrize("mu", [1.2, 1.5])
+def test_a_start_at_which_several_reactions_are_possible_is_refused(mu):
+    """A rod that turns so fast that its end would lift off without a reaction: it does where the
+    number is positive, and else a reaction that presses it on the floor is possible besides."""
+    model = UniformRod(mu=mu)
+    system, angle = (
+        saltus.System(model=model, impact=saltus.NewtonImpact(e=0.5)),
+        float(np.arctan(2)),
+    )
+    seen = set()
+    for way in (1.0, -1.0):
+        q, v = (0.0, 0.0, angle), (way, 0.0, 2.0)
+        free = np.linalg.solve(model.mass_matrix(q), model.force(0.0, q, v, None))
+        assert free[1] > 0.1
+        start = {"x": 0.0, "y": 0.0, "angle": angle, "velocity": v}
+        is_unique = painleve(mu, angle, way) > 0.0
+        seen.add(is_unique)
+        if is_unique:
+            motion = saltus.simulate(system, **start, duration=1e-3)
+            assert motion.y == pytest.approx(free[1] * 5e-7, rel=1e-2)
+        else:
+            with pytest.raises(saltus.MotionError, match="no reaction is possible or several are"):
+                saltus.simulate(system, **start, duration=1e-3)
+    assert seen == ({True, False} if mu > 4.0 / 3.0 else {True})
+
+
 @pytest.mark.parametrize(("tangent", "way"), [(1.0, -1.0), (3.6, -1.0), (30.0, 1.0)])
 def test_the_motion_of_a_rod_ends_by_name_at_the_angle_where_the_paradox_begins(tangent, way):
     """tan^2 - 3 mu tan + 4 = 0, in whichever direction its end would slide if it did not stick."""

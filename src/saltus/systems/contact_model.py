@@ -462,6 +462,9 @@ class ContactModel(Model):
         """The normal force N of each friction; the motion ends where one is not positive. By
         default it is 1, so that mu N is mu.
 
+        There is one number for each friction, in their order; that of a friction in a contact is
+        not used, as the contact's reaction presses it.
+
         Parameters
         ----------
         t

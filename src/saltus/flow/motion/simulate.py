@@ -371,7 +371,20 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
     status, numbers = _advance(request, made, now, recorder, progress)
     if run is None and status == Status.DONE and recorder.is_short:
         remember(request, made)
-    return Followed(_collect(request, now, status, numbers, recorder), now, recorder)
+    motion = _collect(request, now, status, numbers, recorder)
+    if motion.limit is not None and motion.time == motion.start:
+        _refuse_paradox(motion)
+    return Followed(motion, now, recorder)
+
+
+def _refuse_paradox(motion: Motion) -> None:
+    """Refuse a start at which a contact with friction has no reaction or several."""
+    model: Any = motion.system.model
+    pressed = [friction.limit for friction in model.frictions if friction.contact is not None]
+    if motion.limit in pressed:
+        state = tuple(np.atleast_1d(motion.position)), tuple(np.atleast_1d(motion.velocity))
+        if sentence := paradox(motion.system, motion.time, state):
+            raise MotionError(sentence)
 
 
 def _advance(

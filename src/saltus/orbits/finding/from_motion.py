@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_count, check_names
+from saltus.checks import Numbers, check_count, check_names, check_number
 from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
@@ -69,6 +69,8 @@ def find_orbit(
     settle: int | None = None,
     max_period: int = SETTINGS.max_period,
     parameters: tuple[str, ...] = (),
+    time: float = 0.0,
+    side: int | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> PeriodicOrbit:
@@ -83,7 +85,7 @@ def find_orbit(
     system
         What moves, under a load with a frequency.
     velocity, coordinates
-        The state at phase 0, by the model's names: theta=0.3.
+        The state at `time`, by the model's names: theta=0.3.
     period
         The period of the orbit in forcing periods; by default the shortest one, up to `max_period`,
         after which the motion returns.
@@ -95,6 +97,9 @@ def find_orbit(
     parameters
         Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which
         adds its own.
+    time, side
+        The time at the start, phase 0 by default, and the side to which the motion goes from a
+        contact, as `simulate` takes them: `find_orbit(system, **orbit.start())` begins on an orbit.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -113,9 +118,11 @@ def find_orbit(
     """
     counts = {"period": period, "max_period": max_period, "settle": settle}
     _check(system, parameters, counts)
-    state = arguments_of(
-        system, read_start(system, velocity, coordinates, ("parameters", "progress", *counts))
-    )
+    check_number("time", time)
+    others = ("parameters", "time", "side", "progress", *counts)
+    state = arguments_of(system, read_start(system, velocity, coordinates, others, time))
+    if side is not None or time:
+        state = _at_phase_0(system, state, time, side)
     progress(0.0, "following the motion")
     # refuses systems that have no orbits
     base = equations_of(system, Signature((), 1), tuple(parameters))
@@ -148,6 +155,19 @@ def _check(system: System, parameters: Iterable[str], counts: dict[str, int | No
             check_count(name, count, 0 if name == "settle" else 1)
     for path in check_names("parameters", parameters, "parameters, such as ('load.frequency',)"):
         check_path(system, path, "parameters")
+
+
+def _at_phase_0(
+    system: System, state: dict[str, Any], time: float, side: int | None
+) -> dict[str, Any]:
+    """The state at the next phase 0 of a motion that begins at a time."""
+    period = system.load.period
+    if period is None:
+        return state  # refused where there is no period
+    ahead = period - time % period
+    motion = simulate(system, **state, time=time, side=side, duration=ahead, dense=False)
+    _refuse_rest(system, motion, state)
+    return arguments_of(system, motion.final_state)
 
 
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:
