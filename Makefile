@@ -10,12 +10,13 @@ INSTALL := $(PYTHON) -m pip --python $(BIN)/python install --quiet --no-compile
 # All cores compile to bytecode what pip would on one, without the packages' own tests, which are half of it.
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '[/\\]tests[/\\]' $(VENV)/lib src reproduction/src || true
 
-.PHONY: help reproduce test thorough release-check lint bench docs dist lock clean
+.PHONY: help reproduce test thorough ci release-check lint bench docs dist lock clean
 
 help:
 	@echo "make reproduce   compute and draw the paper into results/"
 	@echo "make test        lint, type-check and run the tests"
 	@echo "make thorough    run the tests that take long: many structures, many random cases, whole figures, most examples of one thing"
+	@echo "make ci          all that a user runs, by the clock, in at most 70 minutes: tests, paper, pages, wheel, site, browser, other processors"
 	@echo "make release-check   compute the whole paper anew and judge every claim at full size"
 	@echo "make bench       measure speed against other integrators, side by side"
 	@echo "make docs        build the documentation as a site, docs/_build/html/index.html; needs no network once it is installed"
@@ -35,6 +36,10 @@ test: $(TEST_READY)
 
 thorough: $(TEST_READY)
 	$(BIN)/python -m pytest -m thorough
+
+# STEPS passes options on: make ci STEPS="--only docs"
+ci:
+	$(PYTHON) release/ci.py $(STEPS)
 
 release-check: $(TEST_READY)
 	$(BIN)/python -m saltus_paper.release_check
@@ -95,4 +100,4 @@ lock:
 	rm -rf $(VENV)/lock uv.lock
 
 clean:
-	rm -rf $(VENV) results docs/_build docs/gallery docs/reference/api
+	rm -rf $(VENV) .venv-peers .venv-dist results docs/_build docs/gallery docs/reference/api

@@ -3,8 +3,9 @@
 Each Python on the path that saltus allows, with the newest packages, and the oldest Python also
 with the lowest packages that pyproject.toml allows, which newer ones may not have, gets an
 environment of its own with nothing but the wheel and what it needs. There `saltus doctor` compares
-a motion with its closed form, a study is run and read back, the reproduction of the paper is added
-and makes a part, and with --tests the tests of both run.
+a motion with its closed form, a study is run and read back, the README's blocks run, a page is
+made, the reproduction of the paper is added and makes a part, and with --tests the tests of both
+run.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Trial:
             "venv",
             "--quiet",
             "--python",
-            shutil.which(f"python{self.python}") or "",
+            command_of(self.python) or "",
             folder / "venv",
         )
         install = ("pip", "install", "--quiet", "--python", python)
@@ -80,6 +81,7 @@ class Trial:
         call("-m", "saltus", "doctor")
         call("-m", "saltus", "run", STUDY, "--output", folder / "results")
         call("-m", "saltus", "status", "--verify", folder / "results")
+        print(call(ROOT / "release" / "try_readme.py", ROOT, folder / "readme"), end="")
         uv(*install, paper)  # with what it needs beside saltus
         uv("pip", "check", "--quiet", "--python", python)
         call("-m", "saltus", "reproduce", "table1", "--output", folder / "paper")
@@ -117,13 +119,15 @@ def uv(*arguments: str | Path) -> None:
     subprocess.run([sys.executable, "-m", "uv", *arguments], check=True)
 
 
-def works(python: str) -> bool:
-    """Whether this machine has a Python; a command of its name may be a pointer to none."""
+def command_of(python: str) -> str | None:
+    """The command of a Python, if this machine has it; one of its name may be a pointer to none."""
+    if python == f"{sys.version_info[0]}.{sys.version_info[1]}":
+        return sys.executable
     command = shutil.which(f"python{python}")
-    return (
-        command is not None
-        and subprocess.run([command, "-c", ""], capture_output=True, check=False).returncode == 0
-    )
+    if command is None:
+        return None
+    done = subprocess.run([command, "-c", ""], capture_output=True, check=False)
+    return command if done.returncode == 0 else None
 
 
 def build(target: Path) -> tuple[Path, Path]:
@@ -147,6 +151,9 @@ def main() -> None:
     """Build, then try all that can be had here."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", choices=PYTHONS, help="try this Python alone")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--newest", action="store_true", help="with the newest packages alone")
+    which.add_argument("--lowest", action="store_true", help="with the lowest packages alone")
     parser.add_argument(
         "--tests", action="store_true", help="run the tests in each environment as well"
     )
@@ -154,12 +161,22 @@ def main() -> None:
     target = ROOT / "dist"
     shutil.rmtree(target, ignore_errors=True)
     wheel, paper = build(target)
-    there = [python for python in PYTHONS if works(python) and options.only in (None, python)]
+    there = [
+        python
+        for python in PYTHONS
+        if command_of(python) is not None and options.only in (None, python)
+    ]
+    if not there:
+        raise SystemExit(f"there is no Python {options.only or 'from 3.11'} here")
     print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MiB")
     print("| environment | Python | numba | NumPy | SciPy | xarray | Zarr | Matplotlib | tests |")
     print("|---|---|---|---|---|---|---|---|---|")
     for python in there:
-        for lowest in (False, True) if python == PYTHONS[0] else (False,):
+        for lowest in (False, True):
+            if options.newest if lowest else options.lowest:
+                continue
+            if lowest and python != PYTHONS[0] and not options.lowest:
+                continue  # the lowest packages are older than newer Pythons
             with tempfile.TemporaryDirectory() as folder:
                 print(
                     Trial(python, lowest).run(wheel, paper, Path(folder), options.tests), flush=True

@@ -13,7 +13,7 @@ from saltus.files import write_dataset
 from saltus.flow import available_cores
 from saltus.systems import System
 from saltus_paper import FIGURES, reproduce
-from saltus_paper.expected_time import expected_seconds, on_the_clock
+from saltus_paper.expected_time import Speeds, expected_seconds, on_the_clock, reasonable_effort
 from saltus_paper.figures.figure import EFFORTS
 from saltus_paper.toml_tables import toml_table
 
@@ -63,7 +63,9 @@ def test_the_time_is_told_first_and_each_picture_as_it_is_ready(tmp_path):
 
 def test_the_work_of_every_part_is_known_and_a_draft_takes_a_third_at_most():
     times = {
-        effort: expected_seconds([figure.at(effort) for figure in FIGURES.values()], 1e5)
+        effort: expected_seconds(
+            [figure.at(effort) for figure in FIGURES.values()], Speeds(1e5, 100.0)
+        )
         for effort in EFFORTS
     }
     table = toml_table("expected_time.toml")
@@ -73,10 +75,20 @@ def test_the_work_of_every_part_is_known_and_a_draft_takes_a_third_at_most():
 
 
 def test_twice_the_speed_is_half_the_time():
-    slow, fast = (expected_seconds([FIGURES["fig14"]], speed)["fig14"] for speed in (1e5, 2e5))
+    slow, fast, no_faster_branches = (
+        expected_seconds([FIGURES["fig14"]], Speeds(motions, points))["fig14"]
+        for motions, points in ((1e5, 100.0), (2e5, 200.0), (2e5, 100.0))
+    )
     assert slow == 2 * fast
+    assert fast < no_faster_branches < slow
     assert on_the_clock(1200.0 * available_cores()) == "20 min"
     assert on_the_clock(42.0 * available_cores()) == "40 s"
+
+
+def test_a_slow_machine_makes_a_draft_where_time_is_short():
+    whole = sum(expected_seconds(FIGURES.values(), Speeds(1e5, 100.0)).values())
+    for cores, effort in ((1.1 * whole / 900.0, "standard"), (0.9 * whole / 900.0, "quick")):
+        assert reasonable_effort(FIGURES.values(), Speeds(1e5, 100.0), cores) == effort
 
 
 @pytest.mark.thorough

@@ -244,7 +244,7 @@ def compared(motion, beside, other):
     return count, True
 
 
-def check_whole(system, motion, beside, other):
+def check_whole(system, motion, beside, other, at=AT):
     """A motion that rounding does not change: its end, its margins and its energy are the page's."""
     assert other["stop"] == motion.stop
     ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
@@ -266,10 +266,10 @@ def check_whole(system, motion, beside, other):
             assert (other["validity"]["first"][name] is None) == (
                 motion.validity.first[name] is None
             ), (system, name)
-    for time, energy in zip(AT, other["energies"], strict=True):
-        assert (
-            time > motion.time or abs(energy - kinetic_energy(system, motion, time)) <= allowed
-        ), (system, time)
+    for time, energy in zip(at, other["energies"], strict=True):
+        if energy is None or time > motion.time:  # a model need not have an energy
+            continue
+        assert abs(energy - kinetic_energy(system, motion, time)) <= allowed, (system, time)
 
 
 def kinetic_energy(system, motion, time):

@@ -7,7 +7,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class ComputedPart:
     error: Exception | None = None
 
 
-def compute_panels(parts: Mapping[str, Panels]) -> Iterator[ComputedPart]:
+def compute_panels(parts: Mapping[str, Panels]) -> Generator[ComputedPart, None, None]:
     """Compute the panels of all parts; each part is given as soon as its last panel is there.
 
     Panels are begun in the order of the parts. Parts of a single panel each are computed here: to

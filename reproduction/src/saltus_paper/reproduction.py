@@ -16,7 +16,7 @@ from saltus.flow import available_cores
 from saltus.plots import style
 from saltus_paper import up_to_date as state
 from saltus_paper.claims.claim import Claim
-from saltus_paper.expected_time import expected_seconds, measured_speed, on_the_clock
+from saltus_paper.expected_time import expected_seconds, measured_speeds, on_the_clock
 from saltus_paper.figures.figure import EFFORTS, PaperFigure
 from saltus_paper.output_folder import check_writable
 from saltus_paper.panel_work import ComputedPart, compute_panels
@@ -196,7 +196,7 @@ def _announced(figures: Mapping[str, PaperFigure], progress: Progress) -> dict[s
     if not figures:
         return {}
     progress(0.0, "measuring the speed of this machine, after compiling if it is the first run")
-    expected = expected_seconds(figures.values(), measured_speed())
+    expected = expected_seconds(figures.values(), measured_speeds())
     cores = f"{available_cores()} core{'s' if available_cores() > 1 else ''}"
     progress(
         0.0,
