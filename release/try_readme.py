@@ -14,9 +14,9 @@ CHECKOUT, FOLDER = Path(sys.argv[1]), Path(sys.argv[2])
 sys.path.insert(0, str(CHECKOUT / "tests" / "pages"))
 os.environ["MPLBACKEND"] = "agg"
 
-from code_blocks import Page, blocks
+from code_blocks import Page, blocks  # noqa: E402
 
-import saltus
+import saltus  # noqa: E402
 
 if Path(saltus.__file__).is_relative_to(CHECKOUT):
     sys.exit("this is the checkout's saltus, not that of the wheel")

@@ -20,10 +20,10 @@ from typing import Any
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "docs" / "_extensions")]
 
-import living_systems
-from test_agreement import AT, check_whole, compared, in_node
+import living_systems  # noqa: E402
+from test_agreement import AT, check_whole, compared, in_node  # noqa: E402
 
-import saltus
+import saltus  # noqa: E402
 
 BLOCK = r'<script[^>]* id="{}">(.*?)</script>'
 MOVED = (0.0, 1e-14, -1e-14, 3e-14)  # by which starts are moved, to see what rounding changes

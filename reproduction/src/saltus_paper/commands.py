@@ -34,8 +34,7 @@ def reproduce(
         typer.Option(
             "--effort",
             help=(
-                "quick: a draft of the whole report in about two fifths of the time, marked as "
-                "such."
+                "quick: a draft of the whole report in about a third of the time, marked as such."
             ),
         ),
     ] = "standard",
