@@ -76,3 +76,14 @@ def test_what_saltus_imports_it_also_requires():
     imported = {name for text in code for name in statement.findall(text)}
     assert "numba" in imported
     assert imported - allowed == {"llvmlite"}  # of one release with numba, which fixes its version
+
+
+def test_the_changelog_can_be_read():
+    """Ten lines of highlights above, then a line an entry, and a date for each version."""
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest, *older = re.split(r"^## ", text, flags=re.M)[1:]
+    assert re.match(r"\S+ \(20\d\d-\d\d-\d\d\)\n\nIn short:\n\n(\* .+\n){10}\n### ", newest)
+    assert all(re.match(r"\S+ \((20\d\d-\d\d-\d\d|\w{7})[),]", version) for version in older)
+    entries = [line for line in text.splitlines() if line and not line.startswith("#")]
+    assert all(line.startswith("* ") or not line.startswith(" ") for line in entries)
+    assert max(map(len, entries)) <= 160
