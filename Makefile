@@ -34,8 +34,9 @@ test: $(TEST_READY)
 	@$(BIN)/python tests/compile_first.py & $(MAKE) --no-print-directory lint; passed=$$?; wait; exit $$passed
 	$(BIN)/python -m pytest --assert=plain || { $(BIN)/python -m pytest -n 0 --last-failed --last-failed-no-failures none; exit 1; }
 
+# THOROUGH names files: make thorough THOROUGH="tests/web tests/flow/test_roots.py"
 thorough: $(TEST_READY)
-	$(BIN)/python -m pytest -m thorough
+	$(BIN)/python -m pytest -m thorough $(THOROUGH)
 
 # STEPS passes options on: make ci STEPS="--only docs"
 ci:

@@ -273,7 +273,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--list", action="store_true", help="show the table and stop")
     parser.add_argument("--only", nargs="+", metavar="STEP", help="run these steps alone")
+    parser.add_argument(
+        "--share",
+        type=int,
+        metavar="N",
+        help=f"print a share of the thorough tests, below {SHARES}",
+    )
     options = parser.parse_args()
+    if options.share is not None:
+        print(*thorough_files(options.share, SHARES))
+        return 0
     table = steps(commit_number())
     if options.only:
         unknown = set(options.only) - {step.name for step in table}
