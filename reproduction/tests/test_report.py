@@ -356,6 +356,18 @@ def test_every_erratum_has_a_derivation_and_docs_hold_those_that_are_our_own():
         assert erratum.derivation.endswith("."), number
 
 
+def test_numbers_of_errata_that_a_run_measures_are_filled_in_from_its_claims():
+    measured = {number: erratum for number, erratum in errata().items() if erratum.measured}
+    assert {37, 39} <= set(measured)
+    assert {id for erratum in measured.values() for id in erratum.measured} <= {
+        id for table in claim_tables().values() for id in table
+    }
+    filled = errata()[37].filled({"fig11-two-regions": "Ω = 1: 5, Ĥ = 1 to 2"})
+    assert filled.derivation.endswith("Over the load there are Ω = 1: 5, Ĥ = 1 to 2.")
+    assert "not computed here" in errata()[37].filled({}).derivation
+    assert not filled.measured
+
+
 def test_ids_and_errata_in_words_become_links_and_nothing_else_does():
     linked = Linker({"fig09-chaos", "fig09-chaos-range", "period"})
     assert (

@@ -132,6 +132,7 @@ def report_content(
         ]
     shown = {claim.id for part in parts if part.figure.section for claim in part.claims}
     numbers = [*section_titles(), ""]
+    evidence = {claim.id: claim.evidence for claim in claims}
     sections = [
         SectionContent(
             number=number,
@@ -151,7 +152,7 @@ def report_content(
         errata=[
             ErratumContent(
                 number=number,
-                erratum=erratum,
+                erratum=erratum.filled(evidence),
                 claims=[claim for claim in claims if claim.erratum == number],
             )
             for number, erratum in errata().items()
