@@ -1,0 +1,107 @@
+"""What docs/models.md calls out of scope is refused in one sentence, or ends in one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from what_works.model_classes import RubbingBlock
+
+import saltus
+from saltus import Contact, Friction, Load, NewtonImpact, Surface, System
+
+
+@dataclass(frozen=True, kw_only=True)
+class Falling(saltus.Model):
+    """A smooth model whose force is given by its subclasses."""
+
+    coordinates = ("x",)
+    channels = ("push",)
+
+
+class Dragged(Falling):
+    """Quadratic drag."""
+
+    def acceleration(self, t, x, velocity, side, load):
+        return load.push(t) - abs(velocity) * velocity
+
+
+class Timed(Falling):
+    """A force that depends on the time other than by a load."""
+
+    def acceleration(self, t, x, velocity, side, load):
+        return load.push(t) - np.exp(-t)
+
+
+class Hertzian(Falling):
+    """Hertz's contact force, which has no series where it begins."""
+
+    def acceleration(self, t, x, velocity, side, load):
+        return load.push(t) - x**1.5
+
+
+class TwiceRubbing(RubbingBlock):
+    """Two frictions in one contact."""
+
+    @property
+    def frictions(self):
+        one = Friction(name="rub", coordinate="x", kinetic=0.1, contact="floor")
+        return one, replace(one, name="again")
+
+
+class FastSide(saltus.ContactModel):
+    """A surface of a velocity."""
+
+    coordinates = ("x",)
+    surfaces = (Surface(name="fast", coordinate="x_velocity"),)
+
+    def force(self, t, x, velocity, load, sides):
+        return -x
+
+
+PUSHED = Load(push=1.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: System(model=Dragged(), load=PUSHED), "sign of a velocity"),
+        (lambda: System(model=Timed(), load=PUSHED), "time"),
+        (lambda: System(model=TwiceRubbing(), impact=NewtonImpact(0.3)), "another one is"),
+        (lambda: System(model=FastSide()), "x_velocity"),
+    ],
+)
+def test_what_is_out_of_scope_is_refused_in_one_sentence(made, words):
+    with pytest.raises(saltus.SaltusError) as refusal:
+        saltus.simulate(made(), x=0.1, duration=1.0)
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_force_without_a_series_ends_the_motion_in_one_sentence():
+    """The mass falls back to x = 0, where x^1.5 has none."""
+    with pytest.raises(saltus.SaltusError) as refusal:
+        saltus.simulate(System(model=Hertzian(), load=Load(push=-1.0)), x=0.1, duration=5.0)
+    assert "\n" not in str(refusal.value)
+
+
+def test_cycles_without_a_period_are_no_orbits_and_undecided():
+    belt = saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.2)
+    free = System(model=belt)
+    with pytest.raises(saltus.ParameterError, match="no forcing period, so no periodic orbits"):
+        saltus.find_orbit(free, x=0.5)
+    assert str(saltus.classify(free, x=0.5, periods=100).kind) == "undecided"
+
+
+def test_contacts_hold_coordinates_that_have_a_velocity():
+    """A contact of a coordinate of first order has no speed that could stop."""
+
+    class Held(saltus.ContactModel):
+        coordinates = ("x", "voltage")
+        first_order = ("voltage",)
+        contacts = (Contact(name="stop", coordinate="voltage"),)
+
+        def force(self, t, q, velocity, load):
+            return -q[0], -q[1]
+
+    with pytest.raises(saltus.SaltusError, match="voltage"):
+        System(model=Held())
