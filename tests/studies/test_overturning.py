@@ -224,6 +224,41 @@ def test_a_record_of_the_same_shape_has_nearly_the_same_borders():
         assert data.border_amplitude[own].values.max() == pytest.approx(1 / np.sin(psi), rel=2e-5)
 
 
+def test_a_factor_of_a_record_is_the_same_in_the_spectrum_in_fragility_and_in_ensembles():
+    """Whatever scale the record has in the system, as SI records of a block have 1 / g."""
+    time = np.linspace(0.0, 2.0, 41)
+    record = Record(time, np.sin(np.pi * time), quantity="acceleration")
+    factors = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    body = saltus.PhysicalBlock(half_width=0.2, half_height=0.8)
+    block = body.system(Load(ground_horizontal=record))
+    scale = block.get("load.ground_horizontal.scale")
+    assert scale != 1.0
+    data = saltus.overturning_spectrum(block, amplitude=factors, frequency=[0.9, 1.0], curves=False)
+    own = data.overturned.sel(frequency=1.0).values
+    np.testing.assert_array_equal(own, saltus.fragility([block], factors).overturned.values[0])
+    ends = saltus.simulate_many(
+        block,
+        theta=0.0,
+        duration=2.0 * body.frequency + 60.0,
+        parameters={"load.ground_horizontal.scale": scale * factors},
+    )
+    np.testing.assert_array_equal(own != 0, saltus.stop_names(ends).values == "limit")
+    assert 0 < np.count_nonzero(own) < factors.size
+    # a record that is written twice as large overturns at half of the factor
+    twice = block.with_({"load.ground_horizontal.scale": 2.0 * scale})
+    again = saltus.overturning_spectrum(
+        twice, amplitude=factors / 2.0, frequency=[0.9, 1.0], curves=True
+    )
+    np.testing.assert_array_equal(again.overturned.values, data.overturned.values)
+    borders = saltus.overturning_spectrum(block, amplitude=factors, frequency=[0.9, 1.0])
+    np.testing.assert_allclose(
+        again.border_amplitude, borders.border_amplitude.values / 2.0, rtol=1e-12
+    )
+    # borders after many impacts have one row of the legend
+    labels = [text.get_text() for text in saltus.plot(borders).figure.legends[0].get_texts()]
+    assert len(labels) == len(set(labels)) <= 6
+
+
 def test_fragility_is_the_share_of_loads_with_its_interval():
     """Pulses whose thresholds are known: the share is that of the thresholds below each scale, the
     interval Wilson's.

@@ -55,7 +55,8 @@ from saltus.progress import show_below_cell
 
 # stands; overturns at once, after one impact, after more
 FILLS = ("white", "#bcd2ea", "#f3c98b", "#c9a0c9")
-IMPACTS = ("without an impact", "after 1 impact", "after {} impacts")
+IMPACTS = ("without an impact", "after 1 impact", "after 2 or more impacts")
+POINTS = ("o", "x", ".")  # the markers of borders that are single points
 
 
 @drawing
@@ -78,29 +79,33 @@ def draw_overturning(
         rasterized=True,
     )
     shown = sorted(set(np.minimum(impacts[fallen], len(FILLS) - 2).tolist()))
-    names = [*IMPACTS[:2], f"after {len(FILLS) - 2} or more impacts"]
+    names = IMPACTS
     handles: list[Any] = [
         Patch(facecolor=FILLS[1 + k], label=f"overturns {names[k]}") for k in shown
     ]
-    counts = dataset["border_impacts"].values
-    for k, count in enumerate(sorted(set(counts.tolist()))):
+    counts = np.minimum(dataset["border_impacts"].values, len(IMPACTS) - 1)
+    numbers = dataset["border_number"].values
+    for count in sorted(set(counts.tolist())):
         line: dict[str, Any] = {
             "color": LOOK.ink,
-            "linestyle": LOOK.dashes[min(k, len(LOOK.dashes) - 1)],
+            "linestyle": LOOK.dashes[count],
             "linewidth": 1.0,
         }
-        for number in sorted(set(dataset["border_number"].values[counts == count].tolist())):
-            part = dataset["border_number"].values == number
-            marker = "." if np.count_nonzero(part) == 1 else ""
+        # borders that are not followed are single points
+        points = all(
+            np.count_nonzero(numbers == number) == 1 for number in numbers[counts == count]
+        )
+        look = (
+            {**line, "linestyle": "", "marker": POINTS[count], "markersize": 3} if points else line
+        )
+        for number in sorted(set(numbers[counts == count].tolist())):
+            part = numbers == number
             ax.plot(
                 dataset["border_frequency"].values[part],
                 dataset["border_amplitude"].values[part],
-                marker=marker,
-                **line,
+                **look,
             )
-        handles.append(
-            Line2D([], [], label=f"border {IMPACTS[min(count, 2)].format(count)}", **line)
-        )
+        handles.append(Line2D([], [], label=f"border {IMPACTS[count]}", **look))
     signal = (
         json.loads(dataset.attrs.get("system", "{}"))
         .get("load", {})
@@ -113,7 +118,7 @@ def draw_overturning(
         "speed of the record" if pulse == "record" else r"frequency $\omega$ of the pulse"
     )
     ax.set_ylabel(
-        "scale of the record"
+        "factor of the record"
         if pulse == "record"
         else f"amplitude of the {signal.get('quantity', 'pulse')}"
     )

@@ -206,7 +206,8 @@ def overturning_spectrum(
         A model with one coordinate that margins can stop, such as a `RockingBlock`, under a pulse
         or a record.
     amplitude
-        The amplitudes of the pulse, or the scales of the record, that increase.
+        The amplitudes of the pulse, that increase; or the factors by which the record, as it is in
+        the system, is multiplied, as in `fragility`.
     frequency
         The frequencies of the pulse, or the factors of the speed of the record, that increase.
     curves

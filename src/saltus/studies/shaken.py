@@ -106,15 +106,15 @@ class Shaken:
         return min(place.eigenvalues[0].real for place in self.saddles if place.eigenvalues)
 
     def under(self, frequency: float, amplitude: float | None = None) -> System:
-        """The system under the pulse of this frequency and amplitude, or under the record, scaled,
-        so many times faster.
+        """The system under the pulse of this frequency and amplitude, or under the record, times
+        the amplitude, so many times faster.
         """
         signal: Any = self.signal
         if isinstance(signal, Record):
             signal = replace(
                 signal,
                 time=signal.time / frequency,
-                scale=signal.scale if amplitude is None else amplitude,
+                scale=signal.scale * (1.0 if amplitude is None else amplitude),
             )
         else:
             signal = replace(
@@ -146,7 +146,9 @@ class Shaken:
         )
 
     def outcomes(self, frequency: np.ndarray, amplitude: np.ndarray) -> Outcomes:
-        """What becomes of motions with these frequencies and amplitudes, (n,) each."""
+        """What becomes of motions with these frequencies and amplitudes, (n,) each; of a record
+        they are factors.
+        """
         if not isinstance(self.signal, Record):
             columns = {f"load.{self.channel}.frequency": frequency, self.path: amplitude}
             duration = self.duration(np.unique(frequency))
@@ -159,7 +161,7 @@ class Shaken:
             ends = simulate_many(
                 self.under(float(value)),
                 duration=self.duration(np.array([value])),
-                parameters={self.path: amplitude[own]},
+                parameters={self.path: amplitude[own] * self.signal.scale},
                 **self.start,
             )
             for array, values in zip(found, Outcomes.of(ends), strict=True):
