@@ -25,6 +25,7 @@ SHARED = {
     "notebook",
     "result",
     "checks",
+    "kinds",
     "files",
     "progress",
     "branch_tables",

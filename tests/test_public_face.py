@@ -10,6 +10,8 @@ end in Python's own TypeError, and is not tried.
 import importlib
 import inspect
 import math
+import os
+import random
 import time
 
 import numpy as np
@@ -59,7 +61,7 @@ FORMULAS = (
 MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.inside")
 
 # What is tried, by what stands in the annotation: numbers, or as many numbers as a list has.
-NUMBERS = (-1, 0, 0.5, 80.0, math.nan, math.inf, -math.inf, 1e300, 10**30)
+NUMBERS = (-1, 0, 0.5, 80.0, math.nan, math.inf, -math.inf, 1e300, 10**30, 10**400, np.ma.masked)
 ARRAYS = ([], [math.nan], [math.inf, 1.0], [1e300], [2.0, 1.0], np.array([]), np.zeros((2, 3)))
 TEXTS = ("", "x", "load.vertcal", "x" * 100_000)
 
@@ -555,6 +557,53 @@ def test_every_argument_answers_every_value(made, alone):
     assert not wrong, "\n".join(
         f"{name}({parameter}={value!r:.30}) {what:.200}" for name, parameter, value, what in wrong
     )
+
+
+class Own:
+    """An object that nobody means."""
+
+
+# of other kinds than an argument may have; 300 of these calls are tried, all in a thorough run
+OTHER_KINDS = (
+    *(None, True, Own(), Own, b"x", [None], ["a"], {1: 2}, 1j, np.array("a"), np.array([1j])),
+    *(np.zeros((2, 3, 4)), {1, 2}, range(3), slice(1, 2), np.datetime64("2020"), xarray.Dataset()),
+    *(SYSTEM, SYSTEM.load, SYSTEM.model, "\0", "x" * 5000, np, saltus.Harmonic(1.0), 10**400),
+)
+# formulas, which compute with whatever they get, and what calls a function of the user's
+UNCHECKED = ("Surface.side", "Friction.slipping", "Friction.coefficient")
+CALLED = ("workers", "scheduler", "progress", "response", "functions")
+KIND_CASES = int(os.environ.get("SALTUS_CASES", "20000"))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "count", [300, pytest.param(KIND_CASES, marks=pytest.mark.thorough)], ids=["few", "many"]
+)
+def test_every_argument_answers_every_kind(made, alone, count):
+    """Python's own errors are for mistakes of saltus, not for those of its users."""
+    wrong = []
+    asked = good(made)
+    calls = [
+        (name, parameter, value)
+        for name, (function, _) in asked.items()
+        for parameter in _arguments(function)
+        for value in OTHER_KINDS
+        if name not in UNCHECKED
+        and parameter.name not in CALLED
+        and parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
+    ]
+    for name, parameter, value in random.Random(count).sample(calls, min(count, len(calls))):
+        function, fitting = asked[name]
+        begun = time.process_time()
+        try:
+            refusal = str(answer(function, {**fitting, parameter.name: value}))
+        except Exception as error:
+            wrong.append(f"{name}({parameter.name}={value!r:.40}) {error!r:.200}")
+            continue
+        long = len(refusal) > 400 or not refusal.isprintable()
+        if long or time.process_time() - begun > 10.0:
+            wrong.append(f"{name}({parameter.name}={value!r:.40}) is long: {refusal:.200}")
+    assert not wrong, "\n".join(wrong)
 
 
 def test_every_misspelt_argument_is_answered_with_the_near_name(made):

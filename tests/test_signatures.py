@@ -43,6 +43,7 @@ SEVERAL = {
     ),
     "known": "attractors, orbits or branches",
     "parameters": "values by dotted path, or the paths to differentiate to or to solve for",
+    "position": "the number of a contact or a surface, or coordinates",
     "path": "a parameter's dotted path, or that of a file",
     "periods": "forcing periods; of one motion also a fraction",
     "points": "how many of a curve, or sums of displacements by name",

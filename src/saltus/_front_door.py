@@ -22,6 +22,21 @@ from saltus.errors import ParameterError, near
 FOR_USERS = ("saltus.theory",)
 
 
+# what other packages call what is here
+MEANT = {
+    **dict.fromkeys(("integrate", "solve", "solveivp", "odeint", "run", "trajectory"), "simulate"),
+    **dict.fromkeys(("ensemble", "montecarlo"), "simulate_many"),
+    **dict.fromkeys(("continuation", "continuebranch", "follow"), "continue_orbit"),
+    **dict.fromkeys(("shoot", "shooting", "periodicorbit", "floquet"), "find_orbit"),
+    **dict.fromkeys(("bifurcation", "bifurcations"), "bifurcation_diagram"),
+    **dict.fromkeys(("lyapunov", "lyapunovexponent", "exponents"), "lyapunov_spectrum"),
+    **dict.fromkeys(("basins", "basin"), "basins_of_attraction"),
+    **dict.fromkeys(("attractor", "attractorset"), "find_attractors"),
+    **dict.fromkeys(("read", "open"), "load"),
+    **dict.fromkeys(("gradient", "jacobian"), "sensitivities"),
+}
+
+
 def front_door(
     package: str, file: str
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -45,7 +60,9 @@ def front_door(
             return found
         if os.path.exists(os.path.join(os.path.dirname(file), f"{name}.py")):
             raise AttributeError(name)  # Python asks for the name of a file, which it then imports
-        raise AttributeError(f"{package} has no {name!r}; {_elsewhere(name) or near(name, public)}")
+        meant = MEANT.get(name.lower().replace("_", ""))
+        hint = f"did you mean {meant!r}?" if meant in public else near(name, public)
+        raise AttributeError(f"{package} has no {name!r}; {_elsewhere(name) or hint}")
 
     return get, names, public
 

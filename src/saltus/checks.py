@@ -11,6 +11,8 @@ import inspect
 import itertools
 import math
 import os
+import re
+import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -21,6 +23,7 @@ from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, cast
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
+from saltus.kinds import check_kinds, check_switches
 from saltus.progress import silent, watched
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
@@ -297,7 +300,7 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
     """
     try:
         low, high = (float(x) for x in bounds)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"{name} must be two numbers (lowest, highest), got {shown(bounds)}", name
         ) from None
@@ -356,7 +359,7 @@ def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
     check_size(given, name)
     try:
         return np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
 
@@ -413,7 +416,7 @@ def instants(times: Any) -> np.ndarray:
     check_size(times, "times")
     try:
         asked = np.atleast_1d(np.asarray(times, dtype=float))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"times must be a number or an array of numbers, got {shown(times)}", "times"
         ) from None
@@ -436,7 +439,7 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
     check_size(states, name)
     try:
         array = np.asarray(states, dtype=float).reshape(-1, dimension)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.full((1, dimension), np.nan)
     if not (np.abs(array) <= LIMITS.value).all():
         each = "coordinate, velocity" if dimension == 2 else "coordinates, velocities"
@@ -498,6 +501,7 @@ def check_environment() -> None:
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
+Kind = TypeVar("Kind")
 # a number or an array of numbers, which the type checker cannot tell, as arrays have many types
 Numbers: TypeAlias = Any
 
@@ -531,6 +535,7 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
         def refuse(*given: Any, **named: Any) -> inspect.BoundArguments:
             bound = bound_arguments(function, given, named)
+            check_switches(function, named)
             bound.apply_defaults()
             for name, value in bound.arguments.items():
                 if isinstance(value, Iterator):
@@ -543,8 +548,12 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
         @functools.wraps(function)
         def call(*given: Any, **named: Any) -> R:
-            bound = refuse(*given, **named)
-            return told(function, *bound.args, **bound.kwargs)
+            try:
+                bound = refuse(*given, **named)
+                return told(function, *bound.args, **bound.kwargs)
+            except OF_OTHER_KINDS as error:
+                _refuse_kinds(function, given, named, error)
+                raise
 
         vars(call).update(check=refuse, answers=True)
         return cast(Checked[P, R], call)
@@ -554,26 +563,66 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
 def answered(function: Callable[P, R]) -> Callable[P, R]:
     """The function, for users: an argument that it does not have is refused as `bound_arguments`
-    does it.
+    does it, and one of another kind than its annotation as `check_kinds` does it.
     """
 
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
+        if named:
+            check_switches(function, named)
         try:
             return (
                 told(function, *given, **named)
                 if "progress" in named
                 else function(*given, **named)
             )
-        except TypeError:
-            bound_arguments(function, given, named)
+        except OF_OTHER_KINDS as error:
+            _refuse_kinds(function, given, named, error)
             raise
 
     vars(call)["answers"] = True
     return call
 
 
-def told(function: Callable[P, R], *given: P.args, **named: P.kwargs) -> R:
+def with_answers(kind: type[Kind]) -> type[Kind]:
+    """A class decorator by which the public methods of a class answer arguments that they do not
+    have, and those of other kinds."""
+    for name, method in list(vars(kind).items()):
+        function = getattr(method, "__func__", method)
+        plain = inspect.isfunction(function) and not name.startswith("_")
+        if plain and not hasattr(function, "answers") and function.__code__.co_argcount > 1:
+            wrapped: Any = answered(function)
+            setattr(kind, name, type(method)(wrapped) if function is not method else wrapped)
+    return kind
+
+
+# what Python and NumPy raise where an argument is of another kind than was meant
+OF_OTHER_KINDS = (
+    *(TypeError, ValueError, AttributeError, LookupError, ArithmeticError, AssertionError),
+    struct.error,
+)
+
+
+def _refuse_kinds(
+    function: Callable[..., Any], given: tuple[Any, ...], named: dict[str, Any], error: Exception
+) -> None:
+    """Refuse a call that failed by an error of Python's own because its arguments are unknown, or
+    of other kinds than the function's annotations."""
+    if not isinstance(error, SaltusError):
+        if isinstance(error, TypeError):
+            bound_arguments(function, given, named)
+            # one that went among the coordinates, and is an argument of what is called inside
+            twice = re.search(r"multiple values for (?:keyword )?argument '(\w+)'", str(error))
+            known = inspect.signature(function).parameters
+            if twice and twice[1] in named and twice[1] not in known:
+                name = function.__qualname__
+                raise ParameterError(
+                    f"{name}() has no argument {twice[1]!r}; {near(twice[1], known)}", twice[1]
+                )
+        check_kinds(function, given, named)
+
+
+def told(function: Callable[P, R], /, *given: P.args, **named: P.kwargs) -> R:
     """Call a function of which somebody may watch the progress: what takes long within it is told
     too.
     """

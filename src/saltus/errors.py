@@ -141,7 +141,7 @@ def near(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
     also = tuple(also)
     # users write the text of an enumeration's member, not its repr
     known = sorted(str(name) for name in known)
-    asked = name[:LONGEST_NAME]
+    asked = str(name)[:LONGEST_NAME]
     # theta is near threads, but is not meant
     further = difflib.get_close_matches(asked, also, n=3, cutoff=0.7)
     close = difflib.get_close_matches(asked, [*known, *further], n=3, cutoff=0.6)

@@ -27,6 +27,7 @@ PART = ".part"
 # s; without locks, a half-written file that was not touched for so long is taken as left by a
 # killed run
 STALE = 60.0
+LONGEST_NAME = 220  # bytes; file systems allow 255, and a half-written file has a longer name
 COPIES = 2  # the number of copies of a file's bytes that reading it makes
 # of the checksum: wiping out 64 bytes leaves one of them
 HEAD = b"\nsha256 of the bytes before: "
@@ -57,6 +58,12 @@ def write_durably(path: Path, content: bytes, flush: bool = True) -> None:
     OSError
         The error has the name of the file.
     """
+    if "\0" in str(path) or len(os.fsencode(path.name)) > LONGEST_NAME:
+        raise ParameterError(
+            f"path must name a file, with a name of at most {LONGEST_NAME} bytes, got "
+            f"{shown(str(path))}",
+            "path",
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.urandom(6).hex()}{PART}")
     try:
@@ -241,6 +248,8 @@ def read_dataset(path: Path | str) -> Any:
 
     path = Path(path)
     content = checked_content(path)
+    if content[:200].lstrip().lower().startswith((b"<!doctype html", b"<html")):
+        raise ParameterError(f"{path} is a page; open it in a browser")
     try:
         with xarray.open_datatree(
             io.BytesIO(content), engine="h5netcdf", phony_dims="access"

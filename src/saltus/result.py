@@ -341,7 +341,7 @@ def _is_short(value: Any) -> bool:
 
 # Raised whenever the same request gives other numbers than before: results of another version are
 # refused and not continued.
-RESULT_VERSION = 14
+RESULT_VERSION = 15
 
 
 def provenance(

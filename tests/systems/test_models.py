@@ -28,7 +28,7 @@ def bounce(self, t, velocity, side, load, impact):
 
 def made(base, **parts):
     """A model of one coordinate x with these parts."""
-    return dataclass(type("Own", (base,), {"coordinates": ("x",), **parts}))()
+    return dataclass(frozen=True)(type("Own", (base,), {"coordinates": ("x",), **parts}))()
 
 
 FLOOR = (Contact(name="floor", coordinate="x"),)

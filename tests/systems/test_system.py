@@ -58,12 +58,15 @@ harmonics = st.builds(Harmonic, finite, finite, finite, st.integers(1, 9))
 def records(draw, quantities):
     steps = draw(st.lists(st.floats(0.01, 10), min_size=4, max_size=8))
     values = draw(st.lists(finite, min_size=len(steps), max_size=len(steps)))
+    quantity = draw(st.sampled_from(quantities))
+    curves = {"velocity": ("spline", "linear", "monotone"), "displacement": ("spline", "monotone")}
     return Record(
         np.cumsum(steps),
         values,
-        draw(st.sampled_from(quantities)),
+        quantity,
         draw(finite),
         draw(st.sampled_from(["", "q.csv"])),
+        draw(st.sampled_from(curves.get(quantity, ("",)))),
     )
 
 

@@ -100,7 +100,7 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
             if np.ndim(series) == 1
             else np.asarray(series, dtype=float)
         )
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             "the 0-1 test takes a series of numbers, one a forcing period", "series"
         ) from None

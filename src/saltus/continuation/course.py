@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from saltus.checks import check_count
+from saltus.checks import check_count, with_answers
 from saltus.continuation.end import CurveEnd, End, Missed
 from saltus.continuation.pseudo_arclength import STEPS, between, cubic
 from saltus.continuation.test_functions import TestFunction, located
@@ -103,6 +103,7 @@ Point = TypeVar("Point", bound=Any)
 Special = TypeVar("Special")
 
 
+@with_answers
 @dataclass(frozen=True, eq=False)
 class Course(Generic[Point, Special]):
     """A curve as it was followed: its points in order, its special points, and the reasons for both

@@ -138,7 +138,7 @@ def transmissibility(
     answer = course.position[0] if response is None else response(course.time, *state)
     try:
         values = np.broadcast_to(np.asarray(answer, dtype=float), course.time.shape)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             "response must return a number for each time, position and velocity", "response"
         ) from None

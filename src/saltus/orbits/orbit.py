@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_count
+from saltus.checks import LIMITS, check_count, with_answers
 from saltus.continuation import NEWTON, newton
 from saltus.errors import MotionError
 from saltus.flow import Motion, SegmentColumn, Validity, simulate
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 NEWTON_ITERATIONS = 12
 
 
+@with_answers
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit(Result):
     """A periodic orbit of the exact system, solved to rounding.

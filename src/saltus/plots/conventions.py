@@ -23,7 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.checks import answered, bound_arguments, check_number
-from saltus.errors import ParameterError, SaltusError, shown
+from saltus.errors import ParameterError, SaltusError, near, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -198,6 +198,17 @@ NARROWEST = 10.0
 WIDEST = 2000.0
 
 
+def _drawable(dataset: Any) -> list[str]:
+    """The names of the numbers of a result that may be drawn."""
+    nodes = dataset.subtree if hasattr(dataset, "subtree") else (dataset,)
+    return [
+        str(name)
+        for node in nodes
+        for name, variable in node.data_vars.items()
+        if variable.dtype.kind in "fiu" and not str(name).startswith(("special_", "flag_"))
+    ]
+
+
 def drawing(draw: Callable[P, R]) -> Callable[P, R]:
     """A decorator of functions that draw a dataset in the conventions: arguments of a wrong kind
     are refused by their names.
@@ -224,6 +235,12 @@ def drawing(draw: Callable[P, R]) -> Callable[P, R]:
         except (SaltusError, OSError, MemoryError):
             raise
         except Exception as error:
+            asked = arguments.get("quantity")
+            if isinstance(error, KeyError) and isinstance(asked, str):
+                raise ParameterError(
+                    f"quantity {shown(asked)} is not in this result; {near(asked, _drawable(dataset))}",
+                    "quantity",
+                ) from error
             said = " ".join(f"{type(error).__name__}: {error}".split())
             raise ParameterError(
                 f"{name} cannot be drawn by {draw.__name__} ({said:.150})", name

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_number, checked_by
+from saltus.checks import check_count, check_number, checked_by, with_answers
 from saltus.errors import MotionError, ParameterError, SaltusError, near, shown
 from saltus.flow import state_names
 from saltus.progress import Progress, html_table, silent
@@ -46,6 +46,7 @@ class FitSettings:
 FIT = FitSettings()
 
 
+@with_answers
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit(Result):
     """Numbers found from measured motions, with their errors.
@@ -433,6 +434,12 @@ def fit(
 def _search(system: System, data: Any, parameters: Any, functions: Any, tol: float) -> _Search:
     """The checked arguments of a fit."""
     records = (data,) if isinstance(data, Measurement) else tuple(data)
+    if not all(isinstance(record, Measurement) for record in records):
+        raise ParameterError(f"data must be Measurements, got {shown(data)}", "data")
+    if functions is not None and not isinstance(functions, Mapping):
+        raise ParameterError(
+            f"functions must be a dict of functions by name, got {shown(functions)}", "functions"
+        )
     given = dict(parameters) if isinstance(parameters, Mapping) else dict.fromkeys(parameters)
     if not records or not given:
         raise ParameterError(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import as_numbers, check_number
+from saltus.checks import as_numbers, check_number, with_answers
 from saltus.errors import MotionError, ParameterError, near, shown
 from saltus.flow import MotionRequest, Sensitivities, derivatives_of, state_names
 from saltus.systems import System
@@ -21,6 +21,7 @@ Function = Callable[[Any, Any, Any], Any]
 Unknowns = Mapping[str, float]
 
 
+@with_answers
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measurement:
     """One record of a motion: what was measured, how exactly, and how the motion began.
@@ -74,7 +75,14 @@ class Measurement:
                     f"{name} must be numbers that rise, got {shown(getattr(self, name))}", name
                 )
             object.__setattr__(self, name, times)
-        values = {name: np.asarray(column, dtype=float) for name, column in self.values.items()}
+        for name in ("start", "values", "changes"):
+            given = getattr(self, name)
+            if not isinstance(given, Mapping):
+                raise ParameterError(f"{name} must be a dict by name, got {shown(given)}", name)
+        for sigma in self.sigma.values() if isinstance(self.sigma, Mapping) else (self.sigma,):
+            if sigma is not None:
+                check_number("sigma", sigma, above=0.0)
+        values = {name: as_numbers(column, "values") for name, column in self.values.items()}
         for name, column in values.items():
             if column.shape != self.time.shape:
                 raise ParameterError(

@@ -307,6 +307,8 @@ def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path |
         raise ParameterError(
             f"store must be the path of a folder, or None, got {store!r:.80}", "store"
         )
+    if "\0" in str(store):
+        raise ParameterError("store must be the path of a folder, without a null letter", "store")
     if isinstance(store, str) and "://" in store:
         raise ParameterError(
             f"store must be a folder on this machine, got the address {store!r}", "store"

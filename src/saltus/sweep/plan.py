@@ -68,7 +68,7 @@ class Variable:
             )
         try:
             extra = tuple((str(name), int(size)) for name, size in self.extra)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             wanted = "pairs of a name and a size, such as (('mode', 3),)"
             raise ParameterError(
                 f"extra must be {wanted}, got {shown(self.extra)}", "extra"

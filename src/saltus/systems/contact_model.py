@@ -425,7 +425,8 @@ class ContactModel(Model):
         )
 
     def mass_matrix(self, theta: Any) -> Any:
-        """M(q): a number, or rows of numbers, symmetric and positive definite.
+        """M(q): rows of numbers, symmetric and positive definite; with one coordinate a number, or
+        [[M]].
 
         Parameters
         ----------
@@ -722,7 +723,16 @@ def mass_rows(model: Any, q: Any, t: Any = 0.0, load: Any = None) -> list[list[A
         if getattr(model, "has_moving_walls", False)
         else model.mass_matrix(q)
     )
-    return [[mass]] if len(model.coordinates) == 1 else [list(row) for row in mass]
+    if len(model.coordinates) == 1:
+        return [[single_mass(mass)]]
+    return [list(row) for row in mass]
+
+
+def single_mass(mass: Any) -> Any:
+    """M of one coordinate, which may be given as [[M]]."""
+    while isinstance(mass, (tuple, list)) or (isinstance(mass, np.ndarray) and mass.ndim):
+        (mass,) = mass
+    return mass
 
 
 def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:

@@ -105,7 +105,12 @@ def from_sympy(
 
     def text(what: str, expression: Any, allowed: str) -> str:
         """An expression as Python's text."""
-        given = sympy.sympify(expression).xreplace(kinds)
+        try:
+            given = sympy.sympify(expression, strict=True).xreplace(kinds)
+        except (TypeError, ValueError, AttributeError):  # SymPy's own error is a ValueError
+            raise ParameterError(
+                f"{what} must be an expression of SymPy, got {shown(expression)}", what
+            ) from None
         for symbol in sorted(given.free_symbols, key=str):
             if symbol not in names.values() or str(symbol)[0] not in allowed:
                 known = ", ".join(map(str, [*coordinates, *parameters]))
@@ -118,7 +123,12 @@ def from_sympy(
         return str(printer.doprint(given))
 
     count = len(coordinates)
-    rows = sympy.eye(count) if mass is None else sympy.Matrix(mass)
+    try:
+        rows = sympy.eye(count) if mass is None else sympy.Matrix(mass)
+    except (TypeError, ValueError, NotImplementedError):
+        raise ParameterError(
+            f"mass must be rows of expressions, got {shown(mass)}", "mass"
+        ) from None
     forces = list(force) if isinstance(force, (Sequence, sympy.MatrixBase)) else [force]
     if rows.shape != (count, count) or len(forces) != count:
         raise ParameterError(

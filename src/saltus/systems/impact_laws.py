@@ -22,6 +22,7 @@ from saltus.systems.contact_model import (
     held_entry,
     mass_rows,
     normal_forces,
+    single_mass,
 )
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.load import Load
@@ -439,6 +440,7 @@ def energy_gains(model: Any, impact: Any, shape: tuple[int, ...] = ()) -> dict[s
                 )
         before[places[s]] = -contact.sign
         given = model.mass_matrix(q[0] if size == 1 else tuple(q))
+        given = single_mass(given) if size == 1 else given
         entries = np.broadcast_arrays(
             *after, *([given] if size == 1 else [entry for row in given for entry in row])
         )

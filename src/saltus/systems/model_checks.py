@@ -8,6 +8,7 @@ import inspect
 import itertools
 import math
 from collections.abc import Mapping
+from importlib import import_module
 from types import FunctionType
 from typing import Any
 
@@ -87,6 +88,32 @@ def check_works(model: Model) -> bool:
 
 # classes of which one model has passed, as systems are made by the thousand
 _known = set[type[Model]]()
+
+
+def check_traces(system: Any) -> None:
+    """Refuse a system of one's own class whose equations cannot be traced, when it is made.
+
+    The tracer is in a room above this one, which is asked by its name.
+
+    Raises
+    ------
+    TraceError, ParameterError
+        The error says what cannot be traced, and what to write instead.
+    """
+    kind = type(system.model)
+    if kind in _traced or kind.__module__.partition(".")[0] == "saltus":
+        return
+    if kind.__hash__ is None and not getattr(kind, "__dataclass_fields__", {}):
+        raise ParameterError(
+            f"{kind.__name__} is not frozen, so its numbers could change unseen: write "
+            f"@dataclass(frozen=True, kw_only=True) above class {kind.__name__}",
+            "model",
+        )
+    import_module("saltus.taylor").trace(system)
+    _traced.add(kind)
+
+
+_traced = set[type[Model]]()  # classes of which one system could be traced
 
 
 def _check_class(kind: type[Model]) -> None:
@@ -426,9 +453,12 @@ def _check_mass(model: ContactModel) -> None:
     )
     if found is None:
         return
-    if _size_of(found) != ("a number" if size == 1 else f"{size} rows of {size} numbers"):
+    fitting = (
+        ("a number", "1 row of 1 number") if size == 1 else (f"{size} rows of {size} numbers",)
+    )
+    if _size_of(found) not in fitting:
         wanted = (
-            "a number, as there is one coordinate"
+            "a number or [[M]], as there is one coordinate"
             if size == 1
             else f"{size} rows of {size} numbers, for {', '.join(names)}"
         )

@@ -405,7 +405,7 @@ def read_array(given: Any, name: str) -> np.ndarray:
         if array.dtype.kind not in "biufO":  # NumPy would read a text as a number
             raise TypeError
         array = array.astype(float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{name} must be rows of numbers, got {shown(given)}", name) from None
     if not np.isfinite(array).all():
         raise ParameterError(f"{name} must be finite; it holds nan or inf", name)

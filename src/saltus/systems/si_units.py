@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from operator import mul, truediv
 from typing import Any
 
-from saltus.checks import check_number, settle_numbers
+from saltus.checks import check_number, settle_numbers, with_answers
 from saltus.errors import ParameterError
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import Load
@@ -24,6 +24,7 @@ from saltus.systems.system import System
 from saltus.systems.two_layer import TwoLayer
 
 
+@with_answers
 class Physical:
     """Loads in SI units, made dimensionless by `units`, and back."""
 
@@ -107,6 +108,7 @@ def _notice_milliseconds(load: Load) -> None:
                 warnings.warn(text, UserWarning, stacklevel=2)
 
 
+@with_answers
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalCell(Physical):
     """Length, masses, rotational stiffnesses and dampings of a cell in SI units; layer 1 is the
@@ -267,6 +269,7 @@ class PhysicalCell(Physical):
         return TwoLayer(beta0=beta0, **self.ratios)
 
 
+@with_answers
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicalBlock(Physical):
     """Width, height and gravity of a rigid rocking block in SI units; half of each, so that its

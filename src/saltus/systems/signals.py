@@ -188,7 +188,7 @@ def _samples(where: str, name: str, given: Any) -> np.ndarray:
     check_size(given, name)
     try:
         samples = np.array(given)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         samples = np.array(0.0)
     # complex numbers would lose their imaginary part
     if samples.ndim != 1 or samples.dtype.kind not in "fiub":
@@ -497,6 +497,13 @@ def as_signal(value: Any, name: str) -> Signal:
                 f"{name} is an empty list; give at least one number, harmonic or record", name
             )
         return Sum(tuple(as_signal(item, f"{name}.{i}") for i, item in enumerate(value)))
+    if not isinstance(value, (int, float, np.integer, np.floating)):
+        samples = callable(value) or np.iterable(value)
+        hint = "; samples are given as Record(time, value)" if samples else ""
+        raise ParameterError(
+            f"{name} must be a number, a Harmonic, a pulse or a Record, got {shown(value)}{hint}",
+            name,
+        )
     check_number(name, value)
     return Constant(float(value))
 

@@ -72,7 +72,14 @@ def read_start(
     values = [*positions, *_speeds(velocity, model)]
     for i, value in enumerate(values):
         if not (type(value) is float and abs(value) <= most):
-            check_number(in_order[i] if i < len(in_order) else "velocity", _plain(value))
+            name = in_order[i] if i < len(in_order) else "velocity"
+            if _is_sequence(value) and np.size(value) != 1:
+                raise ParameterError(
+                    f"{name} must be a finite number, got {shown(value, 40)}; for many starts at "
+                    "once use simulate_many",
+                    name,
+                )
+            check_number(name, _plain(value))
     return system._with_rates(time, np.array(values, dtype=float))
 
 

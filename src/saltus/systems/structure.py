@@ -265,6 +265,12 @@ class Structure(ContactModel):
                 if m is not None
             }
         )
+        for name in ("forces", "points"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, Mapping):
+                raise ParameterError(
+                    f"{name} must be a dict of vectors by name, got {shown(value)}", name
+                )
         names = _names_of(self.names, len(mass.array))
         points = {
             name: _vector(row, names, f"points.{name}")
@@ -518,6 +524,8 @@ def _matrix(given: Any, name: str) -> Any:
 
 def _names_of(given: Any, size: int) -> tuple[str, ...]:
     """The names of the rows."""
+    if isinstance(given, str) or not np.iterable(given):
+        raise ParameterError(f"names must be a list of names, got {shown(given)}", "names")
     names = tuple(given) or tuple(f"x{i}" for i in range(size))
     if len(names) != size or len(set(names)) < size:
         raise ParameterError(

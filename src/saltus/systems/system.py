@@ -21,7 +21,7 @@ from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.mirror import mirror_of
 from saltus.systems.model import Model, OneContactModel
-from saltus.systems.model_checks import check_contact, check_works
+from saltus.systems.model_checks import check_contact, check_traces, check_works
 from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
 
 
@@ -79,6 +79,7 @@ class System:
         if _passes(self.model, self.impact):  # refuses sums that cannot be coordinates
             inner = System(model=in_gap_coordinates(self.model), load=self.load, impact=self.impact)
             object.__setattr__(self, "_in_gaps", inner)
+        check_traces(self)
 
     def _remembered(self, what: Any, make: Callable[[], Any]) -> Any:
         """What follows from this system alone, made when it is first asked for; for those who make
@@ -119,6 +120,12 @@ class System:
             A path that leads nowhere (the error names similar ones), or a value that is refused
             there.
         """
+        if changes is not None and not isinstance(changes, Mapping):
+            raise ParameterError(
+                f"changes must be a dict of parts by their paths, as {{'load.frequency': 1.1}}, "
+                f"got {shown(changes)}",
+                "changes",
+            )
         given = {**(changes or {}), **more}
         for path in given:
             if str(path).partition(".")[0] not in children(self):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from saltus.checks import RADIANS, Numbers, check_number, settle_numbers
+from saltus.checks import RADIANS, Numbers, check_number, settle_numbers, with_answers
 from saltus.errors import ParameterError, shown
 from saltus.systems.metainterface import Metainterface
 from saltus.systems.si_units import PhysicalCell
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 ANGLE_ROUNDING = 1e-12  # an angle past a limit by no more than this is rounded onto it
 
 
+@with_answers
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitCell:
     """Two articulated parallelograms, each with a slider amid its diagonal (paper, `gen_conf` to

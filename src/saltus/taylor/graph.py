@@ -50,7 +50,7 @@ BRANCH = (
 )
 FRICTION = (
     "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced: give the model a Friction; a "
-    "smooth one, such as -tanh(velocity / w), can be"
+    "smooth one, such as -tanh(velocity / w), can be, and quadratic drag as -v * sqrt(v**2 + w**2) with a small w"
 )
 # NumPy's names, and ours
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
@@ -439,8 +439,10 @@ def ask(model: Any, method: str, *arguments: Any) -> Any:
         raise
     except BaseException as error:  # a user's own code may call exit
         name = f"{type(model).__name__}.{method}"
+        single = len(getattr(model, "coordinates", ())) == 1 and "not subscriptable" in str(error)
+        hint = "; with one coordinate q and its velocity are numbers: write q, not q[0]" * single
         raise TraceError(
-            f"{name} failed while it was traced: {type(error).__name__}: {error}"
+            f"{name} failed while it was traced: {type(error).__name__}: {error}{hint}"
         ) from error
 
 

@@ -20,9 +20,12 @@ def numbers(name: str, values: Any, **bounds: Any) -> np.ndarray:
     ParameterError
         The error has the name, the range and the first value outside it.
     """
-    size = len(values) if hasattr(values, "__len__") else 1
+    if np.ma.is_masked(values):
+        raise ParameterError(f"{name} must be numbers, and some of them are masked", name)
     if isinstance(values, np.ndarray):
         size = values.size
+    else:
+        size = len(values) if hasattr(values, "__len__") else 1
     if size > LIMITS.count:
         raise ParameterError(f"{name} must be at most {LIMITS.count} numbers, got {size}", name)
     check_memory(name, 8.0 * size, f"{size} numbers")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from saltus.branch_tables import branches_of
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.files import parsed_json
 from saltus.orbits import orbits_of
 from saltus.result import check_provenance, identity
@@ -79,6 +79,10 @@ def _joined(entries: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _one(data: Any, system: System) -> dict[str, Any]:
+    if not hasattr(data, "attrs"):
+        raise ParameterError(
+            f"a page shows results, such as a branch or a motion, got {shown(data)}", "results"
+        )
     kind = str(data.attrs.get("kind", "dataset"))
     if kind not in READERS:
         raise ParameterError(

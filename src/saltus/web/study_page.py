@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_number
+from saltus.checks import Numbers, check_number, with_answers
 from saltus.errors import ParameterError, SaltusError
 from saltus.files import check_writable, write_text
 from saltus.orbits import Branch, OrbitEnd
@@ -149,6 +149,7 @@ def explore(
     return Explorer(system, results, motion, title)
 
 
+@with_answers
 class Explorer:
     """The page of a system in a notebook, made by `explore`: a name alone in a cell shows it.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_count, instants
+from saltus.checks import Numbers, check_count, instants, with_answers
 from saltus.errors import ParameterError, near, shown
 from saltus.flow.motion.events import (
     EventKind,
@@ -49,6 +49,10 @@ class Samples:
     side: np.ndarray
 
 
+HAS = "it has time, final_state, at(t), samples(n), events and impacts, too"
+
+
+@with_answers
 @dataclass(frozen=True, eq=False)
 class Motion(Result):
     """An exact motion of a system.
@@ -120,7 +124,7 @@ class Motion(Result):
         known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
         if name not in known:
             raise AttributeError(
-                f"a Motion has no {name!r}" + (f"; {near(name, known)}" if known else "")
+                f"a Motion has no {name!r}" + (f"; {near(name, known)}; {HAS}" if known else "")
             )
         return self.position[known.index(name)] if len(known) > 1 else self.position
 

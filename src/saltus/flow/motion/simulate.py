@@ -224,7 +224,7 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
     check_size(given, "times")
     try:
         times = np.atleast_1d(np.asarray(given, dtype=float))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         times = np.array([np.nan])
     if (
         times.ndim != 1
@@ -519,7 +519,7 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
         return (
             f"the motion leaves the range of numbers {at}; its velocity was last "
             f"{velocity}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
-            "there, such as abs(x)**1.5 at x = 0"
+            "there, such as abs(x)**1.5 at x = 0; a Hertz contact is written as (x**2 + 1e-12)**0.75 behind a Surface"
         )
     if status == Status.STALLED and not system.model.singularity:
         return f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large"

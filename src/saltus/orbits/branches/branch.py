@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import answered, check_dataset, check_number
+from saltus.checks import answered, check_dataset, check_number, with_answers
 from saltus.continuation import NEWTON, Course, End
 from saltus.errors import ParameterError
 from saltus.orbits.branches.orbit_curve import OrbitPoint
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 START = End(OrbitEnd.START)
 
 
+@with_answers
 @dataclass(frozen=True, eq=False)
 class Branch(Result, Course[OrbitPoint, SpecialPoint]):
     """A branch: its points in order, its special points, and why it ends on both sides.

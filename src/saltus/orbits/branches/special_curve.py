@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.checks import with_answers
 from saltus.continuation import Corrected, Course, Units
 from saltus.errors import ParameterError
 from saltus.orbits.branches.branch import multiplier_columns, solution_columns
@@ -146,6 +147,7 @@ def without_condition(point: SpecialCurvePoint) -> OrbitPoint:
     )
 
 
+@with_answers
 @dataclass(frozen=True, eq=False)
 class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     """A curve of special points in two parameters: its points in order, its codimension-two points,
