@@ -15,6 +15,7 @@ import numpy as np
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.progress import html_table, rows_table
+from saltus.systems import mode_sums
 
 if TYPE_CHECKING:
     import pandas
@@ -351,13 +352,16 @@ def provenance(
     and `seed`, as far as they are given, and further ones.
 
     The system's JSON has its numbers, and `equations` a digest of each part of its equations
-    (`saltus.taylor.equations_of`).
+    (`saltus.taylor.equations_of`). For a structure `modes` are sums of its modes, by which a reader
+    notices that its own are others.
     """
     from saltus import __version__
 
     kept: dict[str, Any] = {"saltus_version": __version__, "result_version": RESULT_VERSION}
     if system is not None:
         kept |= {"system": system.to_json()} | identity(system)
+        if modes := mode_sums(system.model):
+            kept["modes"] = json.dumps(modes)
     return (
         kept
         | {name: value for name, value in (("tol", tol), ("seed", seed)) if value is not None}
@@ -421,3 +425,23 @@ def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]
             f"the {' and the '.join(changed)} of {name} "
             f"{'has' if len(changed) == 1 else 'have'} changed since"
         )
+    modes = mode_sums(system.model)
+    if modes and "modes" in attributes and not _agree(attributes["modes"], modes):
+        yield f"its amplitudes are of other modes of {name}"
+
+
+def _agree(kept: Any, modes: list[float]) -> bool:
+    """Whether the sums of the modes in a file are those of here, up to rounding."""
+    try:
+        there = np.array(json.loads(kept), dtype=float)
+    except (TypeError, ValueError):
+        return False
+    here = np.array(modes)
+    return there.shape == here.shape and bool(
+        np.abs(there - here).max() <= SAME_MODES * np.abs(here).max()
+    )
+
+
+# Sums of the modes of a structure that differ by less, as a share of the largest, are the same:
+# rounding moves modes of nearly equal frequencies.
+SAME_MODES = 1e-6

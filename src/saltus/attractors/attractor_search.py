@@ -21,6 +21,7 @@ from saltus.attractors.attractor import (
     Target,
 )
 from saltus.attractors.classification import classify
+from saltus.attractors.judgement import reason_cycle, reason_unforced
 from saltus.attractors.stroboscopic_section import (
     section_states,
     solved_orbit,
@@ -122,6 +123,9 @@ class KnownAttractors:
         if len(states) == 1 and stays_at_rest(self.system, states[-1]):
             return self.add_rest(states[-1])
         where = f"at {_shown(states[-1])}"
+        cycle = reason_cycle(self.system, states[-1])
+        if cycle is not None:
+            return self._fail(f"{where}: {cycle.sentence}")
         orbit = solved_orbit(self.system, states[-1], len(states))
         if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(
             states
@@ -428,6 +432,11 @@ def _assigned(
     )
     later = found.assign(ends)
     found.assign_unsettled(ends, later)
+    unforced = reason_unforced(found.system)
+    if unforced is not None and (later == WAITING).any():
+        number = int((later == WAITING).sum())
+        found.reasons.append(f"of {number} motions: {unforced.sentence}")
+        later[later == WAITING] = UNDECIDED
     for turn in range(SETTINGS.verdicts):
         waiting = np.flatnonzero(later == WAITING)
         if not waiting.size:

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import state_plane, state_units
-from saltus.attractors.judgement import JUDGEMENT, Judged, JudgementSettings, Reason, judge
+from saltus.attractors.judgement import (
+    JUDGEMENT,
+    Judged,
+    JudgementSettings,
+    Reason,
+    judge,
+    reason_cycle,
+    reason_unforced,
+)
 from saltus.attractors.lyapunov.growth import LYAPUNOV
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
 from saltus.attractors.nonperiodic import FEWEST_ENTRIES, ZeroOne, excludes_tori, zero_one_of_bands
@@ -290,6 +298,9 @@ def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None
     if not ends.periodic[0]:
         return None
     period = int(ends.period[0])
+    cycle = reason_cycle(case.clock, ends.last[0])
+    if cycle is not None:
+        return case.undecided(cycle, ends, {})
     seen = "it repeats itself"
     found = certify(case.clock, ends.states[0, -1], period)
     every = f"every {period} forcing periods" if period > 1 else ""
@@ -369,10 +380,9 @@ def _on_orbit(case: _Case, ends: Recurrence, found: Certificate, seen: str, **mo
 
 def _judged(case: _Case, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has neither come to rest nor repeated itself."""
-    if case.system.load.period is None:
-        return case.undecided(
-            Reason.SELF_EXCITED if case.system.model.frictions else Reason.CONSERVATIVE, ends, {}
-        )
+    unforced = reason_unforced(case.system)
+    if unforced is not None:
+        return case.undecided(unforced, ends, {})
     states = ends.states[:, -JUDGEMENT.companions :]
     answer = judge(
         case.system, states, {}, settings=case.settings, progress=part_of(case.progress, 0.3, 0.6)

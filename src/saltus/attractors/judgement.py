@@ -14,10 +14,11 @@ import numpy as np
 
 from saltus.attractors.lyapunov.growth import LargestExponents
 from saltus.attractors.nonperiodic import regular_motion
+from saltus.attractors.stroboscopic_section import is_unforced
 from saltus.enumerations import NumberedSentence
-from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period
+from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period, simulate
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import System, states_beside
+from saltus.systems import System, arguments_of, natural_units, states_beside
 
 
 class Reason(NumberedSentence):
@@ -66,7 +67,10 @@ class Reason(NumberedSentence):
     NOT_FOLLOWED = 16, "the motion cannot be followed beyond some {periods} forcing periods"
     CONSERVATIVE = (
         17,
-        "under constant loads it goes on moving: it has not lost its energy, or has none to lose",
+        (
+            "under constant loads it goes on moving: it has not lost its energy, has none to lose, or gains some on a cycle, which "
+            "has no forcing period"
+        ),
     )
     SELF_EXCITED = (
         18,
@@ -134,6 +138,8 @@ class JudgementSettings:
 
 
 JUDGEMENT = JudgementSettings()
+# A coordinate that moves by less than this in a period of the clock, in natural units, stands.
+STANDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +239,29 @@ class SettledLater:
         return SettledLater(self.question[order], self.state[order], self.period[order])
 
 
+def reason_unforced(system: System) -> Reason | None:
+    """Why nothing is known of a motion that goes on moving although nothing that acts on it varies;
+    None where something does.
+
+    On a cycle without a forcing period the states at phase 0 of a clock fill a closed curve, and
+    look like those of a torus.
+    """
+    if not is_unforced(system):
+        return None
+    return Reason.SELF_EXCITED if system.model.frictions else Reason.CONSERVATIVE
+
+
+def reason_cycle(system: System, state: np.ndarray) -> Reason | None:
+    """`reason_unforced` of a motion from a state (d,) that repeats itself with its clock; None
+    where it stands at an equilibrium."""
+    reason = reason_unforced(system)
+    if reason is None:
+        return None
+    motion = simulate(system, **arguments_of(system, state), periods=1)
+    swing = np.ptp(np.atleast_2d(motion.extrema), axis=1)
+    return reason if (swing > STANDING * natural_units(system).lengths).any() else None
+
+
 def judge(
     system: System,
     states: np.ndarray,
@@ -255,7 +284,8 @@ def judge(
     grows, until none settles within three mean lives of the transient. If the rate at which
     companions settle does not fall, there is no such attractor.
 
-    A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after
+    Where nothing that acts on a system varies with time, nothing is judged: the answer is undecided
+    (`reason_unforced`). A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after
     a long period. It is on a torus if its exponent may be 0 and the conditions of `regular_motion`
     hold.
 
@@ -314,7 +344,10 @@ class _Judgement:
         self.states = np.full((n, settings.companions, system.dimension), np.nan)
         for row, given in enumerate(states):
             self.states[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
-        self.open = np.ones(n, dtype=bool)  # whether companions are still to be followed
+        # an entry for each question: a `Reason` where nothing that acts varies, so that nothing is
+        # looked for; else -1
+        self.unforced = np.array([self._unforced(row) for row in range(n)], dtype=int)
+        self.open = self.unforced < 0  # whether companions are still to be followed
         # whether the exponent is surely above, or below 0
         self.positive, self.negative = np.zeros((2, n), dtype=bool)
         # whether no companion is left; whether long periods were tried
@@ -330,6 +363,12 @@ class _Judgement:
         self.period, self.rounds = np.zeros((2, n), dtype=int)
         # Number of companions that settled in each round, and the round's exposure.
         self.history = np.zeros((2, settings.rounds + 1, n))
+
+    def _unforced(self, row: int) -> int:
+        """The number of the reason of a question on which nothing acts that varies; else -1."""
+        numbers = {path: float(values[row]) for path, values in self.parameters.items()}
+        reason = reason_unforced(self.system.with_(numbers) if numbers else self.system)
+        return -1 if reason is None else int(reason)
 
     def go_on_from(self, earlier: EarlierJudgement) -> None:
         """Go on from what a less careful judgement has shown."""
@@ -469,6 +508,7 @@ class _Judgement:
 
         Near bifurcations exponents are near 0, and motions settle slowly.
         """
+        chosen = chosen & (self.unforced < 0)
         rows = np.flatnonzero(chosen & ~self.positive & ~self.all_gone & ~self.looked)
         if not rows.size:
             return
@@ -532,7 +572,10 @@ class _Judgement:
         ):
             ending[chosen] = kind
             reason[chosen] = why
-        with np.errstate(divide="ignore"):
+        without = self.unforced >= 0
+        ending[without] = Ending.UNDECIDED
+        reason[without] = self.unforced[without]
+        with np.errstate(divide="ignore", invalid="ignore"):
             life = np.where(
                 lasts, (self.exposure - self.before) / 3.0, self.exposure / self.settled_count
             )

@@ -12,7 +12,14 @@ import numpy as np
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Stop, motions_from, nearest_return, simulate, stroboscopic
 from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from
-from saltus.systems import Load, System, arguments_of, check_system
+from saltus.systems import (
+    DeclaredLoad,
+    Load,
+    System,
+    arguments_of,
+    check_system,
+    natural_units,
+)
 
 
 def with_clock(system: System) -> System:
@@ -63,6 +70,33 @@ def is_constant(load: Load) -> bool:
     equilibria.
     """
     return not any(signal.periodic for signal in load.channels.values())
+
+
+def is_unforced(system: System) -> bool:
+    """Whether nothing that acts on a system varies with time: its motions may be shifted in time,
+    and a cycle of it has no forcing period, whatever the base frequency of its load is.
+    """
+    for signal in system.load.channels.values():
+        for term in getattr(signal, "terms", (signal,)):
+            if term.once or (term.periodic and getattr(term, "amplitude", 1.0) != 0.0):
+                return False
+    return system.load.frequency is None or not _reads_time(system)
+
+
+def _reads_time(system: System) -> bool:
+    """Whether the model itself reads the time, as one with an oscillating stiffness does."""
+    model = system.model
+    load = DeclaredLoad(system.load, model)
+    size = len(model.coordinates)
+    place = 0.1 * natural_units(system).lengths
+    rest: Any = (place[0], 0.0) if size == 1 else (tuple(place), (0.0,) * size)
+    period = system.load.period or 1.0
+    side = model.every_side[0]
+    found = [
+        np.ravel(np.array(model.acceleration(share * period, *rest, side, load), dtype=float))
+        for share in (0.0, 0.17, 0.41)
+    ]
+    return not np.allclose(found, found[0], rtol=1e-12, atol=0.0, equal_nan=True)
 
 
 def section_states(

@@ -70,6 +70,7 @@ from .states import rest_state as rest_state
 from .states import state_of as state_of
 from .states import states_beside as states_beside
 from .states import within_window as within_window
+from .structure import mode_sums as mode_sums
 from .system import System as System
 from .system import check_system as check_system
 from .system_units import NaturalUnits as NaturalUnits

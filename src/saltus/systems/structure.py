@@ -20,6 +20,7 @@ number of modes, each of which has a record of its coefficients.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
@@ -107,6 +108,54 @@ class ModeRecord:
         self.size = at + (1 + 2 * m if damped else 0)
 
 
+# Squares of frequencies that differ by less than this times the rounding of the largest one are
+# equal: their modes may be turned freely, and rounding does.
+EQUAL = 8.0
+# Entries of a mode that differ by less, as a share of the largest, are equally large.
+TIED = 1e-6
+
+
+def canonical(shapes: np.ndarray, squares: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Modes (n, k) of a mass matrix as a basis that depends neither on rounding nor on who computes
+    it.
+
+    Modes of equal frequencies are those in which fixed weights of the rows, with the mass matrix,
+    are diagonal, by rising value.
+    The largest entry of each mode is positive; of several that are equally large, the first.
+    """
+    weights = fixed_weights(len(shapes))
+    weighted = 0.5 * (mass * weights + (mass * weights).T)
+    found = shapes.copy()
+    rounding = EQUAL * len(shapes) * np.finfo(float).eps * np.abs(squares).max()
+    ends = np.flatnonzero(np.diff(squares) > rounding) + 1
+    for group in np.split(np.arange(len(squares)), ends):
+        if len(group) > 1:
+            part = found[:, group]
+            _, turned = np.linalg.eigh(part.T @ weighted @ part)
+            found[:, group] = part @ turned
+    sizes = np.abs(found)
+    first = np.argmax(sizes >= (1.0 - TIED) * sizes.max(axis=0), axis=0)
+    return found * np.sign(found[first, range(found.shape[1])])
+
+
+def fixed_weights(count: int) -> np.ndarray:
+    """Numbers between 0 and 1, (count,), without any symmetry: the fractions of n^2 times the golden
+    ratio. Those of n times it have some: w_n + w_m depends on n + m alone."""
+    return np.asarray((np.arange(1.0, count + 1.0) ** 2 * GOLDEN) % 1.0)
+
+
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+def mode_sums(model: Any) -> list[float]:
+    """The sums of the displacements of each coordinate of a `Structure` with fixed weights, by which
+    a reader of a file notices that its modes are others; none for other models."""
+    modes = vars(model).get("_modes") if hasattr(model, "__dict__") else None
+    if modes is None:
+        return []
+    return [float(x) for x in fixed_weights(len(modes.basis)) @ modes.basis]
+
+
 @lru_cache(maxsize=64)
 def modes_of(
     mass: ConstantNumbers,
@@ -126,9 +175,8 @@ def modes_of(
     free = null_space(r) if len(r) else np.eye(len(m))
     shapes = np.zeros((len(m), 0))
     if free.shape[1]:
-        _, found = eigh(free.T @ k @ free, free.T @ m @ free)
-        shapes = free @ found
-        shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), range(shapes.shape[1])])
+        squares, found = eigh(free.T @ k @ free, free.T @ m @ free)
+        shapes = canonical(free @ found, squares, m)
     basis = np.hstack([inertial @ local, shapes])
     count = len(r)
     rounding = 64.0 * len(m) * np.finfo(float).eps

@@ -88,7 +88,7 @@ class NaturalUnits:
     @cached_property
     def forces(self) -> np.ndarray:
         """The unit of the force along each coordinate, (n,)."""
-        return self.masses * self.lengths / self.time**2
+        return np.asarray(self.masses * self.lengths / self.time**2)
 
     @cached_property
     def state(self) -> np.ndarray:

@@ -75,13 +75,17 @@ class Labelling:
         rows = np.arange(len(states))
         history = states[:, None]
         done = 0
-        while rows.size and done < self.periods:
-            span = min(max(SETTINGS.stage, done // 2), self.periods - done)
+        # two periods of the longest orbit are looked at
+        most = max(
+            self.periods, 2 * max((len(t.states) for t in self.targets if not t.dense), default=0)
+        )
+        while rows.size and done < most:
+            span = min(max(SETTINGS.stage, done // 2), most - done)
             ends = find_recurrence(self.system, history[:, -1], span, tol=self.tol).after(
                 done, history
             )
             done += span
-            label[rows] = self._labels(ends, at_the_end=done == self.periods)
+            label[rows] = self._labels(ends, at_the_end=done == most)
             time[rows] = self._times(label[rows], ends)
             on = ends.unsettled & (label[rows] == UNDECIDED)
             rows, history = rows[on], ends.states[on]
@@ -147,10 +151,13 @@ def _on_orbit(target: Target, ends: Recurrence) -> np.ndarray:
     near = SAME_STATE * np.maximum(1.0, np.abs(last).max(axis=1))
     here: np.ndarray = (target.distance(last) < near) & (ends.periodic | ends.unsettled)
     rows = np.flatnonzero(here & ends.unsettled)
+    here[rows] = False
+    if ends.states.shape[1] < 2 * q:
+        return here  # not yet followed for two of its periods
     rounds = target.distance(ends.states[rows, -2 * q :])
     before = rounds[:, :q].max(axis=1)
     after = rounds[:, q:].max(axis=1)
-    here[rows] = (before < near[rows]) & (after < before) & (rounds.shape[1] == 2 * q)
+    here[rows] = (before < near[rows]) & (after < before)
     return here
 
 

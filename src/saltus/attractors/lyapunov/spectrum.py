@@ -27,7 +27,7 @@ from saltus.checks import Numbers
 from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, arguments_of, states_beside
+from saltus.systems import System, arguments_of, read_start, states_beside
 from saltus.taylor import Expr, differentiate, substitute, trace
 
 if TYPE_CHECKING:
@@ -344,6 +344,10 @@ class Exponents(Result):
         )
 
 
+# arguments of `lyapunov_spectrum` beside the state
+NAMES = ("periods", "transient", "tol", "two_trajectories", "progress")
+
+
 def lyapunov_spectrum(
     system: System,
     *,
@@ -404,8 +408,10 @@ def lyapunov_spectrum(
     """
     check_run("lyapunov_spectrum", system, periods, transient, tol)
     run = _Run(system, periods)
-    start = dict[str, Any](coordinates, velocity=velocity)
-    motion = simulate(system, **start, duration=transient * run.length, tol=tol, dense=False)
+    begin = float(coordinates.pop("time", 0.0))  # as `PeriodicOrbit.start` gives it
+    start = arguments_of(system, read_start(system, velocity, coordinates, NAMES))
+    span = transient * run.length + (-begin) % run.length  # up to phase 0
+    motion = simulate(system, **start, time=begin, duration=span, tol=tol, dense=False)
     run.state = arguments_of(system, motion.final_state)
     run.note = _lost(motion)
     share = 0.6 if two_trajectories else 1.0
