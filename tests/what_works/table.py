@@ -27,7 +27,7 @@ def written() -> str:
 
     numbers = {words: number for number, words in enumerate(REASONS, 1)}
     parts = [HEAD]
-    half = len(VERBS) // 2
+    half = (len(VERBS) + 1) // 2
     for title, verbs in (("Motions and orbits", VERBS[:half]), ("Results", VERBS[half:])):
         cells = {key: f"({numbers[words]})" for key, words in REFUSED.items()}
         parts.append(f"## {title}\n\n{_table(verbs, cells)}")

@@ -81,6 +81,25 @@ def many(tried: Tried, folder: Path) -> None:
     assert abs(float(ends[tried.observed]) - tried.value(tried.motion.position)) < 1e-8
 
 
+def many_extremes(tried: Tried, folder: Path) -> None:
+    """The least and the largest value of a motion of an ensemble are those of the motion alone."""
+    ends = saltus.simulate_many(
+        tried.system, **tried.start, periods=3, sample=("extrema",), last="all"
+    )
+    name = tried.observed if len(tried.coordinates) == 1 else "coordinate"
+    extrema = np.asarray(tried.motion.extrema)
+    assert abs(float(ends[f"overall_smallest_{name}"]) - extrema.min()) < 1e-8
+    assert abs(float(ends[f"overall_largest_{name}"]) - extrema.max()) < 1e-8
+
+
+def many_exponents(tried: Tried, folder: Path) -> None:
+    """The largest exponent of each motion of an ensemble is that of the orbit's multipliers."""
+    found = saltus.lyapunov_many(tried.system, **tried.start, periods=64, transient=40)
+    length = tried.orbit.period * tried.system.load.period
+    expected = math.log(max(abs(tried.orbit.multipliers))) / length
+    assert abs(float(np.ravel(found.exponent)[0]) - expected) < 0.05
+
+
 def sensitivities(tried: Tried, folder: Path) -> None:
     """A derivative to a number of the model is the quotient of differences."""
     path = tried.model_class.parameter
@@ -286,6 +305,7 @@ class Verb:
 VERBS = (
     Verb("motion", "simulate", simulate),
     Verb("ensemble", "simulate_many", many),
+    Verb("its extrema", "simulate_many", many_extremes),
     Verb("derivatives", "sensitivities", sensitivities),
     Verb("orbit", "find_orbit", orbit),
     Verb("branch", "continue_orbit", branch),
@@ -295,6 +315,7 @@ VERBS = (
     Verb("basins", "basins_of_attraction", basins),
     Verb("diagram", "response_spectrum", spectrum),
     Verb("exponents", "lyapunov_spectrum", exponents),
+    Verb("of an ensemble", "lyapunov_many", many_exponents),
     Verb("fit", "fit", fit),
     Verb("energies", "energies", energies),
     Verb("page", "page", page),
