@@ -1,3 +1,5 @@
+from .arcs import ArcBox as ArcBox
+from .arcs import arc_box as arc_box
 from .balls import EPS as EPS
 from .balls import UP as UP
 from .balls import Ball as Ball

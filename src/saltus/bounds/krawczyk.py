@@ -86,8 +86,13 @@ def contraction(
     return np.asarray((y + reach) * UP)
 
 
-def prove_zero(shooting: Shooting, settings: KrawczykSettings = SETTINGS) -> ProvedZero | NotProved:
-    """The tightest box around the zero near `shooting.x0` in which Krawczyk's operator proves it."""
+def prove_zero(
+    shooting: Shooting, settings: KrawczykSettings = SETTINGS, unique: bool = True
+) -> ProvedZero | NotProved:
+    """The tightest box around the zero near `shooting.x0` in which Krawczyk's operator proves it.
+
+    Unless `unique`, no wider box is looked for in which it is alone.
+    """
     near = _newton(shooting, settings.newton)
     if isinstance(near, NotProved):
         return near
@@ -104,8 +109,10 @@ def prove_zero(shooting: Shooting, settings: KrawczykSettings = SETTINGS) -> Pro
         reach = contraction(inverse, residual, jacobian, radius)
         if (reach < radius).all():
             tight, inner = _tightened(shooting, x, inverse, residual, reach)
-            unique = _widest(shooting, x, inverse, residual, radius, settings)
-            return ProvedZero(x, tight, inverse, residual, inner, unique)
+            alone = radius
+            if unique:
+                alone = _widest(shooting, x, inverse, residual, radius, settings)
+            return ProvedZero(x, tight, inverse, residual, inner, alone)
         share = float((reach / radius).max())
         size = float(np.abs(inverse).sum(axis=1).max())
         reason = (

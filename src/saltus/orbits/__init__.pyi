@@ -20,6 +20,7 @@ from .finding.search import Search as Search
 from .orbit import PeriodicOrbit as PeriodicOrbit
 from .orbits_as_json import as_json as as_json
 from .orbits_as_json import from_json as from_json
+from .proofs.branch_proof import BranchProof as BranchProof
 from .proofs.orbit_proof import OrbitProof as OrbitProof
 from .proofs.special_proof import SpecialProof as SpecialProof
 from .signature import Signature as Signature

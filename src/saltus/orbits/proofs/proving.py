@@ -8,10 +8,13 @@ from typing import overload
 from saltus.bounds import ShootingSettings
 from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError, shown
+from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.special_point import SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.proofs.branch_proof import BranchProof, prove_branch
 from saltus.orbits.proofs.orbit_proof import OrbitProof, prove_orbit
 from saltus.orbits.proofs.special_proof import SpecialProof, prove_special
+from saltus.progress import Progress, silent
 
 
 @overload
@@ -34,26 +37,42 @@ def prove(
 ) -> SpecialProof: ...
 
 
+@overload
 def prove(
-    result: PeriodicOrbit | SpecialPoint,
+    result: Branch,
     *,
     within: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
-) -> OrbitProof | SpecialProof:
-    """Prove by interval arithmetic that an orbit or a special point exists, alone in a box.
+    most_boxes: int = 2000,
+    progress: Progress = silent,
+) -> BranchProof: ...
+
+
+def prove(
+    result: PeriodicOrbit | SpecialPoint | Branch,
+    *,
+    within: Mapping[str, float] | None = None,
+    step: float | None = None,
+    order: int | None = None,
+    most_boxes: int = 2000,
+    progress: Progress = silent,
+) -> OrbitProof | SpecialProof | BranchProof:
+    """Prove by interval arithmetic that an orbit, a special point or a branch exists.
 
     Of an orbit: it exists, no other one of its signature is near, its contacts are open between
     impacts, and it is stable or unstable.
     Of a fold, a period doubling, a symmetry breaking or a grazing: an orbit with this property
     exists at a parameter that is enclosed, and it is regular.
+    Of a branch: its points lie on connected curves of orbits, each alone in one of many boxes along
+    the arclength, with signs of its turns and with stability; some 20 to 50 boxes take a second.
     The motion is enclosed by Taylor steps with a bound of their remainder, and the zero of the
     shooting equations by Krawczyk's operator.
 
     Parameters
     ----------
     result
-        An orbit, as from `find_orbit`, or a special point of a branch.
+        An orbit, as from `find_orbit`, a special point of a branch, or a branch.
     within
         By its path, how far a number of the system may lie from its double: the theorem holds for
         all of these values.
@@ -61,11 +80,16 @@ def prove(
         The longest Taylor step, also times the forcing frequency; 0.45 by default.
     order
         The order of the Taylor steps; 36 by default.
+    most_boxes
+        After so many boxes the proof of a branch stops, and says so.
+    progress
+        Called with the share of a branch's points that are done.
 
     Returns
     -------
-    OrbitProof | SpecialProof
-        With `proved`: True, False where the orbit is refuted, or None with the `reason`.
+    OrbitProof | SpecialProof | BranchProof
+        With `proved`: True, False where the orbit is refuted, or None with the `reason`; of a
+        branch, an entry for each point.
 
     Raises
     ------
@@ -100,8 +124,11 @@ def prove(
         return prove_orbit(result, radii, settings)
     if isinstance(result, SpecialPoint):
         return prove_special(result, radii, settings)
+    if isinstance(result, Branch):
+        check_count("most_boxes", most_boxes, at_least=1)
+        return prove_branch(result, radii, settings, int(most_boxes), progress)
     raise ParameterError(
-        f"prove takes a PeriodicOrbit, as from find_orbit, or a SpecialPoint of a branch, got "
+        f"prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
         f"{shown(result)}",
         "result",
     )
