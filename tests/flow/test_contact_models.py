@@ -1,5 +1,6 @@
 """The models with several contacts that come with saltus: the impact pair, and chains of cells."""
 
+import collections
 import math
 import pickle
 import time
@@ -301,11 +302,8 @@ def test_cells_that_move_alike_move_as_one_for_any_number_of_them(cells):
     start = dict(zip(many.model.coordinates, [0.2, -0.1] * cells, strict=True))
     motion = saltus.simulate(many, **start, velocity=(0.0,) * 2 * cells, duration=8.0)
     assert len(alone.impacts) > 3
-    assert any(
-        event.contact.count("+") == cells - 1
-        for event in motion.events
-        if event.kind == EventKind.IMPACT
-    )
+    closings = collections.Counter(motion.impacts.time.tolist())
+    assert max(closings.values()) == cells
     for cell in range(cells):
         np.testing.assert_allclose(
             motion.at(times)[0][2 * cell : 2 * cell + 2], alone.at(times)[0], rtol=0, atol=1e-8
@@ -432,9 +430,12 @@ def test_the_last_of_64_contacts_closes_alone_and_with_the_one_before():
     fall, lower = math.sqrt(2.0 * 0.7), math.sqrt(2.0 * 0.4)
     together = saltus.simulate(system, **high, x30=0.7, x31=0.7, duration=2.2 * fall)
     assert [event.contact for event in together.events.of(EventKind.IMPACT)] == [
-        "floor30+floor31"
+        "floor30",
+        "floor31",
     ] * 2
-    np.testing.assert_allclose(together.impacts.time, [fall, 2.0 * fall], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        together.impacts.time, [fall, fall, 2.0 * fall, 2.0 * fall], rtol=0, atol=1e-13
+    )
     apart = saltus.simulate(system, **high, x30=0.7, x31=0.4, duration=1.7 * fall)
     assert [event.contact for event in apart.events.of(EventKind.IMPACT)] == [
         "floor31",

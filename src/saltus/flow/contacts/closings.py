@@ -60,6 +60,8 @@ from saltus.flow.contacts.impacts import (
 )
 from saltus.flow.contacts.layout import (
     APART,
+    EQUAL_PUSH,
+    LETS_GO,
     MOST_TRIED,
     TIED,
     ContactColumn,
@@ -118,61 +120,158 @@ def violated(motion, candidates, zero):
 
 
 @lean_jit
-def exchange_closed(motion, candidates, still, t, zero):
-    """As `choose_closed`, where there are too many contacts for trying all choices: by exchanges
-    (`complementarity.py`).
+def set_choice(motion, candidates, still, number):
+    """Let contacts and frictions do what a number says: its lowest bits open those of the
+    `candidates`, as far as contacts are tried, and the base-3 digits of the rest are those of
+    `choose_slides`. False if a friction whose contact is open has a digit other than 0.
     """
     count = motion.contacts.shape[0]
-    for number in range(3 ** motion.frictions.shape[0]):
-        if not choose_slides(motion, still, number):
-            continue
-        closed = candidates
-        wrong = candidates
-        least = count + 1
-        for _ in range(count * count):
+    for i in range(count):
+        if candidates >> i & 1:
+            motion.contacts[i, ContactColumn.CLOSED] = 1
+            if count <= MOST_TRIED:
+                motion.contacts[i, ContactColumn.CLOSED] = 1 - number % 2
+                number //= 2
+    return choose_slides(motion, still, number)
+
+
+@lean_jit
+def changes_of(motion, candidates, still, held):
+    """How much the present choice changes: LETS_GO for each contact that opens and each friction
+    in `held` that lets go, and 1 for each other friction in `still` that does not stick.
+    """
+    changes = 0
+    for i in range(motion.contacts.shape[0]):
+        if candidates >> i & 1 and motion.contacts[i, ContactColumn.CLOSED] == 0:
+            changes += LETS_GO
+    for k in range(motion.frictions.shape[0]):
+        if still >> k & 1 and abs(motion.frictions[k, FrictionColumn.SLIDES]) == 1:
+            changes += LETS_GO if held >> k & 1 else 1
+    return changes
+
+
+@lean_jit
+def is_consistent(motion, candidates, still, held, t, zero):
+    """Whether the present choice fulfils the laws of contacts and frictions.
+
+    Where there are too many contacts for trying all choices, those of the contacts are found by
+    exchanges (`complementarity.py`).
+    """
+    count = motion.contacts.shape[0]
+    closed = candidates
+    least = count + 1
+    for _ in range(count * count if count > MOST_TRIED else 1):
+        hold_coordinates(motion)
+        hold_frictions(motion)
+        expand(motion, t, 1.0, motion.order)
+        wrong = violated(motion, candidates, zero)
+        if not wrong:
+            return slides_so(motion, count, still, held if motion.leave_by == 0 else 0)
+        if count > MOST_TRIED:
+            closed, least = exchanged(closed, wrong, least)
             for i in range(count):
                 if candidates >> i & 1:
                     motion.contacts[i, ContactColumn.CLOSED] = closed >> i & 1
-            hold_coordinates(motion)
-            hold_frictions(motion)
-            expand(motion, t, 1.0, motion.order)
-            wrong = violated(motion, candidates, zero)
-            if not wrong:
-                break
-            closed, least = exchanged(closed, wrong, least)
-        if not wrong and slides_so(motion, count, still):
-            return True
     return False
 
 
 @lean_jit
-def choose_closed(motion, candidates, still, t, zero):
+def push_of(motion):
+    """a' M a of the present choice, with the accelerations a: it does not depend on the order of
+    coordinates.
+    """
+    local = motion.local
+    total = 0.0
+    a = motion.acceleration_series
+    for i in range(local - motion.first_order):
+        for j in range(local - motion.first_order):
+            total += a[i, 0] * motion.solver_numbers[local * i + j] * a[j, 0]
+    return total
+
+
+@lean_jit
+def more_changes(motion, candidates, still, held, numbers, changes):
+    """The least number of changes above `changes` of all choices, or -1."""
+    least = -1
+    for number in range(numbers):
+        if set_choice(motion, candidates, still, number):
+            more = changes_of(motion, candidates, still, held)
+            if more > changes and (least < 0 or more < least):
+                least = more
+    return least
+
+
+@lean_jit
+def count_choices(motion, candidates, still):
+    """The number of choices that `set_choice` takes."""
+    numbers = 1
+    for i in range(motion.contacts.shape[0]):
+        if motion.contacts.shape[0] <= MOST_TRIED and candidates >> i & 1:
+            numbers *= 2
+    for k in range(motion.frictions.shape[0]):
+        if still >> k & 1:
+            numbers *= 3
+    return numbers
+
+
+@lean_jit
+def choose_closed(motion, candidates, still, held, t, zero):
     """Decide which of the candidates, which are at rest at their positions, stay closed; False if
     no choice is consistent.
 
     The choice fulfils 0 <= reaction _|_ second derivative of the gap >= 0; where both are 0, their
     first non-zero derivatives decide likewise. It is decided together which of the frictions in
-    `still`, which have the speed of their ground, stick: all that can.
+    `still`, which have the speed of their ground, stick.
+
+    With static coefficients above the kinetic ones several choices may be consistent. The one that
+    changes least is taken (`changes_of`): what holds goes on holding if it can, and what has just
+    come to the speed of its ground sticks if it can. Of several that change equally little it is
+    the one with the least push (`push_of`), and `ties` counts the instant. If these are equal too,
+    as in a symmetric system, one that changes more is taken if it is alone. So the order in which
+    contacts, frictions and coordinates are declared decides nothing.
     """
-    count = motion.contacts.shape[0]
-    if count > MOST_TRIED:
-        return exchange_closed(motion, candidates, still, t, zero)
-    for number in range((1 << count) * 3 ** motion.frictions.shape[0]):
-        choice = number & ((1 << count) - 1)  # the bits of those that open
-        if choice & ~candidates:
-            continue
-        for i in range(count):
-            if candidates >> i & 1:
-                motion.contacts[i, ContactColumn.CLOSED] = 1 - (choice >> i & 1)
-        if not choose_slides(motion, still, number >> count):
-            continue
-        hold_coordinates(motion)
-        hold_frictions(motion)
-        expand(motion, t, 1.0, motion.order)
-        agrees = violated(motion, candidates, zero) == 0
-        if agrees and slides_so(motion, count, still):
-            return True
-    return False
+    numbers = count_choices(motion, candidates, still)
+    single = still & (still - 1) == 0  # no two choices of one friction are consistent
+    changes = -1
+    found = -1
+    several = False
+    while True:
+        changes = more_changes(motion, candidates, still, held, numbers, changes)
+        if changes < 0:
+            break
+        least = np.inf
+        best = -1
+        alike = False
+        for number in range(numbers):
+            if not set_choice(motion, candidates, still, number):
+                continue
+            if changes_of(motion, candidates, still, held) != changes:
+                continue
+            if not is_consistent(motion, candidates, still, held, t, zero):
+                continue
+            if single:
+                return True
+            push = push_of(motion)
+            several = several or best >= 0
+            if best < 0 or push < least - EQUAL_PUSH * abs(least):
+                alike = False
+                best = number
+                least = push
+            elif push <= least + EQUAL_PUSH * abs(least):
+                alike = True
+        if best >= 0 and not alike:
+            found = best
+            break
+        if found < 0:
+            found = best
+    if found < 0:
+        return False
+    if several and motion.leave_by == 0:
+        if motion.ties == 0:
+            motion.tied_at = motion.origin + t
+        motion.ties += 1
+    set_choice(motion, candidates, still, found)
+    return is_consistent(motion, candidates, still, held, t, zero)
 
 
 @lean_jit
@@ -297,7 +396,7 @@ def rates_between(motion, t, hit):
     """Fill the accelerations between two impacts in a row, after that of `hit`; returns the closed
     contacts that open, as bits."""
     candidates = closed_bits(motion)
-    if candidates & hit and not choose_closed(motion, candidates, 0, t, ZERO):
+    if candidates & hit and not choose_closed(motion, candidates, 0, 0, t, ZERO):
         for i in range(motion.contacts.shape[0]):
             motion.contacts[i, ContactColumn.CLOSED] = candidates >> i & 1
     hold_coordinates(motion)
@@ -306,48 +405,36 @@ def rates_between(motion, t, hit):
     return candidates & ~closed_bits(motion)
 
 
-@lean_jit
-def is_apart(one, other):
-    """Whether two shifts differ by more than rounding, so that the events are not at one instant in
-    neighbouring motions.
-    """
-    return not abs(one - other) <= APART * (abs(one) + abs(other))
-
-
 @jit
 def impacts_in_a_row(motion, t, hit, backwards):
     """The impacts of contacts that close at one instant, block by block; an `ImpactDetail`, or -1
     if one of them fails.
 
-    `IMPULSES` then holds the impulses of all, and `EVENT_SHIFTS` the shift of the event, nan for
-    columns along which the blocks' instants differ. The columns are those at the last impact, with
-    the accelerations after it.
+    Each block has its own event, so that the number of events does not depend on whether rounding
+    lets blocks that move alike close at one instant. The columns are those at the last impact,
+    with the accelerations after it.
     """
-    total = np.zeros(motion.contacts.shape[0])
     opened = 0
     found = int(ImpactDetail.REGULAR)
-    begun = False
-    together = motion.event_shifts
     while hit:
         block = hit & block_of(motion, hit, backwards) if hit & (hit - 1) else hit
         hit &= ~block
+        record_contact_event(motion, EventCode.IMPACT, block, t)
         detail = impact_of(motion, t, block)
         if detail < 0:
             return -1
+        fill_after(motion)
+        if motion.columns > 0:
+            motion.event_labels[motion.recorded_events - 1, 3] = detail
+            if detail != ImpactDetail.NO_SPEED:
+                note_shifts(motion, motion.shifts)
         if found != ImpactDetail.NO_SPEED and detail != ImpactDetail.REGULAR:
             found = detail
-        for i in range(total.size):
-            total[i] += motion.impulses[i]
-        for j in range(motion.columns):
-            shift = motion.shifts[j]
-            together[j] = math.nan if begun and is_apart(together[j], shift) else shift
-        begun = True
         if hit and motion.columns > 0:
             opened |= rates_between(motion, t, block)
             move_columns(motion, -1.0)
             clear_shifts(motion)
     undecide(motion, opened)
-    copy_all(total, motion.impulses)
     return found
 
 
@@ -391,7 +478,9 @@ def impacts_in_any_order(motion, t, hit):
     """
     start = motion.state.copy()
     rows = motion.contacts.copy()
+    recorded = motion.recorded_events
     impacts_in_a_row(motion, t, hit, True)
+    motion.recorded_events = recorded
     rates_between(motion, t, hit)
     move_columns(motion, -1.0)
     other = motion.state.copy()
@@ -404,6 +493,7 @@ def impacts_in_any_order(motion, t, hit):
     opened = rates_between(motion, t, hit)
     if compare_orders(motion, other) and detail == ImpactDetail.REGULAR:
         detail = int(ImpactDetail.ORDERED)
+        motion.event_labels[motion.recorded_events - 1, 3] = detail
     undecide(motion, opened)
     return detail
 
@@ -413,29 +503,25 @@ def contact_impact(motion, t, hit):
     """Apply the impact law to all contacts whose gap is 0, of which those in `hit` have just
     closed. PAUSED, or NO_IMPACT.
     """
-    record_contact_event(motion, EventCode.IMPACT, hit, t)
     if hit & (hit - 1) and motion.columns > 0:
         detail = impacts_in_any_order(motion, t, hit)
     else:
         detail = impacts_in_a_row(motion, t, hit, False)
     if detail < 0:
         return Status.NO_IMPACT
-    fill_after(motion)
-    if motion.columns > 0:
-        motion.event_labels[motion.recorded_events - 1, 3] = detail
-        if detail == ImpactDetail.NO_SPEED:
-            forget(motion)
-        else:
-            note_shifts(motion, motion.event_shifts)
+    if motion.columns > 0 and detail == ImpactDetail.NO_SPEED:
+        forget(motion)
     return Status.PAUSED
 
 
 @jit
-def rests_in_a_row(motion, t, near):
-    """Bring the contacts in `near`, whose impacts accumulate, to rest: each block at the instant of
-    its own last impact.
+def rests_in_a_row(motion, t, near, end):
+    """Bring the contacts in `near`, whose impacts accumulate until `end`, to rest: each block at
+    the instant of its own last impact, with an event of its own.
     """
-    total = np.zeros(motion.contacts.shape[0])
+    moving = 0
+    for i in range(motion.contacts.shape[0]):
+        moving |= (1 << i) if near >> i & 1 and motion.rates[i] != 0.0 else 0
     jumped = 0
     for i in range(motion.contacts.shape[0]):
         jumped |= 1 << i if near >> i & 1 and motion.gaps[i] == 0.0 and motion.rates[i] > 0.0 else 0
@@ -455,6 +541,9 @@ def rests_in_a_row(motion, t, near):
                     motion.shifts[j] = -gap_derivative(motion, j, i) / motion.rates[i]
             move_columns(motion, 1.0)
         near, jumped = near & ~block, jumped & ~block
+        record_contact_event(motion, EventCode.HELD, moving & block, end)
+        if motion.columns > 0:
+            note_shifts(motion, motion.event_shifts)
         jump_columns(motion, block)
         jump_first_order(motion, block)
         if is_pressed(motion):
@@ -463,6 +552,4 @@ def rests_in_a_row(motion, t, near):
         bring_to_rest(motion, block)
         if motion.columns > 0:
             rest_columns(motion, block)
-        for i in range(total.size):
-            total[i] += motion.impulses[i]
-    copy_all(total, motion.impulses)
+        fill_after(motion)

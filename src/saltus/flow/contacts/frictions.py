@@ -17,6 +17,7 @@ from __future__ import annotations
 from saltus.flow.contacts.complementarity import eliminate
 from saltus.flow.contacts.impacts import record_contact_event
 from saltus.flow.contacts.layout import (
+    TOGETHER,
     ContactColumn,
     FrictionColumn,
     NoMargin,
@@ -25,7 +26,7 @@ from saltus.flow.contacts.layout import (
 )
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
-from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading
+from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
 from saltus.flow.kernel.steps import columns_at_event, expand, step_size
 from saltus.taylor import lean_jit
 
@@ -170,6 +171,8 @@ def first_friction(motion, count, h, whole):
             if known >= order:
                 continue
             kind, u, touch = contact_root(guard, known, order, h, motion.polynomial)
+            if motion.nudged == 1 + count + k:
+                u = nudged_share(motion, u, h)
             if kind == SIMPLE and u < first:
                 hit = k
                 first = u
@@ -218,11 +221,15 @@ def undecided(motion):
     """The frictions with exactly the speed of their ground, as bits; for the others the direction
     in which they slide is noted, and for a surface that has just been reached the other side.
 
-    If blocks move alike, the sliding speed of one may have changed its sign, within rounding, at
-    the instant of another one's event. Its direction is then kept, so that it has its own event
-    next, to which it takes the tangent's columns.
+    If blocks move alike, the sliding speed of one may be 0, or have changed its sign, within
+    rounding, at the instant of another one's event. Its direction is then kept, so that it has its
+    own event next, to which it takes the tangent's columns. So has one that has just begun to slide
+    at this instant.
     """
     bits = 0
+    turns = False  # whether this is the event of a friction or a surface
+    for k in range(motion.frictions.shape[0]):
+        turns = turns or motion.frictions[k, FrictionColumn.REACHED] > 0
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
             if motion.frictions[k, FrictionColumn.REACHED] == 3:
@@ -235,12 +242,29 @@ def undecided(motion):
         if is_lifted(motion, k):
             motion.frictions[k, FrictionColumn.SLIDES] = 2
             motion.frictions[k, FrictionColumn.SKIP] = 0
+        elif (
+            turns
+            and motion.frictions[k, FrictionColumn.REACHED] == 0
+            and abs(slides) == 1
+            and abs(rate) <= rounding_of_speed(motion, k)
+        ):
+            continue
         elif rate == 0.0:
             bits |= 1 << k
         elif abs(rate) > ZERO or rate * slides >= 0.0 or slides == 2:
             motion.frictions[k, FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1
             motion.frictions[k, FrictionColumn.SKIP] = 0
     return bits
+
+
+@lean_jit
+def rounding_of_speed(motion, k):
+    """What rounding of instants may leave of a sliding speed when its own event is at the same
+    instant as another one.
+    """
+    speed = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
+    unit = motion.period_length if motion.period_length > 0.0 else 1.0
+    return TOGETHER * (abs(speed[0]) + abs(ground_speed(motion, k)) + abs(speed[1]) * unit)
 
 
 @lean_jit
@@ -251,19 +275,20 @@ def is_lifted(motion, k):
 
 
 @lean_jit
-def choose_slides(motion, candidates, choice):
-    """Let each of the candidates stick, slide forwards or slide backwards, by the base-3 digits of
-    `choice`; False if a friction that is no candidate has a digit other than 0."""
+def choose_slides(motion, still, choice):
+    """Let each of the frictions in `still` stick, slide forwards or slide backwards, by the base-3
+    digits of `choice`, of which each has one; False if one in an open contact has a digit other
+    than 0."""
     for k in range(motion.frictions.shape[0]):
-        digit, choice = choice % 3, choice // 3
+        digit = 0
+        if still >> k & 1:
+            digit, choice = choice % 3, choice // 3
         if is_lifted(motion, k):
             motion.frictions[k, FrictionColumn.SLIDES] = 2
             if digit > 0:
                 return False
-        elif candidates >> k & 1:
+        elif still >> k & 1:
             motion.frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
-        elif digit > 0:
-            return False
         elif motion.frictions[k, FrictionColumn.SLIDES] == 2:
             rate = motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(
                 motion, k
@@ -275,9 +300,10 @@ def choose_slides(motion, candidates, choice):
 
 
 @lean_jit
-def slides_so(motion, count, candidates):
+def slides_so(motion, count, candidates, held):
     """Whether the first non-zero Taylor coefficients of their guards confirm the choice for the
-    candidates; notes how many coefficients before them are 0."""
+    candidates; notes how many coefficients before them are 0. Those in `held` have stuck up to
+    now, and let go at events of their own."""
     order = motion.order
     g = motion.gap_series
     for k in range(motion.frictions.shape[0]):
@@ -297,6 +323,8 @@ def slides_so(motion, count, candidates):
                     1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0,
                     order,
                 )
+                if reached == 0 and held >> k & 1 and abs(row[0]) <= ZERO:
+                    continue  # its own event is next if this margin falls
                 if i < order and row[i] < 0.0:
                     return False
                 if i > 0:
@@ -340,6 +368,16 @@ def slides_before(motion):
     for k in range(motion.frictions.shape[0] - 1, -1, -1):
         number = 4 * number + 1 + motion.frictions[k, FrictionColumn.SLIDES]
     return number
+
+
+@lean_jit
+def sticking(motion, before):
+    """The frictions that stick with the directions `before` (base-4 digits), as bits."""
+    bits = 0
+    for k in range(motion.frictions.shape[0]):
+        bits |= 1 << k if before % 4 == 1 else 0
+        before //= 4
+    return bits
 
 
 @lean_jit

@@ -40,13 +40,13 @@ from saltus.flow.contacts.frictions import (
     slide_bits,
     slides_before,
     stick_columns,
+    sticking,
     tear_loose,
     undecided,
 )
 from saltus.flow.contacts.impacts import (
     closed_bits,
     contact_step_size,
-    fill_after,
     fill_contact_matrices,
     frozen_accumulation,
     gap_series,
@@ -80,7 +80,14 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.layout import SHORTEST, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
-from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, margin_root, value_and_slope
+from saltus.flow.kernel.roots import (
+    NEVER,
+    SIMPLE,
+    contact_root,
+    margin_root,
+    nudged_share,
+    value_and_slope,
+)
 from saltus.flow.kernel.steps import (
     columns_at_event,
     expand,
@@ -128,7 +135,6 @@ def end_accumulation_of(motion, t):
         return t
     limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
     together = near
-    moving = 0
     left = (
         rubbed_accumulation(motion, t, near, last, limit)
         if turns
@@ -154,20 +160,15 @@ def end_accumulation_of(motion, t):
             near = slower
             again = rest_after(motion, near, -1, limit)
             left = again if again >= 0.0 else left + again
-    for i in range(count):
-        moving |= (1 << i) if near >> i & 1 and motion.rates[i] != 0.0 else 0
     if left < 0.0:
         motion.contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
         return t
-    record_contact_event(motion, EventCode.HELD, moving, t + left)
     if motion.columns > 0:
         if turns:
             unknown_shifts(motion)
         else:
             accumulation_shifts(motion, near, t)
-        note_shifts(motion, motion.event_shifts)
-    rests_in_a_row(motion, t, near)
-    fill_after(motion)
+    rests_in_a_row(motion, t, near, t + left)
     return t + left
 
 
@@ -212,11 +213,12 @@ def decide_contacts(motion):
     if motion.leave_by == 1 and not begin_on_surfaces(motion, t):
         return Status.NOT_UNIQUE
     still = undecided(motion)
-    if (candidates or still) and not choose_closed(motion, candidates, still, t, ZERO):
+    held = sticking(motion, before)
+    if (candidates or still) and not choose_closed(motion, candidates, still, held, t, ZERO):
         note_ties(motion, candidates, t)
         if not (
-            choose_closed(motion, candidates, still, t, ZERO)
-            or choose_closed(motion, candidates, still, t, 1e3 * TIED)
+            choose_closed(motion, candidates, still, held, t, ZERO)
+            or choose_closed(motion, candidates, still, held, t, 1e3 * TIED)
         ):
             # where nothing presses, what an accumulation leaves of gaps decides nothing
             return Status.NOT_UNIQUE
@@ -224,11 +226,13 @@ def decide_contacts(motion):
     hold_frictions(motion)
     opened = candidates & ~closed_bits(motion)
     if opened and motion.leave_by == 0:
-        record_contact_event(motion, EventCode.RELEASE, opened, t)
-        if opened & (opened - 1):
-            note_shifts(motion, motion.event_shifts)
-        else:
-            note_shifts(motion, motion.shifts)
+        for i in range(count):
+            if opened >> i & 1:
+                record_contact_event(motion, EventCode.RELEASE, 1 << i, t)
+                if opened & (opened - 1):
+                    note_shifts(motion, motion.event_shifts)
+                else:
+                    note_shifts(motion, motion.shifts)
     if motion.leave_by == 0:
         record_slides(motion, before, t)
     decide_columns(motion, t)
@@ -278,6 +282,8 @@ def first_guard(motion, h, whole):
         else:
             gap_series(motion, i, contact_position(motion, i), order, guard)
         kind, u, touch = contact_root(guard, skip, order, h, motion.polynomial)
+        if motion.nudged == 1 + i:
+            u = nudged_share(motion, u, h)
         if kind == SIMPLE and u < first:
             hit = i
             first = u
@@ -417,7 +423,9 @@ def contact_arc(motion, target):
     for i in range(count):
         motion.contacts[i, ContactColumn.SKIP] = 0
     for k in range(motion.frictions.shape[0]):
-        motion.frictions[k, FrictionColumn.SKIP] = 0
+        # at an event at the same instant as the last one, what has just begun to slide goes on
+        if tau > 0.0 or k == rubs or bits != 0:
+            motion.frictions[k, FrictionColumn.SKIP] = 0
     if bits != 0:  # the sign is the bit of the 64th contact
         motion.mode = Mode.CONTACT
         t = motion.time
@@ -457,6 +465,14 @@ def begin(motion):
 def waits(motion):
     """Whether a decision is due before the motion may end."""
     return motion.mode == Mode.CONTACT
+
+
+@lean_jit
+def spare_events(motion):
+    """The number of events that one pass may record at most: impacts, or ends of accumulations and
+    releases, of all contacts, what all frictions do, and a rest.
+    """
+    return 4 + 2 * (motion.contacts.shape[0] + motion.frictions.shape[0])
 
 
 @lean_jit

@@ -121,9 +121,17 @@ NEAR = (
     2.0**-44
 )  # Contacts close together if, when one closes, the other's gap is no larger than this share of its size in the step.
 GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the contact's position.
+# Events of frictions are at one instant if no more than this share of the period lies between them:
+# some 1e3 units in the last place.
+TOGETHER = 2.0**-42
 # For models with more contacts sets of them are found by exchanges, as there are too many to try
 # them all.
 MOST_TRIED = 8
+# What counts as letting go, in units of a friction that only does not begin to stick: there are no
+# more than 64 rows.
+LETS_GO = 1000
+# Two answers push alike if their a' M a differ by less than this share: by rounding.
+EQUAL_PUSH = 1e-9
 # The largest violation of a complementarity problem that may be rounding, as a share of its
 # right-hand side.
 VIOLATED = 1e-12

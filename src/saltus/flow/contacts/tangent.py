@@ -455,6 +455,14 @@ def start_columns(motion, t, closed):
 
 
 @lean_jit
+def is_apart(one, other):
+    """Whether two shifts differ by more than rounding, so that the events are not at one instant in
+    neighbouring motions.
+    """
+    return not abs(one - other) <= APART * (abs(one) + abs(other))
+
+
+@lean_jit
 def event_shifts(motion):
     """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at
     this instant, which are nan if contacts close at several instants in neighbouring motions."""
@@ -462,12 +470,18 @@ def event_shifts(motion):
         if motion.contacts[i, ContactColumn.RELEASED] == 1:
             return  # `release_columns` has filled them
     first = 1 + 2 * motion.own + motion.contacts.shape[0]
-    last = motion.recorded_events - 1
     for j in range(motion.columns):
         motion.event_shifts[j] = motion.shifts[j]
-        if (
+        begun = False
+        last = motion.recorded_events - 1
+        while (
             last >= 0
             and motion.event_labels[last, 1] == EventCode.IMPACT
             and motion.event_values[last, 0] == motion.time
         ):
-            motion.event_shifts[j] = motion.event_values[last, first + j]
+            shift = motion.event_values[last, first + j]
+            if begun and is_apart(motion.event_shifts[j], shift):
+                shift = math.nan
+            motion.event_shifts[j] = shift
+            begun = True
+            last -= 1

@@ -9,7 +9,14 @@ from __future__ import annotations
 from saltus.flow.kernel.layout import BATCH, Status
 from saltus.flow.kernel.memory import ADVANCE, MotionMemory
 from saltus.flow.kernel.steps import next_target, state_arrays
-from saltus.flow.one_contact.kernel import begin, is_smooth, one_pass, parts_of, waits
+from saltus.flow.one_contact.kernel import (
+    begin,
+    is_smooth,
+    one_pass,
+    parts_of,
+    spare_events,
+    waits,
+)
 from saltus.taylor import by_reference, cached_jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -24,7 +31,7 @@ def advance_with(numbers, parts):
         if motion.until_smooth > 0 and batch > 0 and is_smooth(motion):
             return Status.SMOOTH
         full = motion.recorded_steps >= motion.step_spans.shape[0] - 4
-        if full or motion.recorded_events >= motion.event_values.shape[0] - 4:
+        if full or motion.recorded_events >= motion.event_values.shape[0] - spare_events(motion):
             return Status.FULL
         motion.origin = motion.period * motion.period_length
         last = motion.period == motion.last_period

@@ -55,6 +55,13 @@ MOTION = np.dtype(
         ),  # for the scalar steps of a lane, which end with its forcing period: the local time at its motion's end
         # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
         ("until_smooth", _WHOLE),
+        # for tests: 1 plus the row of a contact or friction whose events are moved, and by how
+        # many units in the last place of the time; 0 moves none
+        ("nudged", _WHOLE),
+        ("nudge", _REAL),
+        # how often no answer changed least, and the time at which this was first so (`choose_closed`)
+        ("ties", _WHOLE),
+        ("tied_at", _REAL),
         ("order", _WHOLE),  # of the Taylor series
         # The sizes of the structure.
         ("dof", _WHOLE),  # coordinates that are followed, own (1 + columns)

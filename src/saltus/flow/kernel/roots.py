@@ -335,3 +335,12 @@ def roots_within(p, n, roots, noise):
         width[top + 1] = half
         top += 2
     return found
+
+
+@lean_jit
+def nudged_share(motion, u, h):
+    """The share of a step at which an event happens that a test has moved by `nudge` units in the
+    last place of the time.
+    """
+    moved = u + motion.nudge * 2.0**-52 * (motion.time + u * h) / h
+    return max(moved, 0.0)

@@ -30,7 +30,8 @@ from saltus.taylor.load_tables import own_records
 # --- compiled from here on ---------------------------------------------------
 
 MOST_TURNS = 16  # the most turning points that are looked for within one step
-BUFFER_LENGTH = 64  # steps, and events, of one call
+BUFFER_LENGTH = 64  # steps of one call
+EVENT_LENGTH = 320  # events of one call: more than 128 rows may record in one pass
 
 
 # --- roots and extrema -------------------------------------------------------
@@ -167,7 +168,7 @@ def buffers(motion, numbers):
         np.empty((BUFFER_LENGTH, motion.own, motion.order + 2)),
     )
     return steps, EventBuffers(
-        np.empty((BUFFER_LENGTH, 4), np.int64), np.empty((BUFFER_LENGTH, numbers + motion.columns))
+        np.empty((EVENT_LENGTH, 4), np.int64), np.empty((EVENT_LENGTH, numbers + motion.columns))
     )
 
 

@@ -203,6 +203,10 @@ class MotionEvents(RowTable, Sequence[Event]):
         """
         return self
 
+    def closed_together(self) -> list[float]:
+        """The times of impacts at which contacts that act on one another close at one instant."""
+        return []
+
     def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, and the events of other kinds if wanted, as arrays."""
         impacts = self._of_kinds(EventKind.IMPACT, *also)
@@ -282,6 +286,14 @@ class ContactEvents(MotionEvents):
             name for i, name in enumerate((*self._contacts, *self._frictions)) if bits >> i & 1
         ]
         return "both" if chosen == list(self._contacts) and len(chosen) == 2 else "+".join(chosen)
+
+    def closed_together(self) -> list[float]:
+        """The times of impacts at which contacts that act on one another close at one instant."""
+        bits = self._labels[:, 2]
+        several = (self._labels[:, 1] == EVENT_KINDS.index(EventKind.IMPACT)) & (
+            bits & (bits - 1) != 0
+        )
+        return self.times[several].tolist()
 
     def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from saltus.systems import System
 
 
+# For tests alone: 1 plus the row of a contact or friction, and by how many units in the last place
+# of the time its events are moved, as by rounding. None moves none.
+NUDGE: tuple[int, float] | None = None
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
@@ -63,6 +66,8 @@ class KernelState:
         )
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, at.length, request.tol)
+        if NUDGE is not None:
+            self.array["nudged"], self.array["nudge"] = NUDGE
 
     @property
     def numbers(self) -> Any:
@@ -343,6 +348,9 @@ class Recorder:
         self._columns = run.structure.sizes.columns
         self._own = run.structure.sizes.own
         self._several = run.structure.several
+        # what one pass of the kernel may record (`spare_events`)
+        parts = run.trace.contact_coordinates, run.trace.friction_coordinates
+        self._spare = 2 * sum(map(len, parts)) if self._several else 0
         self._begin = request.start[: self._own]
         self._drops = not request.dense and request.sample_times is None
         self._bends = _is_nonlinear(request.system)
@@ -371,7 +379,8 @@ class Recorder:
     def make_buffers(self, size: int = MOST.buffer) -> None:
         """Make empty buffers for as many steps, and events."""
         width = self._width + self._columns
-        self.events = EventBuffers(np.empty((size, 4), dtype=np.int64), np.empty((size, width)))
+        events = size + self._spare
+        self.events = EventBuffers(np.empty((events, 4), dtype=np.int64), np.empty((events, width)))
         if self._keeps_steps:
             self.steps = StepBuffers(
                 np.empty((size, 2), dtype=np.int64),

@@ -96,6 +96,10 @@ class Motion(Result):
         The states at the times that `simulate(times=...)` was given.
     sampled_validity
         The validity of a motion with `kept` samples.
+    ties
+        How often several answers of Coulomb's law changed equally little, see `validity`.
+    first_tie
+        The first time at which they did.
 
     Examples
     --------
@@ -119,6 +123,8 @@ class Motion(Result):
     dense: DenseOutput | None
     kept: Samples | None
     sampled_validity: Validity | None
+    ties: int = 0
+    first_tie: float | None = None
 
     def __getattr__(self, name: str) -> Any:
         known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
@@ -374,6 +380,15 @@ class Motion(Result):
             if self.dense is not None:
                 check.add(self.dense)
             found = check.result(self.time - self.start)
+        together = self.events.closed_together()
+        if self.ties or together:
+            found = replace(
+                found,
+                ties=self.ties,
+                first_tie=self.first_tie,
+                together=len(together),
+                first_together=together[0] if together else None,
+            )
         if self.limit is None or found.first.get(self.limit, self.time) is not None:
             return found
         # it ended at the very instant

@@ -569,4 +569,6 @@ def _collect(
         dense=recorder.dense(),
         kept=samples,
         sampled_validity=None if samples is None else recorder.validity(time - start),
+        ties=numbers.ties,
+        first_tie=numbers.tied_at if numbers.ties else None,
     )

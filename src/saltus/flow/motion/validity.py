@@ -94,6 +94,14 @@ class Validity:
     gains
         The contacts at which the impact law may raise the kinetic energy, and by what share of it
         (see `energy_gain`).
+    ties
+        At how many instants several answers of Coulomb's law changed equally little.
+    first_tie
+        The first of these times, or None.
+    together
+        How often contacts that act on one another closed at one instant.
+    first_together
+        The first of these times, or None.
 
     Examples
     --------
@@ -105,6 +113,10 @@ class Validity:
     first: dict[str, float | None]
     share: dict[str, float]
     gains: dict[str, float] = field(default_factory=dict)
+    ties: int = 0
+    first_tie: float | None = None
+    together: int = 0
+    first_together: float | None = None
 
     @property
     def respected(self) -> bool:
@@ -112,7 +124,7 @@ class Validity:
         return not self.gains and all(time is None for time in self.first.values())
 
     def _repr_html_(self) -> str:
-        if not self.first and not self.gains:
+        if not self.first and not self.gains and not self.not_unique():
             return html_table("Validity", {"margins": str(self)})
         rows = {
             name: "respected" if t is None else f"passed first at {t:.6g}"
@@ -120,6 +132,7 @@ class Validity:
         }
         shares = [f"{100 * self.share[name]:.3g} %" for name in self.first]
         gained = {name: self.gain(name) for name in self.gains}
+        gained |= self.not_unique()
         columns = {"margin": [*rows, *gained], "motion": [*rows.values(), *gained.values()]}
         return rows_table(columns | {"share of the time": [*shares, *[""] * len(gained)]})
 
@@ -134,7 +147,26 @@ class Validity:
             for name, t in self.first.items()
         ]
         parts += [f"impacts at {name} {self.gain(name)}" for name in self.gains]
+        parts += list(self.not_unique().values())
         return "; ".join(parts) or "the model has no margins"
+
+    def not_unique(self) -> dict[str, str]:
+        """Sentences about the instants at which the laws of friction, or of impact, leave a choice;
+        empty if there are none.
+        """
+        sentences = {}
+        if self.ties:
+            sentences["frictions"] = (
+                f"{_instants(self.ties, self.first_tie)} several answers of Coulomb's law change "
+                "equally little, and the one with the least accelerations was taken"
+            )
+        if self.together:
+            sentences["impacts"] = (
+                f"{_instants(self.together, self.first_together)} contacts that act on one another "
+                "close together, and a motion beside this one, in which they close one after the "
+                "other, may differ from it by much"
+            )
+        return sentences
 
     def gain(self, contact: str) -> str:
         """A sentence about the energy that impacts may gain at a contact in `gains`.
@@ -146,6 +178,11 @@ class Validity:
         """
         share = 100 * self.gains[contact]
         return f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a smaller transfer would not"
+
+
+def _instants(count: int, first: float | None) -> str:
+    """At how many instants, from when on, in words."""
+    return f"at time {first:.6g}" if count == 1 else f"at {count} instants, first at {first:.6g},"
 
 
 class ValidityCheck:

@@ -215,6 +215,12 @@ def is_smooth(motion):
 
 
 @lean_jit
+def spare_events(motion):
+    """The number of events that one pass may record at most."""
+    return 4
+
+
+@lean_jit
 def waits(motion):
     """Whether a decision is due before the motion may end."""
     return False

@@ -59,13 +59,16 @@ class Switching:
 
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
-        yield from self._together()
+        yield from self._together(False)
         yield from self._without_pull()
         yield from self._without_speed()
         yield from self._touching()
+        # these may be together all along the branch, as those of cells that move alike
+        yield from self._together(True)
 
-    def _together(self) -> Iterator[list[Timed]]:
-        """The events beyond a point at which two successive events have come together."""
+    def _together(self, independent: bool) -> Iterator[list[Timed]]:
+        """The events beyond a point at which two successive events have come together, of contacts
+        that act on one another or do not."""
         events = list(self.events)
         n = len(self.events)
         symmetric = self.equations.signature.symmetric
@@ -81,6 +84,8 @@ class Switching:
                 continue
             one = first.event
             other = second.event
+            if independent != self.equations.is_independent(one.contact, other.contact):
+                continue
             if one.contact != other.contact:
                 before = self._before(i)
                 # the impact on the other contact opens this one
@@ -270,7 +275,7 @@ def contact_change(point: OrbitPoint) -> SpecialKind:
     """
     orbit = point.orbit
     here = Switching.of_point(point)
-    joined = next(iter(here._together()), None) is not None
+    joined = next(iter(here._together(False)), None) is not None
     return (
         SpecialKind.SW
         if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance)

@@ -38,7 +38,8 @@ from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, 
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.branches.symmetry import full_point
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
-from saltus.orbits.equations.event_sequence import STAYS, read_signature
+from saltus.orbits.equations.event_sequence import STAYS, contact_blocks, read_signature
+from saltus.orbits.equations.sampled_motion import ONE_INSTANT
 from saltus.orbits.proofs.contact_segments import contact_segments
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
@@ -161,6 +162,28 @@ class ContactsEquations(OrbitEquations):
         ]
         return np.array(rows, dtype=np.int64)
 
+    @cached_property
+    def _blocks(self) -> list[int]:
+        """The contacts on which each contact acts, as bits."""
+        return contact_blocks(self.system)
+
+    def is_independent(self, one: int, other: int) -> bool:
+        """Whether two contacts do not act on one another."""
+        return not self._blocks[one] >> other & 1
+
+    @cached_property
+    def _independent(self) -> np.ndarray:
+        """(events,): whether the contacts of an event and of the next one do not act on one
+        another.
+        """
+        return np.array(
+            [
+                self.is_independent(event.contact, int(row[SegmentPlan.CONTACT]))
+                for event, row in zip(self.signature.events, self.plan, strict=False)
+            ],
+            dtype=bool,
+        )
+
     def _power(self, begin: ModeChange, end: ModeChange) -> int:
         """The power of the time with which a contact opens, of a segment that begins with an event
         of this contact without speed afterwards and ends with an impact on it; else 0."""
@@ -245,9 +268,14 @@ class ContactsEquations(OrbitEquations):
     def pressing(self, solution: Solution) -> float:
         """The least of the reactions of closed contacts, the times between events, and the gaps of
         other contacts at impacts.
+
+        Events at one instant of contacts that do not act on one another stay together along a
+        branch, as those of cells that move alike: the time between them is rounding.
         """
         phases = self.split(solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
+        alike = self._independent & (np.abs(apart) <= ONE_INSTANT * self.closing)
+        apart = apart[~alike]
         columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]
         evaluation: Any = solution.evaluation
         seen = evaluation.seen

@@ -15,7 +15,7 @@ from saltus.flow import EventCode, EventKind, Motion
 from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import System
+from saltus.systems import System, mass_rows
 
 CHANGES = (
     EventCode.IMPACT,
@@ -245,6 +245,8 @@ def _section_distance(motion: Motion, period: float) -> float:
     return float(min(after, before) / (after + before))
 
 
+# A mass matrix that depends on the coordinates is looked at where they have these sizes.
+PLACES_OF_MASS = 0.13, 0.21
 STAYS = (
     "the motion comes to rest with all coordinates held at contacts for good, which is no "
     "orbit to follow; start elsewhere"
@@ -325,40 +327,60 @@ def _mode_changes(motion: Motion, together: float) -> list[tuple[float, ModeChan
     """The events at which contacts open or close, each with its time and the contacts that are
     closed after it.
 
-    Contacts of different groups, such as the cells of a chain that move alike, may act at one
-    instant. These count as events one after the other, in any order, as their impulses do not act
-    on one another.
+    Contacts that do not act on one another, such as those of the cells of a chain that move alike
+    or of the two ends of a pipe, may act at one instant. These count as events one after the other,
+    in the order of the contacts.
 
     Raises
     ------
     MotionError
         There are events for which orbits have no equations.
     """
-    contacts = motion.system.contact_model.contacts
+    blocks = contact_blocks(motion.system)
     last = motion.start
     changes: list[tuple[float, ModeChange]] = []
-    for time, acting in _instants(motion, together):
+    for time, acting in _instants(motion, together, blocks):
         before = int(motion.closed_at(0.5 * (last + time)))
         closed = int(motion.closed_at(time))
         here = list[tuple[float, ModeChange]]()
-        # before its event all contacts of a group are as they were
-        for contact, is_impact in reversed(acting.items()):
-            here.append((time, ModeChange(is_impact, contact, closed)))
-            group = sum(
-                1 << i for i, other in enumerate(contacts) if other.group == contacts[contact].group
-            )
-            closed = closed & ~group | before & group
+        # before its event all contacts of a block are as they were
+        for contact in sorted(acting, reverse=True):
+            here.append((time, ModeChange(acting[contact], contact, closed)))
+            closed = closed & ~blocks[contact] | before & blocks[contact]
         changes += reversed(here)
         last = time
     return changes
 
 
-def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bool]]]:
+def contact_blocks(system: System) -> list[int]:
+    """For each contact the contacts, as bits, on which it acts at an impact: those that the mass
+    matrix or the restitution couples with it.
+
+    Contacts of different blocks may act at one instant, as no impulse of one changes the rate of
+    another one's gap.
+    """
+    model = system.contact_model
+    size = len(model.coordinates)
+    places = [model.coordinates.index(contact.coordinate) for contact in model.contacts]
+    coupled = np.eye(size, dtype=bool)
+    for x in PLACES_OF_MASS:
+        q = x if size == 1 else tuple(x / (1 + i) for i in range(size))
+        coupled |= np.asarray(mass_rows(model, q), dtype=float) != 0.0
+    for i, row in enumerate(system.impact.restitution_matrix(model)):
+        for j, entry in enumerate(row):
+            coupled[places[i], places[j]] |= float(entry) != 0.0
+    for _ in range(size):
+        coupled = coupled @ (coupled | coupled.T)
+    return [sum(1 << j for j, b in enumerate(places) if coupled[a, b]) for a in places]
+
+
+def _instants(
+    motion: Motion, together: float, blocks: Sequence[int]
+) -> list[tuple[float, dict[int, bool]]]:
     """The instants at which contacts act: for each of them the contacts, and whether it is an
     impact (else a release).
     """
-    contacts = motion.system.contact_model.contacts
-    names = [contact.name for contact in contacts]
+    names = [contact.name for contact in motion.system.contact_model.contacts]
     instants = list[tuple[float, dict[int, bool]]]()
     events: Sequence[Any] = motion.events
     for event in events:
@@ -374,10 +396,12 @@ def _instants(motion: Motion, together: float) -> list[tuple[float, dict[int, bo
             else map(names.index, event.contact.split("+"))
         ):
             is_impact = event.kind is EventKind.IMPACT
-            groups = {contacts[other].group for other in acting if other != contact}
-            if contacts[contact].group in groups or (contact in acting and is_impact):
+            beside = [i for i in acting if i != contact and blocks[contact] >> i & 1]
+            if beside or (contact in acting and is_impact):
+                both = " and ".join(repr(names[i]) for i in sorted({contact, *beside}))
                 raise MotionError(
-                    f"two events at one instant, {time:.6g}: an orbit has no equations for that"
+                    f"two events at {both} at one instant, {time:.6g}: the order of events that "
+                    "act on one another matters, so that an orbit has no equations for that"
                 )
             acting.setdefault(contact, is_impact)
     return instants
