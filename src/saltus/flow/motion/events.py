@@ -293,7 +293,7 @@ class ContactEvents(MotionEvents):
         several = (self._labels[:, 1] == EVENT_KINDS.index(EventKind.IMPACT)) & (
             bits & (bits - 1) != 0
         )
-        return self.times[several].tolist()
+        return [float(time) for time in self.times[several]]
 
     def impacts(self, *also: EventKind) -> Impacts:
         """The impacts, as arrays; `side` has the bits of the contacts that were hit, velocities are

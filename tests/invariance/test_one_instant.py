@@ -1,0 +1,180 @@
+"""Events at one instant: which of them rounding puts first decides nothing.
+
+`NUDGE` of the kernel's inputs moves the events of one contact or friction by units in the last
+place, as another processor would.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import saltus
+import saltus.flow.motion.kernel_state as kernel_state
+
+ULPS = (None, (1, 1.0), (1, -4.0), (1, 64.0), (2, 1.0), (2, 4.0), (2, -64.0))
+DAMPING, COUPLING, FREQUENCY, RESTITUTION = 0.1, 0.4, 0.9, 0.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pipe(saltus.ContactModel):
+    """Both ends of a pipe between equal stops: a'' = F - a - C a' - k (a - b), and b likewise."""
+
+    room: float = 0.6
+
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        return tuple(
+            saltus.Contact(name=f"stop_{c}", coordinate=c, position=self.room, sign=-1)
+            for c in "ab"
+        )
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
+        (a, b), (v, w), force = theta, velocity, load.force(t)
+        apart = COUPLING * (a - b)
+        return force - a - DAMPING * v - apart, force - b - DAMPING * w + apart
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blocks(saltus.ContactModel):
+    """Two blocks on rough ground, as the ends of the pipe, that slip, stick and turn round."""
+
+    kinetic: float = 0.3
+    static: float = 0.4
+
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    force = Pipe.force
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        return tuple(
+            saltus.Friction(
+                name=f"ground_{c}", coordinate=c, kinetic=self.kinetic, static=self.static
+            )
+            for c in "ab"
+        )
+
+    def normal_forces(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        return 1.0, 1.0
+
+
+def system_of(model: Any, amplitude: float) -> saltus.System:
+    load = saltus.Load(frequency=FREQUENCY, force=saltus.Harmonic(amplitude=amplitude))
+    law = {"impact": saltus.NewtonImpact(e=RESTITUTION)} if model.contacts else {}
+    return saltus.System(model=model, load=load, **law)
+
+
+def at_nudges(monkeypatch: pytest.MonkeyPatch, what: Callable[[], Any]) -> list[Any]:
+    """A result with events as they come, and with those of one part moved."""
+    results = []
+    for nudge in ULPS:
+        monkeypatch.setattr(kernel_state, "NUDGE", nudge)
+        results.append(what())
+    monkeypatch.setattr(kernel_state, "NUDGE", None)
+    return results
+
+
+@pytest.mark.parametrize(("model", "amplitude"), [(Pipe(), 0.5), (Blocks(), 0.5), (Blocks(), 1.2)])
+def test_events_at_one_instant_count_the_same_however_rounding_orders_them(
+    monkeypatch: pytest.MonkeyPatch, model: Any, amplitude: float
+) -> None:
+    system = system_of(model, amplitude)
+
+    def counts() -> tuple[Counter[tuple[str, str]], np.ndarray]:
+        motion = saltus.simulate(system, a=0.0, b=0.0, periods=5)
+        state = np.array([motion.position, motion.velocity])
+        return Counter((str(event.kind), event.contact) for event in motion.events), state
+
+    (first, state), *others = at_nudges(monkeypatch, counts)
+    assert sum(first.values()) >= 8
+    names = sorted({name[-1] for _, name in first} - {"b"})
+    assert names == ["a"]
+    for (kind, name), count in first.items():
+        assert first[kind, name[:-1] + "b"] == count
+    for other, state_of_other in others:
+        assert other == first
+        np.testing.assert_allclose(state_of_other, state, rtol=0, atol=1e-11)
+
+
+def test_derivatives_of_two_ends_are_those_of_their_sum_and_difference(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Multipliers in closed form: each mode is a linear oscillator, whose columns an impact changes
+    by the saltation of one mass at its wall, which is the same for both masses.
+    """
+    system = system_of(Pipe(), 0.5)
+    orbit = saltus.find_orbit(system, a=0.0, b=0.0)
+    motion = orbit.motion(tol=1e-14)
+    instants = sorted(set(np.round(motion.impacts.time, 9)))
+    assert len(motion.impacts) == 2 * len(instants) > 0
+    expected = []
+    for stiffness in (1.0, 1.0 + 2.0 * COUPLING):
+        smooth = np.array([[0.0, 1.0], [-stiffness, -DAMPING]])
+        total, time = np.eye(2), motion.start
+        for impact in motion.impacts.time[::2]:
+            speed = motion.at(impact - 1e-9)[1][0]
+            pull = float(system.load.force(impact)) - 0.6
+            before = pull - DAMPING * speed
+            after = pull + DAMPING * RESTITUTION * speed
+            jump = np.array(
+                [
+                    [-RESTITUTION, 0.0],
+                    [-(after + RESTITUTION * before) / speed, -RESTITUTION],
+                ]
+            )
+            total, time = jump @ expm(smooth * (impact - time)) @ total, impact
+        end = motion.start + 2.0 * np.pi / FREQUENCY
+        expected += np.linalg.eigvals(expm(smooth * (end - time)) @ total).tolist()
+
+    def multipliers() -> tuple[np.ndarray, np.ndarray]:
+        start = orbit.start()
+        state = saltus.sensitivities(system, **start, periods=1, tol=1e-13).state
+        return saltus.find_orbit(system, a=0.0, b=0.0).multipliers, np.linalg.eigvals(state)
+
+    for pair in at_nudges(monkeypatch, multipliers):
+        for found in pair:
+            apart = np.abs(found[:, None] - np.array(expected))
+            assert apart.min(axis=0).max() < 1e-7
+
+
+def test_a_branch_of_two_ends_that_move_alike_ends_at_its_bounds() -> None:
+    """Nothing happens along it: the time between its impacts is rounding."""
+    system = system_of(Pipe(), 0.5)
+    orbit = saltus.find_orbit(system, a=0.0, b=0.0)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.85, 0.95))
+    assert [str(end) for end in branch.ends] == ["bound 0.85", "bound 0.95"]
+    assert not branch.special
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cradle(saltus.ContactModel):
+    """Three balls in a row, of which the outer two come from both sides at once."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    contacts = (
+        saltus.Contact(name="left", coordinate={"y": 1.0, "x": -1.0}),
+        saltus.Contact(name="right", coordinate={"z": 1.0, "y": -1.0}),
+    )
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        return 0.0, 0.0, 0.0
+
+
+def test_validity_says_where_contacts_that_act_on_one_another_close_together() -> None:
+    system = saltus.System(model=Cradle(), impact=saltus.NewtonImpact(e=0.5))
+    motion = saltus.simulate(system, x=-1.0, y=0.0, z=1.0, velocity=(1.0, 0.0, -1.0), duration=1.5)
+    assert motion.validity.together == 1
+    assert motion.validity.first_together == pytest.approx(1.0, abs=1e-13)
+    assert "contacts that act on one another close together" in str(motion.validity)
+    one = saltus.simulate(system, x=-1.0, y=0.0, z=2.0, velocity=(1.0, 0.0, 0.0), duration=1.5)
+    assert one.validity.together == 0
