@@ -129,7 +129,7 @@ def test_derivatives_of_two_ends_are_those_of_their_sum_and_difference(
             jump = np.array(
                 [
                     [-RESTITUTION, 0.0],
-                    [-(after + RESTITUTION * before) / speed, -RESTITUTION],
+                    [(after + RESTITUTION * before) / speed, -RESTITUTION],
                 ]
             )
             total, time = jump @ expm(smooth * (impact - time)) @ total, impact

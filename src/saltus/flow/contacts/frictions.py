@@ -213,7 +213,7 @@ def reach_ground_speed(motion, count, t, k, which, later):
         motion.coordinates[rest] = ground_speed(motion, k)
     elif which == 2:
         motion.velocities[rest] = ground_speed(motion, k)
-    motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 0
+    motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 4
 
 
 @lean_jit

@@ -38,7 +38,8 @@ class FrictionColumn(IntEnum):
     SKIP = 2
     # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
     MARGIN = 3
-    # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached
+    # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached;
+    # 4: a margin was at 0, or below, at the start of the step
     REACHED = 4
     PRESSED = 5  # 1 plus the number of the contact whose reaction presses it, 0 for none
     STRUCK = 6  # a `FrictionImpact`
