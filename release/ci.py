@@ -293,6 +293,8 @@ def main() -> int:
         for step in table:
             print(f"{step.name:12} {step.minutes:4.0f} min at most  {step.what}")
         return 0
+    # so that what a step has started ends with this program
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended from outside"))
     return run_all(table)
 
 
