@@ -60,11 +60,20 @@ class Step:
     may_fail: bool = False  # what is installed from elsewhere may be missing
 
 
+# It ends with IMPOSSIBLE where something cannot be had.
 INSTALL_SYSTEM = """
 if test "$(id -u)" = 0 && command -v apt-get >/dev/null; then
     apt-get update -qq
-    apt-get install -qq --no-install-recommends chromium nodejs npm >/dev/null
+    for wanted in chromium:chromium node:nodejs npm:npm; do
+        command -v "${wanted%:*}" >/dev/null ||
+            apt-get install -qq --no-install-recommends "${wanted#*:}" >/dev/null ||
+            echo "${wanted#*:} cannot be installed here"
+    done
 fi
+for command in chromium node npm; do
+    command -v "$command" || missing="${missing:-} $command"
+done
+test -z "${missing:-}" || { echo "this machine lacks$missing"; exit 77; }
 """
 INSTALL_PEERS = """
 if test "$(id -u)" = 0 && command -v apt-get >/dev/null; then
