@@ -11,12 +11,14 @@ import { amplitudeOf } from "./settling.js";
 const SLICE = 10; // milliseconds of work between two pictures
 const WATCHED = 4; // periods at the end of each value over which the amplitude is taken
 const LEAST_LEAP = 0.02; // of the largest amplitude: what a jump changes at least
+const DIFFERENT = 0.01; // of the largest amplitude: by more the ways up and down are on two motions
 const JUMP_HALVINGS = 8; // of a step between two values, in which a smooth change becomes small and a jump stays
 const MORE_TIMES = 3; // a motion that has not settled is followed for as long again
 const STEADY = 0.01; // of its amplitude: what a motion that has settled changes at most from some periods to the next
 
 /** @typedef {{value: number, amplitude: number, state: number[], stop: string, steady: boolean}} SweepPoint */
 /** @typedef {{way: "up"|"down", from: SweepPoint, to: SweepPoint}} Jump */
+/** @typedef {(value: number, state: Record<string, number>) => {point: SweepPoint, ended: boolean}} Settle */
 /** @typedef {{up: SweepPoint[], down: SweepPoint[], jumps: Jump[], done: boolean, refusal: string}} SweepResult */
 
 export class Sweep {
@@ -75,23 +77,48 @@ export class Sweep {
           if (!(await isCurrent())) return;
         }
       }
-      const least = LEAST_LEAP * Math.max(...[...this.result.up, ...this.result.down].map(({ amplitude }) => amplitude || 0));
-      for (const way of /** @type {const} */ (["up", "down"])) {
-        for (const step of changesOf(this.result[way], least)) {
-          for (let k = 0; k < JUMP_HALVINGS && step.change > least; k++) {
-            const middle = settle((step.from.value + step.to.value) / 2, named(this.session, step.from.state)).point;
-            if (!(await isCurrent())) return;
-            if (!middle.steady) break; // too near to the jump to settle
-            halve(step, middle);
-          }
-          if (step.change > least) this.result.jumps.push({ way, from: step.from, to: step.to });
-        }
-      }
+      if (!(await this.findJumps(settle, isCurrent))) return;
     } catch (error) {
       this.result.refusal = /** @type {any} */ (error)?.message ?? String(error);
     }
     this.result = { ...this.result, done: true };
     this.tell(this.result);
+  }
+
+  /**
+   * Find the jumps between the values; false once the sweep was begun anew.
+   * @param {Settle} settle @param {() => Promise<boolean>} isCurrent
+   */
+  async findJumps(settle, isCurrent) {
+    const { up, down, jumps } = this.result;
+    const most = Math.max(...[...up, ...down].map(({ amplitude }) => amplitude || 0));
+    const [least, different] = [LEAST_LEAP * most, DIFFERENT * most];
+    const between = (/** @type {SweepPoint} */ from, /** @type {SweepPoint} */ to, begin = from) => settle((from.value + to.value) / 2, named(this.session, begin.state)).point;
+    for (const [way, own, other] of /** @type {const} */ ([["up", up, down], ["down", down, up]])) {
+      for (const step of changesOf(own, least)) {
+        for (let k = 0; k < JUMP_HALVINGS && step.change > least; k++) {
+          const middle = between(step.from, step.to);
+          if (!(await isCurrent())) return false;
+          if (!middle.steady) break; // too near to the jump to settle
+          halve(step, middle);
+        }
+        if (step.change > least) jumps.push({ way, from: step.from, to: step.to });
+      }
+      // a jump may hide in a small change, where the amplitude has risen before it falls
+      for (const step of endsOfLoops(own, other, different)) {
+        const inside = (/** @type {Jump} */ jump) => jump.way === way && (jump.from.value - step.from.value) * (jump.to.value - step.to.value) <= 0;
+        if (jumps.some(inside)) continue;
+        for (let k = 0; k < JUMP_HALVINGS; k++) {
+          const [middle, joined] = [between(step.from, step.to), between(step.from, step.to, step.to)];
+          if (!(await isCurrent())) return false;
+          if (!middle.steady || !joined.steady) break;
+          if (Math.abs(middle.amplitude - joined.amplitude) > different) step.from = middle;
+          else step.to = middle;
+        }
+        jumps.push({ way, from: step.from, to: step.to });
+      }
+    }
+    return true;
   }
 }
 
@@ -145,4 +172,17 @@ export function halve(step, middle) {
   if (before > behind) step.to = middle;
   else step.from = middle;
   step.change = Math.max(before, behind);
+}
+
+/**
+ * The steps in which a sweep leaves the motion of its own and joins that of the way back: before they differ, and behind they agree.
+ * @param {SweepPoint[]} own @param {SweepPoint[]} other the way back, whose values are in the other order @param {number} different
+ */
+export function endsOfLoops(own, other, different) {
+  const back = [...other].reverse();
+  const apart = own.map((point, i) => Math.abs(point.amplitude - (back[i]?.amplitude ?? NaN)) > different);
+  return own.slice(1).flatMap((to, i) => {
+    const from = /** @type {SweepPoint} */ (own[i]);
+    return apart[i] && !apart[i + 1] && from.steady && to.steady ? [{ from, to }] : [];
+  });
 }
