@@ -18,6 +18,7 @@ from .load import Load as Load
 from .metainterface import Metainterface as Metainterface
 from .mirror import Mirror as Mirror
 from .mirror import declares_mirror as declares_mirror
+from .mirror import has_half_the_period as has_half_the_period
 from .mirror import image_of as image_of
 from .mirror import is_its_image_later as is_its_image_later
 from .mirror import mirror_of as mirror_of

@@ -118,6 +118,46 @@ def is_its_image_later(system: System) -> bool:
     return _moves_as_image(inner, same, 0.5 * period)
 
 
+def has_half_the_period(system: System) -> bool:
+    """Whether the equations repeat themselves after half a forcing period, as under a load that
+    acts through its square: what the load's frequency calls a period then is two.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    """
+    if system.load.period is None:
+        return False
+    inner = system.in_gap_coordinates
+    model: Any = inner.model
+    load = DeclaredLoad(inner.load, model)
+    units = natural_units(inner)
+    random = np.random.default_rng(4)
+    n = len(model.coordinates)
+    t = random.uniform(size=PROBES) * inner.load.period
+    q = random.normal(size=(n, PROBES)) * units.lengths[:, None]
+    v = random.normal(size=(n, PROBES)) * units.speeds[:, None]
+    frictions = len(model.frictions)
+    try:
+        with np.errstate(all="ignore"):
+            for side in model.every_side:
+                values = [
+                    np.concatenate(
+                        [
+                            _rows(model.acceleration(time, _of(q), _of(v), side, load), n),
+                            _rows(normal_forces(model, time, _of(q), _of(v), load), frictions),
+                        ]
+                    )
+                    for time in (t, t + 0.5 * inner.load.period)
+                ]
+                if not _alike(*values):
+                    return False
+    except (SaltusError, ArithmeticError, TypeError, ValueError, IndexError):
+        return False
+    return True
+
+
 def _mirror_of(system: System) -> Mirror | None:
     model = system.model
     inner = system.in_gap_coordinates

@@ -24,6 +24,7 @@ AFTER_RELEASE = 3  # power of the time with which the gap grows after a release
 # begins: its speeds grow as the distance cubed.
 BEGUN = (1e-4, 1e-3, 1e-2)
 MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
+MOST_TOUCHES = 8  # the most contacts that are touched at once, each with an impact beyond
 
 
 @dataclass(frozen=True)
@@ -146,10 +147,40 @@ class Switching:
 
     def _without_speed(self) -> Iterator[list[Timed]]:
         """The events without an impact that has lost its speed."""
-        for i, timed in enumerate(self.events):
-            slow = abs(self.evaluation.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
-            if timed.event.is_impact and slow and timed.event.closed == self._before(i):
-                yield _changed(list(self.events), {i: None})
+        for i in self.slow_impacts():
+            yield _changed(list(self.events), {i: None})
+
+    def slow_impacts(self) -> list[int]:
+        """The places of impacts that have lost their speed and change no closed contact."""
+        return [
+            i
+            for i, timed in enumerate(self.events)
+            if timed.event.is_impact
+            and abs(self.evaluation.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
+            and timed.event.closed == self._before(i)
+        ]
+
+    def with_touch(self) -> list[Timed] | None:
+        """The events with an impact at a touch of a contact that has none yet; None without one."""
+        events = list(self.events)
+        seen = self.evaluation.seen
+        frequency = self.equations.frequency(self.point.solution.values)
+        touched = np.flatnonzero(np.abs(seen[:, SegmentExtremes.GAP]) < TOLERANCES.touch)
+        for s in touched.tolist():
+            contact = int(seen[s, SegmentExtremes.GAP + 2])
+            phase = float(seen[s, SegmentExtremes.GAP + 1]) * frequency
+            is_known = any(
+                timed.event.contact == contact
+                and abs((timed.phase - phase + np.pi) % (2.0 * np.pi) - np.pi)
+                < TOLERANCES.switching
+                for timed in events
+            )
+            if not is_known:
+                closed = int(self.equations.plan[s, SegmentPlan.ALONG])
+                new = Timed(ModeChange(True, contact, closed), phase)
+                at = s + 1 if events else 0
+                return [*events[:at], new, *events[at:]]
+        return None
 
     def _touching(self) -> Iterator[list[Timed]]:
         """The events with an additional impact where a gap touches 0, or with a release and an
@@ -303,22 +334,93 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
     """
     here = Switching.of_point(point)
     reason = OrbitEnd.TWO_AT_ONCE
+    if not known:
+        # several impacts that appear or are lost at once belong together, as both of a symmetric
+        # orbit: with one of them alone the branch would be left
+        alike = _with_all_impacts(point)
+        ahead = None if alike is None else _admissible(alike)
+        if ahead is not None:
+            return ahead
     known = (*known, cycle_of(point.orbit.signature))
     for events in here.other_signatures():
-        found = here.equations_with(events)
-        if found is None or cycle_of(found[0].signature) in known:
-            continue
-        solved = point.curve.with_equations(found[0]).known(found[1], point.parameters)
-        if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
+        begun = _begun(here, events, known)
+        if begun is None:
             continue
         reason = OrbitEnd.NO_DIRECTION
-        begun = point.curve.with_equations(found[0]).along_kernel(solved)
         ahead = _admissible(begun) or (
             _with_other_events(begun, known) if len(known) < MOST_TOGETHER else None
         )
         if isinstance(ahead, OrbitPoint):
             return ahead
     return End(reason, point.parameter)
+
+
+def _begun(here: Switching, events: list[Timed], known: tuple[Cycle, ...]) -> OrbitPoint | None:
+    """The orbit of a switching in the equations with other events, which are none of those known;
+    None where it does not solve them."""
+    found = here.equations_with(events)
+    if found is None or cycle_of(found[0].signature) in known:
+        return None
+    curve = here.point.curve.with_equations(found[0])
+    solved = curve.known(found[1], here.point.parameters)
+    if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
+        return None
+    begun: OrbitPoint = curve.along_kernel(solved)
+    return begun
+
+
+def _with_all_impacts(point: OrbitPoint) -> OrbitPoint | None:
+    """The orbit in the equations without all of the impacts that have lost their speed, or with one
+    at each touch; None if there is one alone, or none."""
+    here = Switching.of_point(point)
+    slow = here.slow_impacts()
+    if len(slow) > 1:
+        return _begun(here, _changed(list(here.events), dict.fromkeys(slow)), ())
+    number = 0
+    while number < MOST_TOUCHES and (events := here.with_touch()) is not None:
+        begun = None if slow else _begun(here, events, ())
+        if begun is None:
+            return None
+        here = Switching.of_point(begun)
+        number += 1
+    return here.point if number > 1 else None
+
+
+def families_beside(point: OrbitPoint) -> list[tuple[str, int]]:
+    """At an orbit at which several impacts appear or are lost at once, those with which alone
+    orbits begin there: "with" or "without" each, and the number of its contact. They are no
+    symmetric orbits where the branch's are.
+
+    Parameters
+    ----------
+    point
+        The point of the branch.
+    """
+    full = full_point(point) if point.orbit.symmetric else point
+    here = Switching.of_point(full)
+    events = list(here.events)
+    slow = here.slow_impacts()
+    all_touched = None if slow else _with_all_impacts(full)
+    if len(slow) > 1:
+        choices = [("without", events[i].event.contact, _changed(events, {i: None})) for i in slow]
+    elif all_touched is not None:
+        new = [
+            timed
+            for timed in Switching.of_point(all_touched).events
+            if all(abs(timed.phase - other.phase) > TOLERANCES.switching for other in events)
+        ]
+        choices = [
+            ("with", timed.event.contact, sorted([*events, timed], key=lambda one: one.phase))
+            for timed in new
+        ]
+    else:
+        return []
+    found = []
+    for change, contact, other in choices:
+        begun = _begun(here, other, ())
+        if begun is not None and _admissible(begun) is not None:
+            found.append((change, contact))
+    return found
 
 
 def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:

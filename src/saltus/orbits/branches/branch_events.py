@@ -24,6 +24,7 @@ from saltus.orbits.branches.orbit_curve import (
     grazing,
     never_torus,
 )
+from saltus.orbits.branches.retrace import comes_along_itself
 from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
 from saltus.orbits.branches.symmetry import (
     beside_image,
@@ -219,6 +220,8 @@ class BranchEvents(OrbitEvents):
             )
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
+        if comes_along_itself(run.points):
+            return End(OrbitEnd.ALONG_ITSELF, run.points[-2].parameter)
         # one point alone may be where branches cross
         if not any(point.orbit.isolated for point in run.points[-2:]):
             return End(OrbitEnd.NOT_ISOLATED, run.points[-2:][0].parameter)

@@ -119,6 +119,10 @@ class OrbitEnd(EndReason):
         "comes back onto itself at {parameter:.9g}: between two branches that nearly meet it has gone over "
         "from one to the other; use a smaller step"
     )
+    ALONG_ITSELF = (
+        "comes back along itself: from {parameter:.9g} on its orbits are those that it has already, in the other direction; "
+        "an event that leads on in two ways, or a step that was too long, has turned it round"
+    )
     MANY_IMPACTS = "more than {detail} impacts a period"
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
@@ -196,6 +200,12 @@ class SpecialPoint(Zero):
         """The distance of the orbit from itself a period later, by direct simulation."""
         return self.orbit.defect
 
+    @property
+    def note(self) -> str:
+        """What it is besides, or what else begins there, in words; empty if there is nothing."""
+        found: str = self.orbit.equations.note(self.kind, self.point)
+        return found
+
     def _repr_html_(self) -> str:
         return SpecialPoints([self])._repr_html_()
 
@@ -204,7 +214,7 @@ class SpecialPoint(Zero):
         return (
             f"SpecialPoint(kind='{self.kind}', {'parameter' if len(self.parameters) == 1 else 'parameters'}={place}, "
             f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.impact_count} impacts, "
-            f"bracket {self.evidence.bracket:.1g})"
+            f"bracket {self.evidence.bracket:.1g}{self.note and '; ' + self.note})"
         )
 
 

@@ -32,6 +32,7 @@ from saltus.orbits.branches.beyond_switching import (
     AFTER_RELEASE,
     bounces,
     contact_change,
+    families_beside,
     other_events_side,
 )
 from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, grazing
@@ -286,12 +287,43 @@ class ContactsEquations(OrbitEquations):
     def nearest(
         self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
     ) -> np.ndarray | None:
-        """Unchanged: events are not renumbered."""
-        return (
-            unknowns
-            if not self.signature.events and self.signature == other.orbit.signature
-            else None
-        )
+        """Begun at another event, and shifted by whole forcing periods."""
+        target = other.orbit.signature
+        signature = self.signature
+        n = len(signature.events)
+        if not n:
+            return unknowns if signature == target else None
+        if (n, signature.period, signature.symmetric) != (
+            len(target.events),
+            target.period,
+            target.symmetric,
+        ):
+            return None
+        events = signature.events
+        images = tuple(event.image(self.images) for event in events) if signature.symmetric else ()
+        turns = [
+            turn
+            for turn in range(2 * n if signature.symmetric else n)
+            if (events + (images or events) + events)[turn : turn + n] == target.events
+        ]
+        evaluation = self.evaluate(unknowns, values) if turns else None
+        if evaluation is None:
+            return None
+        equations: Any = other.orbit.equations
+        goal = other.solution.unknowns
+        state, phases = self.split(unknowns)
+        later = np.concatenate([phases + turn * self.closing for turn in range(3)])
+        place = SegmentEnd.NUMBERS + 8 * self.own
+        found = []
+        for turn in turns:
+            index = turn % n
+            begin = evaluation.ends[index - 1, place : place + 2 * self.own] if index else state
+            begin = self.image_of(begin) if turn >= n else begin
+            begun = later[turn : turn + n]
+            first = equations.split(goal)[1][0]
+            begun = begun + math.tau * round((first - begun[0]) / math.tau)
+            found.append(equations.joined(begin, begun))
+        return min(found, key=lambda one: float(np.abs(one - goal).max()))
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
         return GRAZING
@@ -302,6 +334,16 @@ class ContactsEquations(OrbitEquations):
 
     def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
         return other_events_side(cut.point)
+
+    def note(self, kind: str, point: OrbitPoint) -> str:
+        """At a grazing of several contacts at once, which other orbits begin there."""
+        if kind not in (SpecialKind.GR, SpecialKind.SW):
+            return super().note(kind, point)
+        names = [contact.name for contact in self.system.contact_model.contacts]
+        return ", ".join(
+            f"orbits {change} an impact of {names[contact]} alone begin there as well"
+            for change, contact in families_beside(point)
+        )
 
     def stalled(
         self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds

@@ -18,12 +18,23 @@ from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
-from saltus.systems import Mirror, NaturalUnits, System, mirror_of, natural_units, numbers
+from saltus.systems import (
+    Mirror,
+    NaturalUnits,
+    System,
+    has_half_the_period,
+    mirror_of,
+    natural_units,
+    numbers,
+)
 from saltus.taylor import FREQUENCY, record_table
 
 # upper limit of distances of an orbit from a change, which are infinite where nothing comes near to
 # one
 FARTHEST = 1.0
+# the largest difference of the halves of an orbit that repeats itself after half a period, as a
+# share of its size
+HALVES_ALIKE = 1e-5
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
 
 
@@ -197,7 +208,7 @@ class OrbitEquations(ABC):
     8. **what lies beyond a change**: `change`, which special point the zero of the barrier is;
        `beyond`, the point with which
        the branch goes on; `born_at`, whether it ends there because its parent bears it; `also_at`,
-       a further special point there; `first_step` after it, and `stalled`, what stops a branch
+       a further special point there, and `note`, what it is besides; `first_step` after it, and `stalled`, what stops a branch
        where no step leads on;
     9. **curves of special points**: `curve_barrier`, and `touched`, the equations with the impact
        that a grazing begins with.
@@ -437,6 +448,29 @@ class OrbitEquations(ABC):
         know why.
         """
         return None
+
+    def note(self, kind: str, point: Any) -> str:
+        """What a special point of a kind is besides, in words; empty if it is nothing else."""
+        return self._of_half_the_period(point) if kind == "BPC" else ""
+
+    def _of_half_the_period(self, point: Any) -> str:
+        """Whether a branch point is a period doubling in a system whose equations repeat themselves
+        after half a forcing period, in words."""
+        orbit = point.orbit
+        if orbit.symmetric or not orbit.period % 2 or not has_half_the_period(orbit.system):
+            return ""
+        motion = orbit.motion()
+        middle = np.concatenate(
+            [np.atleast_1d(part) for part in motion.at(motion.start + 0.5 * orbit.duration)]
+        )
+        begin = np.concatenate([np.atleast_1d(part) for part in motion.at(motion.start)])
+        size = np.abs(begin).max() + np.abs(middle).max()
+        if np.abs(middle - begin).max() > HALVES_ALIKE * size:
+            return ""
+        return (
+            "the load acts alike half a forcing period later, as through its square, so that this "
+            "is a period doubling of an orbit of half the period"
+        )
 
     # --- 9. curves of special points -----------------------------------------
 
