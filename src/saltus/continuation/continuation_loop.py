@@ -279,7 +279,7 @@ class Continuation:
         if np.linalg.norm(b.curve.weights[-k:] * (first.parameters - a.parameters)) > 1.1 * length:
             return False
         place = self.events.nearest(first, first.place, b)
-        if place is None:
+        if place is None or length == 0.0:
             return False
         along = place - a.place
         share = float(along @ (b.curve.weights**2 * across)) / length**2
