@@ -213,6 +213,8 @@ def run(step: Step, minutes: float) -> Outcome:
     process = subprocess.Popen(
         ["bash", "-euo", "pipefail", "-c", step.commands],
         cwd=ROOT,
+        # of this checkout and of what it installs alone
+        env={name: value for name, value in os.environ.items() if not name.startswith("PYTHON")},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

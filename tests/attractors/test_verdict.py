@@ -69,33 +69,27 @@ def test_a_ball_that_comes_to_rest_now_and_then_is_no_chaos_but_of_a_long_period
     )
     rests = saltus.simulate(ball, x=-0.5, periods=1000, dense=False).events.of(EventKind.REST)
     assert len(rests) > 1
-    coming_together, rounding = 0, 0
-    # Rounding grows to the motion's size between rests: what is said of one motion is luck, so that
-    # ten beside one another are asked.
-    for x in -0.5 * (1.0 + 1e-12 * np.arange(10)):
-        verdict = classify(ball, x=x)
-        if verdict.cause is Reason.COMING_TOGETHER:
-            coming_together += 1
-            exponent = verdict.evidence["largest_exponent"]
-            assert exponent + verdict.evidence["largest_exponent_error"] < 0.0
-            assert verdict.kind is Ending.UNDECIDED
-            assert "motions beside it come together" in verdict.reason
-            assert "may find, unless rounding decides its period" in verdict.reason
-        looked_for = classify(ball, x=x, max_period=300)  # what the sentence advises
-        if looked_for.cause is Reason.ROUNDING:
-            rounding += 1
-            assert looked_for.kind is Ending.UNDECIDED
-            assert "no orbit can be told" in looked_for.reason
-        assert Ending.CHAOTIC not in (verdict.kind, looked_for.kind)
-    assert coming_together >= 7
-    assert rounding >= 7
-    starts = np.column_stack((-0.5 * (1.0 + 1e-12 * np.arange(10)), np.zeros(10)))
-    fine, coarse = (
-        find_recurrence(ball, starts, 4000, max_period=300, kept=602, tol=tol).period
-        for tol in (1e-12, 1e-10)
-    )
-    # each step error has another period, so that none is the motion's
-    assert (fine != coarse).sum() >= 7
+    # Rounding, and with it the processor, decides on which period the motion settles after a rest:
+    # on one longer than is looked for at first, or on one that is found.
+    verdict = classify(ball, x=-0.5)
+    assert verdict.kind is Ending.UNDECIDED
+    assert verdict.cause in (Reason.COMING_TOGETHER, Reason.LONG_PERIOD)
+    if verdict.cause is Reason.COMING_TOGETHER:
+        assert "motions beside it come together" in verdict.reason
+        assert "may find, unless rounding decides its period" in verdict.reason
+    assert verdict.evidence["largest_exponent"] + verdict.evidence["largest_exponent_error"] < 0.0
+    looked_for = classify(ball, x=-0.5, max_period=300)  # what the sentence advises
+    assert looked_for.kind is Ending.UNDECIDED
+    assert looked_for.cause is Reason.ROUNDING
+    assert "no orbit can be told" in looked_for.reason
+    periods = {
+        find_recurrence(
+            ball, np.array([[-0.5, 0.0]]), 4000, max_period=300, kept=602, tol=tol
+        ).period[0]
+        for tol in (1e-12, 1e-11, 3e-11, 1e-10)
+    }
+    # another step error may have another period, so that none is the motion's
+    assert len(periods) > 1
 
 
 def test_an_orbit_with_rest_is_periodic():
