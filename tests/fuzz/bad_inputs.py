@@ -74,6 +74,27 @@ STUDY = {
         "periods": 40,
     },
 }
+# one of other classes: a structure with contacts, and a chain of cells
+STRUCTURE = {
+    "model": {
+        "type": "Structure",
+        "mass": [[1.0, 0.0], [0.0, 2.0]],
+        "stiffness": [[2.0, -1.0], [-1.0, 1.0]],
+        "contacts": [{"name": "wall", "coordinate": 1, "position": 0.5, "sign": -1}],
+        "surfaces": [{"name": "soft", "coordinate": "x0", "position": 0.4, "stiffness": 3.0}],
+        "friction": [],
+        "forces": {"drive": [1.0, 0.0]},
+    },
+    "load": {"frequency": 1.0, "drive": {"amplitude": 0.5}},
+    "impact": {"type": "NewtonImpact", "e": 0.5},
+    "simulate": {"x0": 0.1, "x1": 0.0, "periods": 2},
+}
+CHAIN = {
+    "model": {"type": "CellChain", "beta0": 1.4, "cells": 2},
+    "load": {"frequency": 1.0, "horizontal": {"amplitude": 0.1}, "vertical": -0.5},
+    "impact": {"type": "NewtonImpact", "e": 0.5},
+    "attractors": {"starts": 4, "seed": 1, "max_period": 2},
+}
 NAMES = (
     *[
         "type",
@@ -92,6 +113,12 @@ NAMES = (
         "starts",
         "window",
         "curves",
+        "mass",
+        "contacts",
+        "position",
+        "restitution",
+        "interpolation",
+        "quantity",
     ],
     "é",
     "a.b",
@@ -146,7 +173,8 @@ def damaged(rng: random.Random, content: bytes) -> bytes:
 
 def study(rng: random.Random) -> bytes:
     """A study that is wrong in a few places, or whose text is."""
-    text = tomli_w.dumps(mutated(rng, STUDY, rng.randrange(1, 4))).encode("utf-8", "surrogatepass")
+    whole = rng.choice((STUDY, STUDY, STRUCTURE, CHAIN))
+    text = tomli_w.dumps(mutated(rng, whole, rng.randrange(1, 4))).encode("utf-8", "surrogatepass")
     return damaged(rng, text) if rng.random() < 0.3 else text
 
 
@@ -170,6 +198,38 @@ def record(rng: random.Random) -> bytes:
         rng.shuffle(rows)
     text = "\n".join(separator.join(row) for row in rows).encode()
     return damaged(rng, text) if rng.random() < 0.4 else text
+
+
+HEADINGS = (
+    "PEER\nA record\n{kind} TIME HISTORY IN UNITS OF {unit}\nNPTS= {count}, DT= {step} SEC\n",
+    "PEER\nA record\n{kind} IN UNITS OF {unit}\n {count} {step} NPTS, DT\n",
+    "Corrected\n {count} points of {kind} data equally spaced at {step} sec, in {unit}. (4f10.3)\n",
+    "Corrected\n {count} POINTS OF {kind} DATA EQUALLY SPACED AT {step} SEC. (UNITS: {unit})\n",
+    "Corrected\n {count} {kind} pts a 50 pts/sec, units={unit} (02),Format=(4F10.3)\n",
+    "Corrected\n {count} {kind} pts, approx {step} secs, units={unit},Format=(4F10.3)\n",
+)
+FIELDS = {
+    "kind": ("accel", "velocity", "DISPL", "", "acc" * 50),
+    "unit": ("G", "cm/sec2", "CM/S", "g*100", "0.1 mm", "", "x" * 500, "gal"),
+    "count": ("8", "8", "8", "0", "-1", "8.5", "9" * 30, "1e1", ""),
+    "step": (".02", ".02", "2D-2", "1/50", "0", "-1", "nan", "1.2.3", "1e400", "20 m"),
+}
+
+
+def record_file(rng: random.Random) -> bytes:
+    """A file of PEER, CSMIP or COSMOS that is wrong in a few places."""
+    said = {
+        name: rng.choice(values[:2] if rng.random() < 0.5 else values)
+        for name, values in FIELDS.items()
+    }
+    numbers = [f"{rng.uniform(-1, 1):10.3f}" for _ in range(8)]
+    if rng.random() < 0.2:
+        numbers[rng.randrange(8)] = rng.choice(
+            ("       nan", "*" * 10, "1" * 5000 + "x", "+1+1+1+1+1")
+        )
+    lines = "".join(numbers[:4]) + "\n" + "".join(numbers[4:]) + "\n"
+    text = (rng.choice(HEADINGS).format(**said) + lines).encode()
+    return damaged(rng, text) if rng.random() < 0.5 else text
 
 
 def system_json(rng: random.Random) -> str:

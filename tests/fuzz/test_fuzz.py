@@ -11,6 +11,7 @@ import resource
 import time
 
 import bad_inputs
+import numpy as np
 import pytest
 
 import saltus
@@ -100,6 +101,24 @@ def test_bad_records(tmp_path, count, piece):
         (tmp_path / "q.csv").write_bytes(bad_inputs.record(rng))
         refused += answer(case, load_study, tmp_path / "study.toml") is not None
     assert refused > count / 3
+
+
+@pytest.mark.parametrize(("count", "piece"), PIECES)
+def test_bad_record_files(tmp_path, count, piece):
+    """And what is read has as many finite numbers at times that rise as it says."""
+    rng, refused = random.Random(f"record files {piece}"), 0
+    for case in range(count):
+        (tmp_path / "r.AT2").write_bytes(bad_inputs.record_file(rng))
+        found = []
+        sentence = answer(
+            case, lambda into=found: into.append(saltus.Record.read(tmp_path / "r.AT2"))
+        )
+        assert sentence is None or sentence.isprintable()
+        refused += sentence is not None
+        for record in found:
+            assert np.isfinite(record.value).all()
+            assert (np.diff(record.time) > 0.0).all()
+    assert count / 3 < refused < count
 
 
 @pytest.mark.parametrize(("count", "piece"), PIECES)
