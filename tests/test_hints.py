@@ -86,7 +86,7 @@ def test_a_name_that_lives_in_a_room_is_answered_with_the_room() -> None:
 
 
 def test_a_motion_names_its_coordinates() -> None:
-    with pytest.raises(AttributeError, match=r"no 'x'; known here: theta$"):
+    with pytest.raises(AttributeError, match=r"no 'x'; known here: theta; it has time"):
         _ = saltus.simulate(SYSTEM, theta=0.3, periods=0).x
 
 

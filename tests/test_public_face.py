@@ -62,6 +62,8 @@ MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.insi
 
 # What is tried, by what stands in the annotation: numbers, or as many numbers as a list has.
 NUMBERS = (-1, 0, 0.5, 80.0, math.nan, math.inf, -math.inf, 1e300, 10**30, 10**400, np.ma.masked)
+# complex numbers lost their imaginary parts, and masked ones counted
+NO_REALS = (np.array([1.0, 2j]), np.ma.masked_array([1.0, 2.0], mask=[False, True]))
 ARRAYS = ([], [math.nan], [math.inf, 1.0], [1e300], [2.0, 1.0], np.array([]), np.zeros((2, 3)))
 TEXTS = ("", "x", "load.vertcal", "x" * 100_000)
 
@@ -604,6 +606,27 @@ def test_every_argument_answers_every_kind(made, alone, count):
         if long or time.process_time() - begun > 10.0:
             wrong.append(f"{name}({parameter.name}={value!r:.40}) is long: {refusal:.200}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_complex_and_masked_arrays_are_refused_everywhere(made, alone):
+    """But by formulas, which compute with whatever they get."""
+    taken = []
+    formulas = ("theory.", "UnitCell.", "System.", *UNCHECKED)
+    for name, (function, fitting) in good(made).items():
+        if name.startswith(formulas):
+            continue
+        for parameter in _arguments(function):
+            kind = str(parameter.annotation).removesuffix(" | None")
+            lists = ("Numbers", "np.ndarray", "Iterable[float]", "tuple[float, float]")
+            for value in NO_REALS if kind in lists else ():
+                try:
+                    refusal = answer(function, {**fitting, parameter.name: value})
+                except Exception as error:
+                    refusal = None
+                    taken.append(f"{name}({parameter.name}) {error!r:.80}")
+                if refusal is None:
+                    taken.append(f"{name}({parameter.name})")
+    assert not taken, "\n".join(taken)
 
 
 def test_every_misspelt_argument_is_answered_with_the_near_name(made):

@@ -23,7 +23,7 @@ from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, cast
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
-from saltus.kinds import check_kinds, check_switches
+from saltus.kinds import check_kinds, check_switches, switches_of
 from saltus.progress import silent, watched
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
@@ -299,7 +299,7 @@ def check_bounds(bounds: Any, name: str = "bounds") -> tuple[float, float]:
         Bounds that are not such a pair.
     """
     try:
-        low, high = (float(x) for x in bounds)
+        low, high = (float(x) for x in real_array(list(bounds)))
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"{name} must be two numbers (lowest, highest), got {shown(bounds)}", name
@@ -345,6 +345,20 @@ def check_size(values: Any, name: str | None = None) -> None:
         )
 
 
+def real_array(given: Any) -> np.ndarray:
+    """An array of real numbers, from what NumPy takes for one.
+
+    Raises
+    ------
+    TypeError
+        Complex numbers, which would lose their imaginary parts, or masked ones, which would count.
+    """
+    array = np.asarray(given)
+    if array.dtype.kind == "c" or np.ma.is_masked(given):
+        raise TypeError("complex or masked numbers")
+    return array if array.dtype == float else array.astype(float)
+
+
 def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
     """An array of numbers; an empty one for anything else, so that functions that refuse an empty
     array refuse it too.
@@ -358,7 +372,7 @@ def as_numbers(given: Any, name: str | None = None) -> np.ndarray:
         given = list(itertools.islice(given, LIMITS.count + 1))  # an iterator may have no end
     check_size(given, name)
     try:
-        return np.asarray(given, dtype=float)
+        return real_array(given)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
@@ -415,7 +429,7 @@ def instants(times: Any) -> np.ndarray:
     """
     check_size(times, "times")
     try:
-        asked = np.atleast_1d(np.asarray(times, dtype=float))
+        asked = np.atleast_1d(real_array(times))
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"times must be a number or an array of numbers, got {shown(times)}", "times"
@@ -438,7 +452,7 @@ def check_states(name: str, states: Any, dimension: int = 2) -> np.ndarray:
     """
     check_size(states, name)
     try:
-        array = np.asarray(states, dtype=float).reshape(-1, dimension)
+        array = real_array(states).reshape(-1, dimension)
     except (TypeError, ValueError, OverflowError):
         array = np.full((1, dimension), np.nan)
     if not (np.abs(array) <= LIMITS.value).all():
@@ -527,6 +541,7 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
     """
 
     def decorate(function: Callable[P, R]) -> Checked[P, R]:
+        switches = switches_of(function)
         open_ended = [
             p.name
             for p in inspect.signature(function).parameters.values()
@@ -535,7 +550,7 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
         def refuse(*given: Any, **named: Any) -> inspect.BoundArguments:
             bound = bound_arguments(function, given, named)
-            check_switches(function, named)
+            check_switches(switches, named)
             bound.apply_defaults()
             for name, value in bound.arguments.items():
                 if isinstance(value, Iterator):
@@ -566,10 +581,12 @@ def answered(function: Callable[P, R]) -> Callable[P, R]:
     does it, and one of another kind than its annotation as `check_kinds` does it.
     """
 
+    switches = switches_of(function)
+
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
-        if named:
-            check_switches(function, named)
+        if not switches.isdisjoint(named):
+            check_switches(switches, named)
         try:
             return (
                 told(function, *given, **named)

@@ -157,22 +157,21 @@ def problem_of_kind(annotation: Any, value: Any) -> str | None:
     return f"must be {_words(pieces)}, got {shown(value)}"
 
 
-@functools.cache
 def switches_of(function: Callable[..., Any]) -> frozenset[str]:
     """The arguments of a function that are true or false."""
-    known = inspect.signature(function).parameters.values()
-    return frozenset(p.name for p in known if p.annotation == "bool")
+    known = function.__annotations__.items()
+    return frozenset(name for name, annotation in known if annotation == "bool")
 
 
-def check_switches(function: Callable[..., Any], named: Mapping[str, Any]) -> None:
-    """Refuse anything but true or false where that is meant.
+def check_switches(switches: frozenset[str], named: Mapping[str, Any]) -> None:
+    """Refuse anything but true or false where that is meant, in the arguments `switches`.
 
     Raises
     ------
     ParameterError
         The error has the argument and its value.
     """
-    for name in switches_of(function) & named.keys():
+    for name in switches & named.keys():
         if not _is_switch(named[name]):
             raise ParameterError(f"{name} must be True or False, got {shown(named[name])}", name)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import certify, check_periodic
 from saltus.bounds import area_contraction, largest_pushes
-from saltus.checks import Numbers, check_count, check_size
+from saltus.checks import Numbers, check_count, check_size, real_array
 from saltus.errors import ParameterError
 from saltus.flow import ContactRegularity, contact_regularity, find_recurrence
 from saltus.orbits import PeriodicOrbit
@@ -95,11 +95,8 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
     check_count("every", every, 1)
     check_size(series, "series")
     try:
-        values = (
-            np.asarray(series, dtype=float)[:: int(every)]
-            if np.ndim(series) == 1
-            else np.asarray(series, dtype=float)
-        )
+        values = real_array(series)
+        values = values[:: int(every)] if values.ndim == 1 else values
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             "the 0-1 test takes a series of numbers, one a forcing period", "series"

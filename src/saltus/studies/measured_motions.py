@@ -65,11 +65,11 @@ class Measurement:
 
     def __post_init__(self) -> None:
         for name in ("time", "impacts"):
-            times = (
-                np.ravel(as_numbers(getattr(self, name), name))
-                if np.size(getattr(self, name))
-                else np.empty(0)
-            )
+            given = getattr(self, name)
+            empty = isinstance(given, (list, tuple, np.ndarray)) and not np.size(given)
+            times = np.empty(0) if empty else np.ravel(as_numbers(given, name))
+            if not empty and not times.size:
+                raise ParameterError(f"{name} must be numbers that rise, got {shown(given)}", name)
             if not np.isfinite(times).all() or not (np.diff(times) > 0).all():
                 raise ParameterError(
                     f"{name} must be numbers that rise, got {shown(getattr(self, name))}", name

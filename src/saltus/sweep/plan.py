@@ -279,6 +279,7 @@ def axis_values(name: Any, values: Any) -> np.ndarray:
         array.ndim != 1
         or not array.size
         or array.dtype.kind not in "iuf"
+        or np.ma.is_masked(values)
         or not np.isfinite(array).all()
     ):
         raise ParameterError(

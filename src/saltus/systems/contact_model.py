@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from saltus.checks import number_problem
+from saltus.checks import LIMITS, number_problem
 from saltus.errors import ParameterError, shown
 from saltus.systems.load import LoadOnSides, Sides
 from saltus.systems.model import Model, is_zero
@@ -73,6 +73,17 @@ class Contact:
     restitution: Number | None = None
 
     def __post_init__(self) -> None:
+        if (
+            type(self.position) is float
+            and -LIMITS.value <= self.position <= LIMITS.value
+            and self.restitution is None
+            and type(self.sign) is int
+            and self.sign in (1, -1)
+            and type(self.name) is str
+            and self.name
+            and type(self.group) is str
+        ):
+            return  # as nearly always; a model makes its contacts at each call
         _check_texts(self, "name", "group")
         _check_sign(self)
         _check_numbers(self, "position")
@@ -272,7 +283,10 @@ def _real(value: Any) -> Any:
 def _check_numbers(part: Contact | Friction | Surface, *names: str, **bounds: Any) -> None:
     """Refuse anything but finite numbers within bounds in the fields of a part of a model."""
     for name in names:
-        value = _real(getattr(part, name))
+        value = getattr(part, name)
+        if type(value) is float and not bounds and -LIMITS.value <= value <= LIMITS.value:
+            continue
+        value = _real(value)
         problem = number_problem(value, **bounds) if _is_number(value) else None
         if problem is not None:
             raise ParameterError(f"{name} of {_called(part)} {problem}", name)

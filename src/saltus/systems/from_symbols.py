@@ -97,6 +97,12 @@ def from_sympy(
     4.0
     """
     sympy = _sympy()
+    for symbol in parameters:
+        if not isinstance(symbol, sympy.Basic):
+            raise ParameterError(
+                f"parameters must be numbers by symbols of SymPy, got {shown(parameters)}",
+                "parameters",
+            )
     _check_types(sympy, coordinates, velocities, parameters, channels or {})
     if equations is not None:
         coordinates, velocities, mass, force = _read_method(equations)

@@ -67,6 +67,10 @@ class Channel:
         return self._derivative(t, 2)
 
 
+# what results are asked for, by which a load is told from them: no channel has such a name
+OF_RESULTS = {"to_xarray", "to_pandas", "attrs", "data_vars", "dims"}
+
+
 @dataclass(frozen=True, init=False, repr=False)
 class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H),
@@ -129,7 +133,9 @@ class Load:
         object.__setattr__(self, "channels", signals)
 
     def __getattr__(self, name: str) -> Channel:
-        if name.startswith("_"):  # IPython, pickle and copy probe for names like these
+        if name in OF_RESULTS or name.startswith(
+            "_"
+        ):  # IPython, pickle and copy probe for names like these
             raise AttributeError(name)
         return Channel(self.channels.get(name), self.frequency)
 

@@ -95,7 +95,11 @@ def finite_array(name: str, given: Any) -> Any:
             f"{name} holds {size:.3g} numbers, and {LIMITS.count} are the most", name
         )
     try:
-        if np.iscomplexobj(given) or getattr(given, "dtype", np.dtype(float)).kind in "mM":
+        if (
+            np.iscomplexobj(given)
+            or np.ma.is_masked(given)
+            or getattr(given, "dtype", np.dtype(float)).kind in "mM"
+        ):
             raise TypeError
         array = (
             given.astype(float)

@@ -190,8 +190,8 @@ def _samples(where: str, name: str, given: Any) -> np.ndarray:
         samples = np.array(given)
     except (TypeError, ValueError, OverflowError):
         samples = np.array(0.0)
-    # complex numbers would lose their imaginary part
-    if samples.ndim != 1 or samples.dtype.kind not in "fiub":
+    # complex numbers would lose their imaginary part, and masked ones would count
+    if samples.ndim != 1 or samples.dtype.kind not in "fiub" or np.ma.is_masked(given):
         raise ParameterError(f"{where}: {name} must be a list of numbers, got {shown(given)}", name)
     return samples.astype(float)
 

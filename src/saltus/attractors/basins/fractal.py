@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.attractors.attractor import UNDECIDED
-from saltus.checks import Numbers, answered, check_count, check_size
+from saltus.checks import Numbers, answered, check_count, check_size, real_array
 from saltus.errors import ParameterError
 from saltus.result import Result, result_dataset
 
@@ -408,7 +408,7 @@ def _labels(labels: Any) -> np.ndarray:
     """The labels as an array of whole numbers, of one or two dimensions."""
     check_size(labels, "labels")
     try:
-        array = np.asarray(labels)
+        array = real_array(labels)
         grid = array.astype(int)
     except (TypeError, ValueError, OverflowError):
         array = np.empty((0, 0))

@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.checks import LIMITS, Numbers, check_memory, check_number, check_size, notice_degrees
+from saltus.checks import (
+    LIMITS,
+    Numbers,
+    check_memory,
+    check_number,
+    check_size,
+    notice_degrees,
+    real_array,
+)
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
@@ -223,7 +231,7 @@ def _check_dense(when: Clock, periods: float | None, duration: float | None) -> 
 def _sample_times(given: Any, start: float) -> np.ndarray:
     check_size(given, "times")
     try:
-        times = np.atleast_1d(np.asarray(given, dtype=float))
+        times = np.atleast_1d(real_array(given))
     except (TypeError, ValueError, OverflowError):
         times = np.array([np.nan])
     if (

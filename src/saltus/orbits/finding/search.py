@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_starts
-from saltus.errors import ParameterError
+from saltus.checks import as_numbers, check_count, check_starts
+from saltus.errors import ParameterError, shown
 from saltus.flow import Recurrence, find_recurrence
 from saltus.orbits.finding.from_motion import NEAR_RETURNS, orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
@@ -231,15 +231,10 @@ def search_orbits(
     check_count("seed", seed, 0)
     check_path(system, path)
     area = check_window(window, system)
-    listed = (
-        list(values)
-        if isinstance(values, Iterable) and not isinstance(values, np.ndarray)
-        else values
-    )
-    grid = np.atleast_1d(np.asarray(listed, dtype=float))
+    grid = np.atleast_1d(as_numbers(values, "values"))
     if grid.ndim != 1 or not grid.size or not np.isfinite(grid).all():
         raise ParameterError(
-            f"values must be numbers of {path} at which to search, got {grid.tolist()}", "values"
+            f"values must be numbers of {path} at which to search, got {shown(values)}", "values"
         )
     early, late = _follow(
         system, path, grid, initial_states(system, starts, area, seed), max_period
