@@ -27,6 +27,8 @@ INSTANTS = 8
 # A load that moves d by a smaller share of it than this has no part in the unit.
 FARTHEST = 1e-7
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
+# A distance that is this share of the largest one is rounding.
+ROUNDING = 1e-12
 ANGLES = ("rad", "deg")  # units of coordinates that have their own natural unit
 
 
@@ -145,7 +147,9 @@ def _found(system: System) -> NaturalUnits:
             nearest = _other_length(system, load, time)
     largest = float(np.max(nearest, where=~angular, initial=0.0))
     first_order = np.arange(len(nearest)) >= len(model.moving)
-    lengths = np.where(first_order & (nearest > 0.0), nearest, largest)
+    # what the load does not move has a distance that is rounding of the others
+    moved = nearest > ROUNDING * np.max(nearest, initial=0.0)
+    lengths = np.where(first_order & moved, nearest, largest)
     lengths = np.where(angular, 1.0, lengths)
     sound = np.isfinite(lengths) & (lengths > 0.0)
     return NaturalUnits(np.where(sound, lengths, 1.0), time, _masses(model))
