@@ -120,6 +120,7 @@ class BranchEvents(OrbitEvents):
     # The last step whose cut was computed: the cut decides first whether the step is accepted, then
     # where it ends.
     last_cut: tuple[OrbitPoint, OrbitPoint, Cut | End | None] | None = None
+    values: list[float] = field(default_factory=list)  # the parameters of the points so far
 
     name = "branch"
     keeps_special = True  # so that a line through the points shows the fold
@@ -220,7 +221,8 @@ class BranchEvents(OrbitEvents):
             )
         if self.while_stable and cut is None and not ahead.orbit.stable:
             return super().ended(run, ahead, cut) or End(OrbitEnd.UNSTABLE, ahead.parameter)
-        if comes_along_itself(run.points):
+        self.values += [point.parameter for point in run.points[len(self.values) :]]
+        if comes_along_itself(run.points, self.values):
             return End(OrbitEnd.ALONG_ITSELF, run.points[-2].parameter)
         # one point alone may be where branches cross
         if not any(point.orbit.isolated for point in run.points[-2:]):

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.symmetry import nearest
 from saltus.orbits.signature import TOLERANCES
@@ -16,7 +14,7 @@ FEWEST_POINTS = 6  # a branch of fewer cannot have turned round
 BESIDE = 0.1
 
 
-def comes_along_itself(points: Sequence[OrbitPoint]) -> bool:
+def comes_along_itself(points: Sequence[OrbitPoint], values: Sequence[float] | None = None) -> bool:
     """Whether the last two points of a branch lie on earlier steps of it.
 
     One point alone may be where a branch crosses itself.
@@ -25,24 +23,33 @@ def comes_along_itself(points: Sequence[OrbitPoint]) -> bool:
     ----------
     points
         The points in order, the newest last.
+    values
+        Their parameters, if these are known.
     """
     if len(points) < FEWEST_POINTS:
         return False
-    return all(_lies_on(points[: -2 - place], points[-1 - place]) for place in (0, 1))
+    known = [point.parameter for point in points] if values is None else values
+    return all(_lies_on(points, len(points) - 1 - place, known) for place in (0, 1))
 
 
-def _lies_on(earlier: Sequence[OrbitPoint], point: OrbitPoint) -> bool:
-    """Whether a point lies on one of the steps between earlier points."""
-    return any(_is_on_step(a, b, point) for a, b in pairwise(earlier) if _may_be_on(a, b, point))
+def _lies_on(points: Sequence[OrbitPoint], index: int, values: Sequence[float]) -> bool:
+    """Whether a point lies on one of the steps before it, of which those that end at its neighbour
+    do not count."""
+    value = values[index]
+    last = max(0, index - 2)
+    passed = [
+        i
+        for i, (a, b) in enumerate(pairwise(values[: last + 1]))
+        if (a <= value <= b) or (b <= value <= a)
+    ]
+    point = points[index]
+    steps = ((points[i], points[i + 1]) for i in passed)
+    return any(_may_be_on(a, b, point) and _is_on_step(a, b, point) for a, b in steps)
 
 
 def _may_be_on(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:
-    """Whether the parameters and the amplitude of a point lie between those of the ends of a step,
-    as far as a step is straight."""
-    low, high = np.minimum(a.parameters, b.parameters), np.maximum(a.parameters, b.parameters)
-    room = BESIDE * (high - low)
-    if not ((low - room <= point.parameters) & (point.parameters <= high + room)).all():
-        return False
+    """Whether the amplitude of a point lies between those of the ends of a step, as far as a step
+    is straight."""
     sizes = a.orbit.amplitude, b.orbit.amplitude
     rounding = TOLERANCES.same_orbit * max(sizes)
     reach = (max(sizes) - min(sizes)) + rounding
