@@ -156,6 +156,23 @@ def test_a_branch_of_two_ends_that_move_alike_ends_at_its_bounds() -> None:
     assert not branch.special
 
 
+@pytest.mark.thorough
+def test_a_branch_of_three_cells_that_move_alike_goes_on_where_their_contacts_open_together() -> (
+    None
+):
+    """Three contacts open at one instant: the reactions of the later two vanish at the event of the
+    first, all along the branch. It ended within 1e-5 of where it began.
+    """
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.4))
+    model = saltus.CellChain(beta0=np.deg2rad(80), cells=3, coupling=0.5, damping=0.1)
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
+    start = {name: 0.4 if name.startswith("lower") else 0.0 for name in model.coordinates}
+    orbit = saltus.find_orbit(system, **start)
+    branch = saltus.continue_orbit(orbit, "load.horizontal.amplitude", (0.398, 0.402))
+    assert [str(end) for end in branch.ends] == ["bound 0.398", "bound 0.402"]
+    assert not branch.special
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cradle(saltus.ContactModel):
     """Three balls in a row, of which the outer two come from both sides at once."""

@@ -408,7 +408,32 @@ class ContactsEquations(OrbitEquations):
             else np.array([0.0, self.closing])
         ) / frequency
         followed = self._followed(self.plan, times, state, values, with_extremes)
+        if followed is not None and with_extremes:
+            self._leave_out_alike(followed[3], phases)
         return None if followed is None else self._assembled(end, times, frequency, *followed)
+
+    def _leave_out_alike(self, seen: np.ndarray, phases: np.ndarray) -> None:
+        """Leave out of the reactions between events at one instant those that vanish there because
+        their own contacts, which do not act on the event's, are released or closed at this instant.
+        """
+        events = self.signature.events
+        if not self._independent.any():
+            return
+        near = np.abs(phases[:, None] - phases) <= ONE_INSTANT * self.closing
+        acting = [{events[j].contact for j in np.flatnonzero(row)} for row in near]
+        first = acting[0]
+        if self.signature.symmetric:
+            first = {self.images[contact] for contact in first}
+        following = [*acting[1:], first]
+        own = [event.contact for event in events]
+        for column, sets, at_event in (
+            (SegmentExtremes.PULL, acting, own),
+            (SegmentExtremes.TAIL, following, self.plan[:, SegmentPlan.CONTACT].tolist()),
+        ):
+            for s in np.flatnonzero(np.isfinite(seen[:, column])):
+                contact = int(seen[s, column + 1])
+                if contact in sets[s] and self.is_independent(contact, at_event[s]):
+                    seen[s, column] = math.inf
 
     def carried_along(
         self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray
