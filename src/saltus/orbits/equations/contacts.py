@@ -50,6 +50,9 @@ from saltus.taylor import FREQUENCY
 # power of the time with which the gap grows after an impact with e = 0; after a release it is
 # `AFTER_RELEASE`
 AFTER_IMPACT = 2
+# An opened gap below this share of the natural length is rounding, at the instant at which it opens.
+GAP_AT_REST = 1e-13
+JUST_OPENED = 1e-4  # the share of the period within which such a gap may have minima by rounding
 # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a
 # contact
 START_SHARE = 0.4
@@ -409,10 +412,10 @@ class ContactsEquations(OrbitEquations):
         ) / frequency
         followed = self._followed(self.plan, times, state, values, with_extremes)
         if followed is not None and with_extremes:
-            self._leave_out_alike(followed[3], phases)
+            self._leave_out_alike(followed[3], phases, frequency)
         return None if followed is None else self._assembled(end, times, frequency, *followed)
 
-    def _leave_out_alike(self, seen: np.ndarray, phases: np.ndarray) -> None:
+    def _leave_out_alike(self, seen: np.ndarray, phases: np.ndarray, frequency: float) -> None:
         """Leave out of the reactions between events at one instant those that vanish there because
         their own contacts, which do not act on the event's, are released or closed at this instant.
         """
@@ -434,6 +437,14 @@ class ContactsEquations(OrbitEquations):
                 contact = int(seen[s, column + 1])
                 if contact in sets[s] and self.is_independent(contact, at_event[s]):
                     seen[s, column] = math.inf
+        # what opens with another contact has no gap at the start of the segment behind both, where
+        # rounding makes minima
+        small = GAP_AT_REST * self.natural.length
+        for s in np.flatnonzero(np.abs(seen[:, SegmentExtremes.GAP]) <= small):
+            after = float(seen[s, SegmentExtremes.GAP + 1]) * frequency - phases[s]
+            together = len(acting[s]) > 1 and after <= JUST_OPENED * self.closing
+            if together and int(seen[s, SegmentExtremes.GAP + 2]) in acting[s]:
+                seen[s, SegmentExtremes.GAP] = math.inf
 
     def carried_along(
         self, state: np.ndarray, closed: int, times: np.ndarray, values: np.ndarray
