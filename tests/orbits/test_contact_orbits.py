@@ -387,9 +387,15 @@ def test_what_has_no_equations_is_refused_by_name(ask, error, words):
     assert words in str(refused.value)
 
 
-def test_curves_of_changes_of_events_are_refused_by_name(branch):
-    with pytest.raises(ParameterError, match="LP, PD, BPC"):
-        saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.1))
+def test_curves_of_changes_of_events_of_whole_motions_are_refused_by_name():
+    system = System(
+        model=saltus.BeltOscillator(kinetic=0.2, static=0.2, damping=0.1, belt_speed=0.5),
+        load=Load(frequency=1.3, force=Harmonic(amplitude=0.3)),
+    )
+    orbit = saltus.find_orbit(system, x=0.2, velocity=0.1)
+    branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.2, 0.35))
+    with pytest.raises(ParameterError, match="curves are followed of LP, PD"):
+        saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.5))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -236,7 +236,7 @@ def test_where_static_friction_is_larger_a_stick_that_is_lost_ends_the_branch() 
 
 
 def test_a_rest_without_duration_is_where_the_engine_for_one_contact_has_it() -> None:
-    """With that kind; beyond it the branch goes on, with impacts that do not die away."""
+    """With that kind; beyond it another branch begins, with impacts that do not die away."""
     load = saltus.Load(frequency=1.0, force=saltus.Harmonic(amplitude=1.5, mean=1.0))
     law, numbers = saltus.VelocityReduction(0.4), {"stiffness": 0.2, "damping": 0.1}
     wall = saltus.System(model=saltus.WallOscillator(wall=0.0, **numbers), load=load, impact=law)
@@ -251,7 +251,9 @@ def test_a_rest_without_duration_is_where_the_engine_for_one_contact_has_it() ->
     )
     assert kinds_of(found)[0] == kinds_of(expected)[0] == "CH"
     assert abs(found.special[0].parameter - expected.special[0].parameter) < 1e-8
-    assert found.ends[1].parameter == 3.0
+    assert found.ends[1].parameter == found.special[0].parameter
+    (beyond,) = saltus.switch_branch(found.special[0], (1.3, 3.0))
+    assert beyond.ends[1].parameter == 3.0
 
 
 def both_layers(amplitude: float) -> saltus.System:
@@ -281,8 +283,10 @@ def test_beyond_where_impacts_die_away_they_are_lost_one_by_one_at_distances_tha
     doublings and grazings come in turn up to the bound."""
     orbit = saltus.find_orbit(both_layers(0.4), theta_1=0.1, theta_2=0.0)
     branch = saltus.continue_orbit(orbit, "load.horizontal.amplitude", (0.35, 0.9))
-    assert [end.parameter for end in branch.ends] == [0.35, 0.9]
-    end, *others = [point for point in branch.special if point.parameter > 0.869]
+    end = branch.special[-1]
+    (beyond,) = saltus.switch_branch(end, (0.35, 0.9))
+    assert [branch.ends[0].parameter, beyond.ends[1].parameter] == [0.35, 0.9]
+    others = beyond.special
     assert [str(point.kind) for point in (end, *others)][:-2] == ["CH", *(["LP", "PD", "GR"] * 12)]
     folds = np.array([point.parameter - end.parameter for point in others if point.kind == "LP"])
     assert np.abs(folds[1:8] / folds[:7] - 2.0).max() < 0.02

@@ -24,6 +24,7 @@ from saltus import (
     find_orbit,
     sensitivities,
     simulate,
+    switch_branch,
 )
 from saltus.errors import MotionError
 from saltus.flow import EventKind, contact_pull, load_releases
@@ -400,8 +401,8 @@ def test_ground_motion_releases_a_block_from_tan_alpha_on():
 
 
 def test_rest_vanishes_where_impacts_no_longer_die_away():
-    """CH: rest is there just before, not just after, where the orbit has many impacts and continues
-    the family.
+    """CH: rest is there just before, not just after, where orbits of another family have many
+    impacts.
     """
     family = family_of("metainterface", HHAT, (0.05, 0.5))
     point = only(family, "CH")
@@ -415,8 +416,10 @@ def test_rest_vanishes_where_impacts_no_longer_die_away():
     assert len(simulate(after.system, **after.start(), periods=5).events.of(EventKind.REST)) == 0
     assert after.amplitude == pytest.approx(point.amplitude, abs=1e-4)
     assert np.abs(after.multipliers).max() < 1e-3
-    # beyond it the family goes on with orbits that do not rest
-    assert family.ends[1].parameter == 0.5
+    # beyond it another family begins, with orbits that do not rest
+    assert family.ends[1].reason is OrbitEnd.REST_VANISHES
+    (beyond,) = switch_branch(point, (0.05, 0.5))
+    assert beyond.ends[1].parameter == 0.5
 
 
 def test_the_orbits_beyond_gather_grazings_and_folds_towards_the_end():

@@ -91,7 +91,7 @@ def test_the_times_of_its_impacts_are_those_of_its_own_frequency(
     assert max(np.abs(direct - time).min() for time in times) < 1e-9
 
 
-def test_a_branch_goes_on_beyond_the_end_of_a_rest_as_the_motion_does() -> None:
+def test_beyond_the_end_of_a_rest_a_branch_of_its_own_begins_as_the_motion_goes_on() -> None:
     """Ahead the impacts no longer die away: orbits with impacts alone, which are the motions that
     settle there.
     """
@@ -102,26 +102,17 @@ def test_a_branch_goes_on_beyond_the_end_of_a_rest_as_the_motion_does() -> None:
     kinds = [str(point.kind) for point in found.special]
     assert kinds[0] == "CH"
     assert kinds.count("CH") == 1
-    assert found.ends[1].reason is not OrbitEnd.REST_VANISHES
-    assert found.ends[1].parameter == 2.6
-    rest_ends = found.special[0].parameter
-    assert all(
-        orbit.signature.section is None
-        for orbit in found.orbits
-        if orbit.system.get(FORCE) > rest_ends + 1e-4
-    )
-    first = next(orbit for orbit in found.orbits if orbit.signature.section is None)
+    assert found.ends[1].reason is OrbitEnd.REST_VANISHES
+    assert found.ends[1].parameter == found.special[0].parameter
+    (beyond,) = saltus.switch_branch(found.special[0], (1.9, 2.6))
+    assert str(beyond.ends[0]).startswith("CH at ")
+    assert beyond.ends[1].parameter == 2.6
+    assert all(orbit.signature.section is None for orbit in beyond.orbits)
+    first = beyond.orbits[1]
     settled = saltus.simulate(first.system, x=-0.5, periods=400, tol=1e-13, dense=False)
     assert first.stable
     assert first.state == pytest.approx((settled.x, settled.velocity), abs=1e-9)
-    assert (
-        max(
-            saltus.orbits.defects(
-                [orbit for orbit in found.orbits if orbit.signature.section is None][::5]
-            )
-        )
-        < 1e-9
-    )
+    assert max(saltus.orbits.defects(beyond.orbits[::5])) < 1e-9
 
 
 def test_at_a_fold_and_at_a_doubling_an_orbit_is_not_stable() -> None:

@@ -3,8 +3,9 @@ and through cusps.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -332,3 +333,57 @@ def test_a_symmetry_breaking_needs_the_symmetry() -> None:
     special = low_frequency_special("BPC")
     with pytest.raises(saltus.ParameterError, match="takes away the mirror symmetry"):
         saltus.continue_special(special, "model.stiffness_ratio")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WallOfSeveral(saltus.ContactModel):
+    """x'' + c x' + x = F(t) below a wall at 1, as a model with several contacts."""
+
+    damping: float = 0.1
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts = (saltus.Contact(name="wall", coordinate="x", sign=-1, position=1.0),)
+
+    def force(self, t, x, v, load):
+        return load.force(t) - x - self.damping * v
+
+
+def test_the_curve_of_a_grazing_with_several_contacts_is_that_of_the_linear_motion():
+    """F = d sqrt((1 - W^2)^2 + (c W)^2); its witness is the gap."""
+    load = saltus.Load(frequency=0.7, force=saltus.Harmonic(0.4, phase=np.pi / 2))
+    system = saltus.System(model=WallOfSeveral(), load=load, impact=saltus.NewtonImpact(0.6))
+    orbit = saltus.find_orbit(system, x=0.0)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.5, 0.9))
+    (grazing,) = (point for point in branch.special if point.kind == "GR")
+    assert grazing.evidence.witness == "gap of wall"
+    curve = saltus.continue_special(
+        grazing, "load.force.amplitude", (0.2, 0.6), first_bounds=(0.4, 1.4)
+    )
+    w, amplitude = curve.parameters.T
+    assert np.ptp(amplitude) == pytest.approx(0.4)
+    assert amplitude == pytest.approx(np.hypot(1 - w**2, 0.1 * w), abs=1e-12)
+
+
+def test_curves_of_changes_of_two_stops_lead_through_those_of_their_branches():
+    """Branches begun at another amplitude have their GR and SW on the curves."""
+    model = saltus.TwoStops(left=-0.8, right=0.5, stiffness=1.0, damping=0.1)
+    load = saltus.Load(frequency=1.2, force=saltus.Harmonic(0.7))
+    system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(0.0))
+
+    def branch_at(amplitude):
+        other = system.with_({"load.force.amplitude": amplitude})
+        orbit = saltus.find_orbit(other, x=0.0)
+        return saltus.continue_orbit(orbit, "load.frequency", (1.1, 1.8))
+
+    changes = [point for point in branch_at(0.7).special if point.kind in ("GR", "SW")]
+    expected = [point for point in branch_at(0.68).special if point.kind in ("GR", "SW")]
+    assert {str(point.kind) for point in changes} == {"GR", "SW"}
+    for point in changes:
+        curve = saltus.continue_special(
+            point, "load.force.amplitude", (0.67, 0.72), first_bounds=(1.0, 2.0)
+        )
+        (there,) = curve.at("load.force.amplitude", 0.68)
+        nearest = min(
+            abs(other.parameter - there.frequency) for other in expected if other.kind == point.kind
+        )
+        assert nearest < 1e-8

@@ -71,14 +71,18 @@ class Continuation:
     end: End | None = None
     trail: Trail = field(init=False)
 
-    def follow(self, first: Any, born: bool = False) -> None:
+    def follow(self, first: Any, born: bool = False, cut: Cut | None = None) -> None:
         """Follow the curve from a point until it ends. `born` says that this is a special point of
-        another curve, whose events are not to be found again."""
+        another curve, whose events are not to be found again; `cut`, that the curve begins beyond a
+        change of its equations there."""
         self.points.append(first)
-        self.end = self._on_a_bound(first)
+        self.end = self._on_a_bound(first) if cut is None else None
         self.trail = Trail(self.events, first)
         before = None
         step = min(self.steps.first, self.steps.longest)
+        if cut is not None and self._cross(cut):
+            self.end = self._on_a_bound(self.points[-1])
+            step = min(step, self.events.first_step(self.points))
         while self.end is None:
             point = self.points[-1]
             ahead, step = self._step(before, point, step)
@@ -144,7 +148,10 @@ class Continuation:
         )
         cut = self.events.cut(point, ahead)
         if isinstance(cut, End):
-            self.end = cut
+            found = self.events.unlocated(self, point, ahead, cut)
+            if isinstance(found, Cut):
+                return self._cross(found)
+            self.end = found
             return False
         ahead, end = (ahead, end) if cut is None else (cut.point, None)
         self.end = None if born else self.events.interrupted(self, point, ahead)
@@ -301,11 +308,13 @@ def both_ways(
     steps: StepSettings = STEPS,
     progress: Progress = silent,
     growing: Callable[[tuple[Any, ...]], object] | None = None,
+    cut: Cut | None = None,
 ) -> Course[Any, Any]:
     """The curve through a point, followed against its tangent and then along it, or once if it
     closes.
 
-    `growing` is called with all points so far, in order, whenever there is a new one.
+    `growing` is called with all points so far, in order, whenever there is a new one. `cut` is a
+    change of the equations at the first point itself, beyond which the second half begins.
     """
     watch: Watch = Watch(progress, bounds, steps.most_points)
     halves: list[Course[Any, Any]] = []
@@ -318,7 +327,7 @@ def both_ways(
 
     for point in (first.turned(), first):
         run: Continuation = Continuation(bounds, events(), steps, watched)
-        run.follow(point)
+        run.follow(point, cut=cut if halves else None)
         halves.append(run.course(End(CurveEnd.CLOSED)))
         if run.end == End(CurveEnd.CLOSED):
             return halves[-1]

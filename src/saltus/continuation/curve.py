@@ -27,6 +27,8 @@ class Evidence:
         The test function at the end of that step.
     value
         The test function at the point itself.
+    witness
+        At a change of an orbit's events, what vanishes there, such as "gap of stop"; else empty.
 
     Examples
     --------
@@ -40,6 +42,7 @@ class Evidence:
     before: float
     after: float
     value: float
+    witness: str = ""
 
     @property
     def bracket(self) -> float:

@@ -357,6 +357,12 @@ class Events:
             else Cut(zero.point, zero)
         )
 
+    def unlocated(self, run: Continuation, point: Any, ahead: Any, end: End) -> Cut | End:
+        """What a step comes to whose cut could not be located: the given end, or a cut at `point`,
+        with which the step begins.
+        """
+        return end
+
     def interrupted(self, run: Continuation, point: Any, ahead: Any) -> End | None:
         """The end of the curve if it ends within a step, which is then not taken; else None."""
         return None

@@ -30,11 +30,9 @@ from saltus.continuation import (
 )
 from saltus.errors import SaltusError
 from saltus.flow import EventCode, EventKind
-from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import is_image, nearest, parent_of
-from saltus.orbits.equations.contract import Restart
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent, section_of
 from saltus.orbits.orbit import PeriodicOrbit
@@ -64,15 +62,23 @@ class OtherSideSettings:
     approach: tuple[float, float] = (0.1, 0.01)
     secants: int = 8
     inside: float = 1e-3
+    # A change is located from its other side up to this distance, through places that are nearer
+    # to it than the one before by this factor.
+    touching: float = 1e-11
+    just_before: float = 1e-3
     # How far from the point an orbit found at a probe may be, in units of the probe's distance.
     near: float = 3.0
     # If the least probe leads to no orbit, the branch may fold just as near to the change: its
     # first step is at most this many times the distance of the orbit that was found. A longer step
     # would jump beyond the fold.
     first: float = 10.0
-    # Where the map is continuous, the residual at the distances `beside` is at most this, even with
-    # a square root.
+    # Neighbours that end up nearer to one another than this are no sign of a jump.
     jump: float = 5e-3
+    # Where the map is continuous, even with a square root, neighbours end up apart by no more than
+    # their distance times the largest multiplier times this; and by less than this share of it at a
+    # tenth of the distance.
+    stretched: float = 10.0
+    shrunk: float = 0.7
     # The way to a change is extrapolated from orbits whose distances from it have at least this
     # ratio.
     fall: float = 10.0
@@ -87,6 +93,8 @@ class OtherSideSettings:
     # A motion smaller than this sticks for good: slips grow as the third power of their duration.
     standing: float = 1e-11
     slow: float = 1e-2  # The largest speed of an impact that has just appeared.
+    # At a change of events something vanishes: it is at most this there.
+    witness: float = 1e-6
     # An orbit that is farther than this from a change of events, and has no orbits with other
     # events beside it, is at no change: the two orbits between which it was solved for lie on two
     # branches.
@@ -139,16 +147,19 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
     here, before = (
         (zero.point, events_at(reference)) if parent is None else (parent, events_at(parent))
     )
-    _, other = next(_beside(here, before.sequence), (None, None))
+    place, other = next(_beside(here, before.sequence), (here.place, None))
     if other is None and events_at(zero.point).distance > SETTINGS.far:
         return End(CurveEnd.NOT_LOCATED, zero.parameter, SpecialKind.SW)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
-    elif _is_discontinuous(other):
+    elif _is_discontinuous(here, place, other):
         kind = first_change(events_at(here), events_of(other))
     else:
         kind = kind_between(before, events_of(other))
-    return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, zero.evidence))
+    if other is None and events_at(zero.point).distance > SETTINGS.witness:
+        return Cut(zero.point, None)  # nothing vanishes there
+    evidence = replace(zero.evidence, witness=events_at(zero.point).witness)
+    return Cut(zero.point, None if kind is None else SpecialPoint(kind, zero.point, evidence))
 
 
 def refused_beyond(point: OrbitPoint, step: float, bounds: Bounds) -> End | None:
@@ -241,19 +252,22 @@ def _stands(point: OrbitPoint) -> bool:
     )
 
 
-def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | Restart | End:
+def beyond(cut: Cut, points: Sequence[OrbitPoint]) -> OrbitPoint | End:
     """The point with which a branch, whose last point is at a cut, goes on beyond it: with other
-    events, or from another section; or where a motion tells it. Or the reason why it ends."""
+    events, or from another section. Or the reason why it ends."""
     if _stands(cut.point):
         return End(OrbitEnd.STICKS, cut.point.parameter)
     # at the parent's orbit rounding decides which events are found: exclude none
     born = parent_of(cut.point) is not None
     sequence = None if born else events_at(cut.point).sequence
     if cut.special is not None and cut.special.kind == SpecialKind.CH:
-        return as_the_motion_goes_on(cut.point)
+        return End(OrbitEnd.REST_VANISHES, cut.point.parameter, SpecialKind.CH)
     if _section_comes(cut.point):
         return _from_another_section(cut.point) or End(OrbitEnd.NO_SECTION, cut.point.parameter)
-    return other_events(cut.point, sequence, points)
+    found = other_events(cut.point, sequence, points)
+    if isinstance(found, End) and cut.special is None:
+        return _from_another_section(cut.point) or found
+    return found
 
 
 def other_events(
@@ -281,7 +295,7 @@ def other_events(
         return None if is_image(ahead) or _lies_on(points, ahead, SETTINGS.same * probe) else ahead
 
     for beside, evaluation in _beside(point, sequence):
-        if _is_discontinuous(evaluation):
+        if _is_discontinuous(point, beside, evaluation):
             reason = OrbitEnd.NOT_CONTINUOUS
             detail = f"{np.abs(evaluation.residual).max():.3g}"
             continue
@@ -355,6 +369,50 @@ def parent_at(cut: Cut, points: Sequence[OrbitPoint]) -> SpecialPoint | None:
     )
 
 
+def located_beyond(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
+    """The special point of a change of events from its other side, where multipliers are smaller
+    by far: there the distance from the change is a smooth function, whose zero is extrapolated from
+    orbits that are ever nearer to it. None where this side is no better.
+
+    At a grazing the map has a square root on the side with the impact, and none on the other.
+    """
+    special = cut.special
+    assert special is not None
+    own, other = (abs(p.orbit.multipliers[0]) for p in (cut.point, following))
+    if not own > SETTINGS.fall * max(1.0, float(other)):
+        return None
+    sequence = events_at(following).sequence
+    way = following.curve.norm(following.place - cut.point.place)
+    far = following.beside(0.5 * way)
+    if far is None or events_at(far).sequence != sequence:
+        return None
+    # places along the tangent of `following`, and the distances from the change there
+    near, known = (
+        following,
+        [(0.5 * way, events_at(far).distance), (0.0, events_at(following).distance)],
+    )
+    for _ in range(SETTINGS.secants):
+        if known[-1][1] <= SETTINGS.touching:
+            break
+        zero = _zero_of_line(*known[-2:])
+        # just before the zero, so that the events are still those of this side
+        at = zero + SETTINGS.just_before * (known[-1][0] - zero)
+        ahead = following.beside(at) if np.isfinite(at) else None
+        if ahead is None or events_at(ahead).sequence != sequence:
+            break
+        near = ahead
+        known.append((at, events_at(ahead).distance))
+    value = known[-1][1]
+    if near is following or value > SETTINGS.touching:
+        return None
+    left = abs(_zero_of_line(*known[-2:]) - known[-1][0])
+    widths = SETTINGS.doubt * left * np.abs(near.tangent[-len(near.parameters) :])
+    witness = events_at(near).witness
+    brackets = tuple(map(float, widths))
+    evidence = Evidence(near.residual, brackets, known[0][1], -TINY, value, witness)
+    return SpecialPoint(special.kind, near, evidence)
+
+
 def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
     """The period doubling (for a symmetric orbit, the symmetry breaking) at a change of events
     where a multiplier jumps over -1.
@@ -418,9 +476,28 @@ def _leads_away(point: OrbitPoint, ahead: OrbitPoint, probe: float) -> bool:
     )
 
 
-def _is_discontinuous(evaluation: Any) -> bool:
-    """Whether the map jumps: a motion that begins very near to an orbit ends away from it."""
-    return bool(np.abs(evaluation.residual).max() > SETTINGS.jump)
+def _is_discontinuous(point: OrbitPoint, place: np.ndarray, evaluation: Any) -> bool:
+    """Whether the map jumps at an orbit: a motion from a place very near to it ends away from it,
+    farther than its multipliers, or those of the motion, stretch this distance; and no less far
+    from a place that is nearer still.
+    """
+    units = point.curve.equations.units
+    apart = units.residual(evaluation.residual)
+    if apart <= SETTINGS.jump:
+        return False
+    way = place - point.place
+    size = units.unknowns * np.ones(len(evaluation.residual))
+    largest = max(
+        1.0,
+        float(abs(point.orbit.multipliers[0])),
+        float(np.linalg.norm(evaluation.monodromy() / np.outer(size, 1.0 / size), 2)),
+    )
+    if apart <= SETTINGS.stretched * largest * point.curve.norm(way):
+        return False
+    nearer = point.curve.evaluate(point.place + 0.1 * way, thorough=True)
+    if nearer is None or events_of(nearer).sequence != events_of(evaluation).sequence:
+        return True
+    return bool(units.residual(nearer.residual) > SETTINGS.shrunk * apart)
 
 
 def _beside(point: OrbitPoint, sequence: Events | None) -> Iterator[tuple[np.ndarray, Any]]:
@@ -437,7 +514,7 @@ def _beside(point: OrbitPoint, sequence: Events | None) -> Iterator[tuple[np.nda
             evaluation = point.curve.evaluate(place, thorough=True)
             if evaluation is None:
                 continue
-            kind = events_of(evaluation).sequence, _is_discontinuous(evaluation)
+            kind = events_of(evaluation).sequence, _is_discontinuous(point, place, evaluation)
             if kind != (sequence, False) and kind not in known:
                 known.add(kind)
                 yield place, evaluation

@@ -4,7 +4,8 @@ direction with admissible orbits.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,18 @@ PROBES: tuple[float, ...] = tuple(
 )  # distances along the new branch, tried in turn until one direction has admissible orbits
 
 
+def repeats(signature: Signature, periods: int) -> bool:
+    """Whether an orbit of a signature that touches alike after so many forcing periods repeats
+    itself after them.
+    """
+    return signature.part(periods) is not None
+
+
+def ends_at_another(point: OrbitPoint, periods: int) -> End:
+    """The end of a branch at a grazing of an orbit of so many forcing periods."""
+    return End(OrbitEnd.GRAZES_ANOTHER, point.parameter, detail=f"orbit of period {periods}")
+
+
 def other_side(point: OrbitPoint) -> OrbitPoint | End:
     """The point of the branch beyond a grazing, with the direction in which it goes on; or why
     there is none.
@@ -28,11 +41,69 @@ def other_side(point: OrbitPoint) -> OrbitPoint | End:
     Where the gap touches zero between impacts, the new signature has a pair of impacts without
     speed there, or a single one at a wall, which turns the motion round. Impacts that have lost
     their speed are left out of it.
+
+    Where the orbit repeats a shorter one that grazes, several families meet, which differ in the
+    touches that are impacts. By one rule, for one contact and for several, orbits keep their
+    period: one of the touches changes, and the new orbit must not repeat the shorter one. Else the
+    branch ends at the grazing of that orbit, whose own branch goes on by itself.
     """
-    changed = removed(point) if is_slow(point) else inserted(point)
-    if isinstance(changed, End):
-        return changed
-    equations, unknowns = changed
+    covered = point.orbit.equations.covered(point.solution)
+    if covered is not None and _turns_round(
+        point.orbit.equations, point.orbit.signature.along()[0]
+    ):
+        for changed in _with_one_touch_changed(point, covered):
+            if isinstance(following := _begun(point, *changed), OrbitPoint):
+                return following
+        return ends_at_another(point, covered)
+    found = removed(point) if is_slow(point) else inserted(point)
+    return found if isinstance(found, End) else _begun(point, *found)
+
+
+def _with_one_touch_changed(
+    point: OrbitPoint, covered: int
+) -> Iterator[tuple[OrbitEquations, np.ndarray]]:
+    """The problems, with their unknowns, in which one touch of a grazing orbit that repeats itself
+    after `covered` forcing periods becomes an impact, or no longer is one. The orbits of each have
+    the period of the point's, and are not those of the point seen some periods later.
+    """
+    equations = point.orbit.equations
+    signature = point.orbit.signature
+    pairs = point.solution.unknowns.reshape(-1, 2) if signature.sides else np.empty((0, 2))
+    slow = pairs[:, 1] < TOLERANCES.touch * equations.natural.speed
+    phase = pairs[slow][0, 0] if slow.any() else _lowest_touch(point)[1]
+    touches = phase + math.tau * covered * np.arange(signature.period // covered)
+    apart = (pairs[slow][:, 0] - touches[:, None] + math.pi) % equations.closing - math.pi
+    struck = [bool(near.any()) for near in np.abs(apart) < TOLERANCES.pair]
+    turned = [struck[i:] + struck[:i] for i in range(len(struck))]
+    for i in range(len(struck)):
+        changed = [is_impact != (j == i) for j, is_impact in enumerate(struck)]
+        if changed in turned or any(
+            changed[k:] + changed[:k] == changed for k in range(1, len(changed))
+        ):
+            continue
+        chosen = [
+            [touch, 0.0] for touch, is_impact in zip(touches, changed, strict=True) if is_impact
+        ]
+        places = np.array([*pairs[~slow].tolist(), *chosen])
+        begin = places[0, 0]
+        places[:, 0] = begin + (places[:, 0] - begin) % equations.closing
+        places = places[np.argsort(places[:, 0], kind="stable")]
+        sides = (signature.along()[0],) * len(places)
+        yield equations.with_signature(Signature(sides, signature.period)), places.ravel()
+
+
+def _lowest_touch(point: OrbitPoint) -> tuple[int, float]:
+    """The segment in which the gap has its least minimum, and the phase of this minimum."""
+    extremes = point.evaluation.extremes
+    segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
+    frequency = point.orbit.equations.frequency(point.solution.values)
+    return segment, float(extremes[segment, SegmentColumn.LOWEST_GAP_TIME]) * frequency
+
+
+def _begun(point: OrbitPoint, equations: OrbitEquations, unknowns: np.ndarray) -> OrbitPoint | End:
+    """The point of a grazing in the equations of another signature, with the direction in which it
+    has orbits; or why there is none.
+    """
     curve = point.curve.with_equations(equations)
     known = curve.known(unknowns, point.parameters)
     if known is None:
@@ -75,11 +146,7 @@ def inserted(point: OrbitPoint) -> tuple[Any, np.ndarray]:
     """
     equations = point.orbit.equations
     signature = point.orbit.signature
-    extremes = point.evaluation.extremes
-    segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
-    phase = extremes[segment, SegmentColumn.LOWEST_GAP_TIME] * equations.frequency(
-        point.solution.values
-    )
+    segment, phase = _lowest_touch(point)
     side = signature.along()[segment]
     sides = (side,) if _turns_round(equations, side) else (side, -side)
     touches = np.array([phase, 0.0] * len(sides))

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from saltus.continuation import End, Evidence
+from saltus.continuation import Evidence
 from saltus.flow import load_releases
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint
 from saltus.orbits.equations.contract import Restart
 from saltus.systems import arguments_of
 
@@ -20,8 +20,8 @@ from saltus.systems import arguments_of
 class RestSettings:
     """How far ahead the end of a rest is looked beyond, and how the loss of a release is located."""
 
-    # Shares of the parameter's range at which orbits are looked for beyond the end of a rest, tried
-    # in turn.
+    # Shares of the parameter's value (of a third of its range where that is 0) at which orbits are
+    # looked for beyond the end of a rest, tried in turn.
     after_rest: tuple[float, ...] = (1e-5, 1e-4, 1e-3)
     # Ahead of an orbit that has nearly shrunk to rest the loss of its release is looked for from
     # this share of the range on, doubled so many times, and located to this relative precision; the
@@ -37,13 +37,14 @@ SETTINGS = RestSettings()
 
 def as_the_motion_goes_on(point: OrbitPoint) -> Restart:
     """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them.
-    Ever more of them towards the end of the rest, where grazings accumulate, so that the branch
-    goes on from a little farther ahead."""
+    Ever more of them towards the end of the rest, where grazings accumulate, so that the orbits are
+    those of a branch of its own, which is begun a little farther ahead."""
     way = point.tangent[-len(point.parameters) :]
-    way = way / np.linalg.norm(way / np.array(point.curve.scales))
+    sizes = np.abs(point.parameters)
+    way = way / np.linalg.norm(way / np.where(sizes > 0.0, sizes, point.curve.scales))
     state = arguments_of(point.orbit.system, point.orbit.section_state)
     values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
-    return Restart(state, values, End(OrbitEnd.REST_VANISHES, point.parameter))
+    return Restart(state, values)
 
 
 def last_release(point: OrbitPoint) -> SpecialPoint | None:

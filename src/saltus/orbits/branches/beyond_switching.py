@@ -12,7 +12,7 @@ import numpy as np
 
 from saltus.continuation import End
 from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
-from saltus.orbits.branches.beyond_grazing import admissible_direction
+from saltus.orbits.branches.beyond_grazing import admissible_direction, ends_at_another, repeats
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.branches.symmetry import full_point, half_point
@@ -333,8 +333,9 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
     most `MOST_TOGETHER`.
     """
     here = Switching.of_point(point)
-    reason = OrbitEnd.TWO_AT_ONCE
-    if not known:
+    end = End(OrbitEnd.TWO_AT_ONCE, point.parameter)
+    covered = point.orbit.equations.covered(point.solution)
+    if not known and covered is None:
         # several impacts that appear or are lost at once belong together, as both of a symmetric
         # orbit: with one of them alone the branch would be left
         alike = _with_all_impacts(point)
@@ -346,13 +347,16 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
         begun = _begun(here, events, known)
         if begun is None:
             continue
-        reason = OrbitEnd.NO_DIRECTION
+        if covered is not None and repeats(begun.orbit.signature, covered):
+            end = ends_at_another(point, covered)
+            continue
+        end = End(OrbitEnd.NO_DIRECTION, point.parameter)
         ahead = _admissible(begun) or (
             _with_other_events(begun, known) if len(known) < MOST_TOGETHER else None
         )
         if isinstance(ahead, OrbitPoint):
             return ahead
-    return End(reason, point.parameter)
+    return end
 
 
 def _begun(here: Switching, events: list[Timed], known: tuple[Cycle, ...]) -> OrbitPoint | None:

@@ -14,8 +14,10 @@ import numpy as np
 from saltus.checks import check_bounds, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
+from saltus.orbits.branches.begun_at_special import from_a_change, with_special_start
+from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.branch import START, Branch
-from saltus.orbits.branches.branch_events import BranchEvents
+from saltus.orbits.branches.branch_events import BranchEvents, restarted
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.branches.symmetry import full_period, half, keeps_symmetry
@@ -99,6 +101,7 @@ def continue_orbit(
     steps = replace(STEPS, longest=step)
     events = partial(BranchEvents, while_stable=while_stable)
     show = growing or _unseen
+    first, cut = from_a_change(first)
     unfinished = End(OrbitEnd.GROWING)
 
     def grown(points: tuple[OrbitPoint, ...]) -> None:
@@ -111,7 +114,9 @@ def continue_orbit(
         steps,
         progress,
         growing and grown,
+        cut,
     )
+    course = replace(course, special=with_special_start(course, first, events(functions or {})))
     branch = Branch(**vars(course), path=path)
     show(branch)
     return branch
@@ -232,7 +237,8 @@ def switch_branch(
 
     At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two
     unsymmetric orbits, which are mirror images of one another, or, where two branches cross, the
-    two halves of the other branch.
+    two halves of the other branch. Beyond a CH it is the branch of the orbits on which the motion
+    settles there, if there are any.
 
     Parameters
     ----------
@@ -262,13 +268,15 @@ def switch_branch(
     """
     check_step(step)
     bounds = check_bounds(bounds)
-    if special.kind not in (SpecialKind.PD, SpecialKind.BPC):
+    if special.kind not in (SpecialKind.PD, SpecialKind.BPC, SpecialKind.CH):
         raise ParameterError(
-            f"no branch begins at a {special.kind}; switch at a PD or a BPC (grazings are gone through anyway)",
+            f"no branch begins at a {special.kind}; switch at a PD, a BPC or a CH (grazings are gone through anyway)",
             "special",
         )
     if special.kind == SpecialKind.PD:
         starts: tuple[OrbitPoint | None, ...] = (_doubled(special.point),)
+    elif special.kind == SpecialKind.CH:
+        starts = (restarted(as_the_motion_goes_on(special.point), special.point),)
     elif special.orbit.symmetric:
         starts = _unsymmetric(special.point)[: 2 if both else 1]
     else:

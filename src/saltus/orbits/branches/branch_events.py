@@ -154,6 +154,13 @@ class BranchEvents(OrbitEvents):
         changed: Cut | End = found.point.orbit.equations.change(found.special, point)
         return changed
 
+    def unlocated(self, run: Run, point: OrbitPoint, ahead: OrbitPoint, end: End) -> Cut | End:
+        """A cut at the last point where the orbits' events change just beyond it, as multipliers
+        grow without bound towards the change so that no orbit nearer to it can be solved for."""
+        step = point.curve.norm(ahead.place - point.place)
+        found = point.orbit.equations.stalled(point, step, run.points, run.bounds)
+        return found if isinstance(found, Cut) else end
+
     def interrupted(self, run: Run, point: OrbitPoint, ahead: OrbitPoint) -> End | None:
         """The end of a family that reaches orbits that are their own images: at the BPC or PD of
         the parent's branch at which the family is born."""
@@ -242,10 +249,10 @@ class BranchEvents(OrbitEvents):
             run.special.append(parent)
             return End(OrbitEnd.IMAGE, parent.parameter, parent.kind)
         following = equations.beyond(cut, run.points)
-        if isinstance(following, Restart):
-            following = restarted(following, cut.point)
         if isinstance(following, End):
             return following
+        if cut.special is not None:
+            run.special[-1] = equations.located_beyond(cut, following) or cut.special
         if (further := equations.also_at(cut, following)) is not None:
             run.special.append(further)
         count = following.orbit.counted_impacts
@@ -281,9 +288,9 @@ class BranchEvents(OrbitEvents):
         return super().stalled(run, point, step)
 
 
-def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
-    """The point with which a branch goes on beyond a point, found from a motion that settles there;
-    or why it ends.
+def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
+    """The first point of the branch beyond the end of another one, found from a motion that settles
+    there; None if it settles on no orbit.
     """
     equations = point.orbit.equations
     period = point.orbit.period
@@ -317,7 +324,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | End:
         )
         if there is not None:
             return there
-    return restart.end
+    return None
 
 
 def _accumulate(run: Run, following: OrbitPoint) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from saltus.bounds import area_contraction
-from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction, Units
+from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction, Units, Zero
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
@@ -329,6 +329,18 @@ def orbit_tests(orbit: PeriodicOrbit, functions: dict[str, UserFunction]) -> Ite
         yield Test(name, margin(name))
     for name, function in functions.items():
         yield Test(name, value(function))
+
+
+def with_witness(zero: Zero) -> Zero:
+    """A change of an orbit's events whose evidence names what vanishes there."""
+    point = zero.point
+    known = point.orbit.equations.witnesses(point.solution)
+    if not known:
+        return zero
+    grazes = zero.kind == SpecialKind.GR
+    of_kind = [witness for witness in known if witness.grazes == grazes] or known
+    least = min(of_kind, key=lambda witness: abs(witness.value))
+    return replace(zero, evidence=replace(zero.evidence, witness=least.what))
 
 
 def curve_test(kind: SpecialKind, value: Callable[[Any], float]) -> TestFunction:

@@ -16,6 +16,7 @@ from saltus.orbits.branches.branch import multiplier_columns, solution_columns
 from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
 from saltus.orbits.branches.special_point import SpecialPoint
+from saltus.orbits.branches.vanishing import Vanishing
 from saltus.orbits.equations.contract import OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import Result, provenance
@@ -51,9 +52,9 @@ class SpecialCurvePoint(OrbitPoint):
     condition_value: ConditionValue
 
     @property
-    def condition(self) -> Condition:
+    def condition(self) -> Condition | Vanishing:
         """The condition with which the next point is computed."""
-        condition: Condition = self.curve.condition
+        condition: Condition | Vanishing = self.curve.condition
         return condition
 
     @property
@@ -79,7 +80,7 @@ class ConditionedCurve(OrbitCurve):
     """The orbits at which a condition holds, along two parameters. At each point the vectors that
     border the condition are renewed."""
 
-    condition: Condition
+    condition: Condition | Vanishing
 
     @property
     def units(self) -> Units:
@@ -164,7 +165,7 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
     missed
         The points that were noticed on the way and could not be located, each with its reason.
     kind
-        The kind of its points: LP, PD, BPC or GR.
+        The kind of its points: LP, PD, BPC, NS, GR or SW.
     paths
         The dotted paths of both parameters.
 

@@ -16,6 +16,7 @@ from saltus.errors import ParameterError
 from saltus.orbits.branches.branch_continuation import STEP
 from saltus.orbits.branches.branch_events import OrbitEvents
 from saltus.orbits.branches.conditions import Condition, Singular, Slow, curve_tests
+from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_curve import (
     ConditionedCurve,
     SpecialCurve,
@@ -24,6 +25,7 @@ from saltus.orbits.branches.special_curve import (
 )
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import divide, half, keeps_symmetry
+from saltus.orbits.branches.vanishing import Vanishing, pair_on_circle, witness_vanishes
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
@@ -31,7 +33,16 @@ from saltus.orbits.signature import TOLERANCES
 from saltus.progress import Progress, silent
 from saltus.systems import check_path, check_system
 
-FOLLOWED = (SpecialKind.LP, SpecialKind.PD, SpecialKind.BPC, SpecialKind.GR)
+FOLLOWED = (
+    SpecialKind.LP,
+    SpecialKind.PD,
+    SpecialKind.BPC,
+    SpecialKind.NS,
+    SpecialKind.GR,
+    SpecialKind.SW,
+)
+# The witness of a change of events is at most this at an orbit beside it, in natural units.
+VANISHES = 1e-3
 # a parameter without bounds is followed up to its value times this, and down to its value divided
 # by this
 TENFOLD = 10.0
@@ -66,6 +77,8 @@ class CurveEvents(OrbitEvents):
         found = super().cut(point, ahead)
         if not isinstance(found, Cut) or found.special is None or isinstance(point.condition, Slow):
             return found
+        if isinstance(point.condition, Vanishing) and point.condition.number >= 0:
+            return Cut(found.point, replace(found.special, kind=_second_change(found.point)))
         zero = replace(found.special, point=without_condition(found.point))
         before = without_condition(point)
         there = point.orbit.equations.change(zero, before)
@@ -92,7 +105,8 @@ class CurveEvents(OrbitEvents):
         return super().ended(run, ahead, cut) if cut is None else None
 
     def tests(self, point: SpecialCurvePoint) -> Iterable[TestFunction]:
-        return curve_tests(self.kind, point.orbit.symmetric)
+        follows_a_witness = isinstance(point.condition, Vanishing)
+        return [] if follows_a_witness else curve_tests(self.kind, point.orbit.symmetric)
 
 
 def continue_special(
@@ -105,8 +119,8 @@ def continue_special(
     most_points: int = STEPS.most_points,
     progress: Progress = silent,
 ) -> SpecialCurve:
-    """The curve of LP, PD, BPC or GR through a special point of a branch, in the branch's parameter
-    and a second one.
+    """The curve of LP, PD, BPC, NS, GR or SW through a special point of a branch, in the branch's
+    parameter and a second one.
 
     It is followed both ways, through cusps, until it closes, reaches a bound, meets another grazing
     or cannot go on. At a PD or BPC the curve has the orbits that lose their stability, not those
@@ -152,10 +166,11 @@ def continue_special(
         raise ParameterError(
             f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special"
         )
-    if special.kind == SpecialKind.GR and special.orbit.equations.touched(special) is None:
+    changes = special.kind in (SpecialKind.GR, SpecialKind.SW)
+    if changes and special.orbit.equations.touched(special) is None:
         raise ParameterError(
-            "of models with several contacts or friction curves are followed of LP, PD and BPC, not of GR so far; "
-            "continue an orbit at several values of the second parameter instead",
+            "of orbits with friction, surfaces, dependent gaps or impacts that die away curves are followed of LP, PD, BPC "
+            f"and NS, not of {special.kind} so far; continue an orbit at several values of the second parameter instead",
             "special",
         )
     if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
@@ -210,8 +225,8 @@ def _start(
     special: SpecialPoint, paths: tuple[str, str], limits: list[tuple[float, float]]
 ) -> SpecialCurvePoint:
     """The special point as a point of its curve."""
-    orbit, condition = _defined(special, paths)
     scales = tuple((high - low) / 3.0 for low, high in limits)
+    orbit, condition = _defined(special, paths, scales)
     curve = ConditionedCurve(orbit.equations, scales, condition=condition)
     exact = curve.along_condition(orbit)
     if exact is None:
@@ -228,13 +243,16 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
     """
     condition = point.condition
     equations = point.orbit.equations
-    assert isinstance(condition, Singular)
     orbit = equations.at_another_section(point.orbit)
     if orbit is None:
         return None
-    curve = ConditionedCurve(
-        orbit.equations, point.curve.scales, condition=Singular.near(orbit, condition.closing)
+    scales = point.curve.scales
+    moved = (
+        Singular.near(orbit, condition.closing)
+        if isinstance(condition, Singular)
+        else pair_on_circle(orbit, scales)
     )
+    curve = ConditionedCurve(orbit.equations, scales, condition=moved)
     there = curve.along_condition(orbit)
     k = len(point.parameters)
     if there is None:
@@ -244,7 +262,58 @@ def _from_another_section(point: SpecialCurvePoint) -> SpecialCurvePoint | None:
     return turned
 
 
-def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrbit, Condition]:
+def _second_change(point: SpecialCurvePoint) -> SpecialKind:
+    """The kind of a point at which, along a curve of changes of an orbit's events, another witness
+    vanishes.
+    """
+    assert isinstance(point.condition, Vanishing)
+    known = point.orbit.equations.witnesses(point.solution)
+    own = known[point.condition.number]
+    others = [witness for witness in known if witness.what != own.what]
+    least = min(others, key=lambda witness: abs(witness.value), default=own)
+    kinds = {2: SpecialKind.GR_GR, 1: SpecialKind.SW_GR, 0: SpecialKind.SW_SW}
+    return kinds[int(own.grazes) + int(least.grazes)]
+
+
+def _changing(
+    special: SpecialPoint, paths: tuple[str, str], scales: tuple[float, ...]
+) -> tuple[PeriodicOrbit, Condition | Vanishing]:
+    """The orbit of a change of events with several contacts, and the condition that its witness
+    vanishes. Where two events come together the witness is one of the orbits on the other side.
+
+    Raises
+    ------
+    ParameterError
+        There is none on either side.
+    """
+    system = special.orbit.system
+    beyond = special.orbit.equations.beyond(Cut(special.point, special), [])
+    for point in (special.point, beyond):
+        if not isinstance(point, OrbitPoint):
+            continue
+        equations = equations_of(system, point.orbit.signature, paths)
+        values = np.array([point.parameter, system.parameters[paths[1]]])
+        orbit = _evaluated(equations, point.orbit.solution.unknowns, values)
+        known = orbit.equations.witnesses(orbit.solution)
+        numbers = [
+            i
+            for i, witness in enumerate(known)
+            if witness.grazes == (special.kind == SpecialKind.GR)
+            and not witness.what.startswith("time between")
+        ]
+        number = min(numbers, key=lambda i: abs(known[i].value), default=None)
+        if number is not None and abs(known[number].value) < VANISHES:
+            return orbit, witness_vanishes(orbit, scales, number)
+    raise ParameterError(
+        f"at this {special.kind} two events come together, of which no curves are followed so far; continue an orbit at "
+        "several values of the second parameter instead",
+        "special",
+    )
+
+
+def _defined(
+    special: SpecialPoint, paths: tuple[str, str], scales: tuple[float, ...]
+) -> tuple[PeriodicOrbit, Condition | Vanishing]:
     """The orbit as a solution of the problem along both parameters, and the condition of its
     special point.
     """
@@ -259,7 +328,9 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
             f"{paths[1]} takes away the mirror symmetry on which this {kind} rests; change it a little, follow the "
             "branch again, and continue the special points into which this one splits"
         )
-    if kind == SpecialKind.GR:
+    if kind in (SpecialKind.GR, SpecialKind.SW):
+        if system.model.holds_coordinates:
+            return _changing(special, paths, scales)
         touched = old.touched(special)
         assert touched is not None, "refused before"
         signature, unknowns = touched
@@ -283,6 +354,8 @@ def _defined(special: SpecialPoint, paths: tuple[str, str]) -> tuple[PeriodicOrb
                 "this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve"
             )
         orbit = halved
+    if kind == SpecialKind.NS:
+        return orbit, pair_on_circle(orbit, scales)
     return orbit, Singular.near(orbit, 1.0 if kind == SpecialKind.LP else -1.0)
 
 

@@ -79,6 +79,8 @@ class SpecialKind(StrEnum):
     )
     LP_BPC_GR = "LP-BPC-GR", "the same, with symmetry breakings of symmetric orbits", 2
     GR_GR = "GR-GR", "two grazings at once", 2
+    NS_GR = "NS-GR", "Neimark-Sacker and grazing at once", 2
+    SW_GR = "SW-GR", "grazing and another change of the orbit's events at once", 2
     LP_SW = (
         "LP-SW",
         "fold where the events of the orbit change, as a contact's release appears or is lost",
@@ -86,6 +88,8 @@ class SpecialKind(StrEnum):
     )
     PD_SW = "PD-SW", "period doubling where they change", 2
     BPC_SW = "BPC-SW", "symmetry breaking where they change", 2
+    NS_SW = "NS-SW", "Neimark-Sacker where they change", 2
+    SW_SW = "SW-SW", "two changes of the orbit's events at once, no grazings", 2
 
     def __new__(cls, code: str, description: str, codimension: int = 1) -> SpecialKind:
         """A kind is equal to its code, a string."""
@@ -151,7 +155,7 @@ class OrbitEnd(EndReason):
     NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open"
     REST_VANISHES = (
         "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away, "
-        "and the motion settles on no orbit near"
+        "and what follows is a branch of its own"
     )
 
 

@@ -35,10 +35,23 @@ from saltus.orbits.branches.beyond_switching import (
     families_beside,
     other_events_side,
 )
-from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, grazing
+from saltus.orbits.branches.orbit_curve import (
+    GRAZING,
+    OrbitPoint,
+    curve_test,
+    grazing,
+    with_witness,
+)
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
 from saltus.orbits.branches.symmetry import full_point
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.branches.vanishing import other_room
+from saltus.orbits.equations.contract import (
+    MotionToRead,
+    OrbitEquations,
+    OrbitEvaluation,
+    Solution,
+    Witness,
+)
 from saltus.orbits.equations.event_sequence import STAYS, contact_blocks, read_signature
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT
 from saltus.orbits.proofs.contact_segments import contact_segments
@@ -223,9 +236,18 @@ class ContactsEquations(OrbitEquations):
         natural = self.natural
         state = natural.state[self._free]
         places = self._run.trace.contact_coordinates
+        rows = self.plan[: len(self.signature.events)]
+        # the gap is divided by a power of the time since the contact opened without speed
         guards = [
-            (natural.lengths if kind == EventCode.IMPACT else natural.forces)[places[contact]]
-            for kind, contact in self.plan[: len(self.signature.events), 1:3].tolist()
+            natural.lengths[places[contact]] / natural.time**power
+            if kind == EventCode.IMPACT
+            else natural.forces[places[contact]]
+            for kind, contact, power in zip(
+                rows[:, SegmentPlan.KIND].tolist(),
+                rows[:, SegmentPlan.CONTACT].tolist(),
+                rows[:, SegmentPlan.POWER].tolist(),
+                strict=True,
+            )
         ]
         unknowns = np.append(state, np.ones(len(guards)))
         return Units(unknowns, np.append(guards, state), self.is_phase)
@@ -287,6 +309,56 @@ class ContactsEquations(OrbitEquations):
         gaps = seen[:, SegmentExtremes.BESIDE].min() / self.natural.length
         return float(min(reactions, gaps, apart.min(initial=math.inf)))
 
+    def covered(self, solution: Solution) -> int | None:
+        signature = self.signature
+        if signature.symmetric:
+            return None
+        phases = self.split(solution.unknowns)[1]
+        ends = solution.evaluation.ends
+        after = SegmentEnd.NUMBERS + 8 * self.own
+        # the row of an event is the segment before it
+        rows = (np.arange(len(phases)) - 1) % max(len(phases), 1)
+        kept = [
+            i
+            for i, event in enumerate(signature.events)
+            if not (
+                event.is_impact
+                and abs(ends[rows[i], SegmentEnd.RATE]) < TOLERANCES.touch * self.natural.speed
+            )
+        ]
+        for periods in range(1, signature.period):
+            if signature.period % periods or len(kept) * periods % signature.period:
+                continue
+            if not kept:
+                begin = phases[0] if len(phases) else 0.0
+                state = (
+                    ends[rows[0], after : after + 2 * self.own]
+                    if len(phases)
+                    else self.split(solution.unknowns)[0]
+                )
+                span = np.array([begin, begin + math.tau * periods])
+                closed = int(self.plan[0, SegmentPlan.ALONG])
+                times = span / self.frequency(solution.values)
+                later = self.carried_along(state, closed, times, solution.values)
+                if later is None:
+                    continue
+                moved = np.abs((later - state) / self.natural.state).max()
+                if moved < TOLERANCES.touching_state:
+                    return periods
+                continue
+            part = len(kept) * periods // signature.period
+            events = [signature.events[i] for i in kept]
+            alike = events[part:] + events[:part] == events
+            moved = np.roll(phases[kept], -part)
+            moved[len(kept) - part :] += self.closing
+            apart = np.abs(moved - phases[kept] - math.tau * periods).max()
+            states = ends[rows[kept], after : after + 2 * self.own]
+            moved_states = (np.roll(states, -part, axis=0) - states) / self.natural.state
+            apart = max(apart, np.abs(moved_states).max())
+            if alike and apart < TOLERANCES.grazing_orbits:
+                return periods
+        return None
+
     def nearest(
         self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
     ) -> np.ndarray | None:
@@ -333,7 +405,7 @@ class ContactsEquations(OrbitEquations):
 
     def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
         at = full_point(zero.point) if zero.point.orbit.symmetric else zero.point
-        return Cut(zero.point, replace(zero, kind=contact_change(at)))
+        return Cut(zero.point, with_witness(replace(zero, kind=contact_change(at))))
 
     def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
         return other_events_side(cut.point)
@@ -355,7 +427,48 @@ class ContactsEquations(OrbitEquations):
         return None if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
 
     def curve_barrier(self, kind: str, point: Any) -> TestFunction:
-        return curve_test(SpecialKind[f"{kind}_GR"], grazing)
+        follows_a_change = kind in (SpecialKind.GR, SpecialKind.SW)
+        value = other_room if follows_a_change else grazing
+        return curve_test(SpecialKind[f"{kind}_GR"], value)
+
+    def witnesses(self, solution: Solution) -> list[Witness]:
+        natural = self.natural
+        names = [contact.name for contact in self.system.contact_model.contacts]
+        evaluation: Any = solution.evaluation
+        seen = evaluation.seen
+        phases = self.split(solution.unknowns)[1]
+        events = self.signature.events
+        forces = natural.forces.max()
+        found = list[Witness]()
+
+        def at(s: int, column: int, after: int, unit: float, what: str, grazes: bool) -> None:
+            number = seen[s, column + after]
+            name = names[int(number)] if np.isfinite(number) else ""
+            found.append(Witness(f"{what} {name}", grazes, float(seen[s, column] / unit)))
+
+        for s in range(len(seen)):
+            at(s, SegmentExtremes.GAP, 2, natural.length, "gap of", True)
+            at(s, SegmentExtremes.FORCE, 2, forces, "reaction of", False)
+            at(s, SegmentExtremes.PULL, 1, forces, "reaction after an event of", False)
+            at(s, SegmentExtremes.TAIL, 1, forces, "reaction before an event of", False)
+            beside = float(seen[s, SegmentExtremes.BESIDE] / natural.length)
+            found.append(Witness("gap at an impact of another contact", False, beside))
+        for i, event in enumerate(events):
+            slow = event.is_impact and self.plan[i - 1, SegmentPlan.POWER] == 0
+            speed = -evaluation.ends[i - 1, SegmentEnd.RATE] if slow else math.inf
+            what = f"speed at {names[event.contact]}"
+            found.append(Witness(what, True, float(speed / natural.speed)))
+        apart = np.diff(np.append(phases, phases[:1] + self.closing))
+        for i, (event, duration) in enumerate(zip(events, apart.tolist(), strict=True)):
+            following = events[(i + 1) % len(events)]
+            what = f"time between {names[event.contact]} and {names[following.contact]}"
+            alike = self._independent[i] and abs(duration) <= ONE_INSTANT * self.closing
+            found.append(Witness(what, False, math.inf if alike else duration))
+        return found
+
+    def touched(self, special: Zero) -> tuple[Signature, np.ndarray] | None:
+        """Its own signature: its equations hold on both sides of what vanishes."""
+        return special.point.orbit.signature, special.point.solution.unknowns
 
     def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
         return self._to_prove(solution)

@@ -134,12 +134,19 @@ class Solution:
         return self.units.residual(self.evaluation.residual)
 
 
+class Witness(NamedTuple):
+    """A quantity of an orbit that vanishes where its events change."""
+
+    what: str  # such as "gap of stop"
+    grazes: bool  # whether the change is then a grazing, else a switching
+    value: float  # in natural units
+
+
 class Restart(NamedTuple):
-    """Where a branch goes on beyond a change, if only a motion tells with which orbits."""
+    """Where a branch begins beyond the end of another one, if only a motion tells its orbits."""
 
     state: dict[str, Any]  # at phase 0, as `simulate` takes it
     values: list[np.ndarray]  # of the parameters at which an orbit is looked for, tried in turn
-    end: End  # why the branch ends if there is none
 
 
 class MotionToRead:
@@ -353,6 +360,12 @@ class OrbitEquations(ABC):
         either."""
         return math.inf
 
+    def witnesses(self, solution: Solution) -> list[Witness]:
+        """The quantities of an orbit one of which vanishes at a change of its events, always in the
+        same order; none where the equations do not know them one by one.
+        """
+        return []
+
     # --- 5. halving and repeating --------------------------------------------
 
     @abstractmethod
@@ -379,6 +392,12 @@ class OrbitEquations(ABC):
         """
         return None
 
+    def covered(self, solution: Solution) -> int | None:
+        """The forcing periods of a shorter orbit that an orbit at a grazing repeats, but for which
+        of its touches are impacts; None if it repeats none.
+        """
+        return None
+
     # --- 6. renumbering ------------------------------------------------------
 
     @abstractmethod
@@ -387,10 +406,14 @@ class OrbitEquations(ABC):
         `other` of a branch; None if the two cannot be compared so."""
 
     def at_section_of(self, point: Any, other: Any) -> Any:
-        """A point with its state given at the section of another point; unchanged if the equations
-        have no section.
+        """A point with its state given at the section of another point or, if the equations have no
+        section, with its unknowns counted as those of that point.
         """
-        return point
+        unknowns = self.nearest(point.solution.unknowns, point.solution.values, other)
+        if unknowns is None or np.array_equal(unknowns, point.solution.unknowns):
+            return point
+        found = other.curve.known(unknowns, point.parameters)
+        return point if found is None else other.curve.with_tangent(found, other.tangent) or point
 
     def at_another_section(self, orbit: Any) -> Any:
         """An orbit with its section farther from all events; None if the equations have no section,
@@ -418,12 +441,17 @@ class OrbitEquations(ABC):
 
     @abstractmethod
     def beyond(self, cut: Cut, points: list[Any]) -> Any:
-        """The point with which the branch of `points` goes on beyond a cut, a `Restart` if it is to
-        be found from a motion, or the end."""
+        """The point with which the branch of `points` goes on beyond a cut, or the end."""
 
     def born_at(self, cut: Cut, points: list[Any]) -> Zero | None:
         """The special point of the parent's branch if a family ends at a cut because it is born
         there; else None.
+        """
+        return None
+
+    def located_beyond(self, cut: Cut, following: Any) -> Zero | None:
+        """The special point of a cut, located among the orbits beyond it, of which `following` is
+        the first; None where it is not known better from there.
         """
         return None
 

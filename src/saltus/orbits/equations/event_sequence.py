@@ -70,6 +70,7 @@ class EventSequence:
     section_distance: float
 
     groups: tuple[Group, ...]  # the groups of contacts and frictions
+    witness: str  # which of these quantities `distance` is
 
     @property
     def sequence(self) -> tuple[OrbitEvent, ...]:
@@ -142,17 +143,16 @@ def sequence_of(
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
-    distance = float(
-        min(
-            [
-                sampled.nearest_touch(smooth),
-                *speeds,
-                *(time for time in apart if time > ONE_INSTANT * period),
-            ]
-        )
+    later = min(time for time in apart if time > ONE_INSTANT * period)
+    distance, witness = min(
+        sampled.nearest_touch(smooth),
+        (min(speeds, default=math.inf), "speed of an impact"),
+        (float(later), "time between events"),
     )
     events, times = _in_order(events, times, ONE_INSTANT * period)
-    return EventSequence(events, times, period, max(distance, 0.0), section_distance, groups)
+    return EventSequence(
+        events, times, period, max(distance, 0.0), section_distance, groups, witness
+    )
 
 
 def _listed(

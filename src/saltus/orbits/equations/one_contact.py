@@ -35,9 +35,15 @@ from saltus.flow import (
 )
 from saltus.orbits.branches.beyond_grazing import inserted, other_side, removed
 from saltus.orbits.branches.conditions import room
-from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test
+from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, with_witness
 from saltus.orbits.branches.special_point import SpecialKind
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.equations.contract import (
+    MotionToRead,
+    OrbitEquations,
+    OrbitEvaluation,
+    Solution,
+    Witness,
+)
 from saltus.orbits.proofs.one_contact_segments import one_contact_segments
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, Signature
@@ -217,6 +223,40 @@ class OneContactEquations(OrbitEquations):
                 return periods
         return None
 
+    def covered(self, solution: Solution) -> int | None:
+        signature = self.signature
+        if signature.symmetric or self.passes_contact:
+            return None
+        unknowns = solution.unknowns
+        pairs = unknowns.reshape(-1, 2) if signature.sides else np.empty((0, 2))
+        fast = pairs[:, 1] >= TOLERANCES.touch * self.natural.speed
+        sides = np.array(signature.sides, dtype=int)[fast]
+        for periods in range(1, signature.period):
+            if signature.period % periods or len(sides) * periods % signature.period:
+                continue
+            part = len(sides) * periods // signature.period
+            if len(sides):
+                later = np.roll(pairs[fast], -part, axis=0)
+                later[len(sides) - part :, 0] += self.closing
+                later[:, 0] -= math.tau * periods
+                apart = np.abs((later - pairs[fast]) / [1.0, self.natural.speed]).max()
+                if (np.roll(sides, -part) == sides).all() and apart < TOLERANCES.grazing_orbits:
+                    return periods
+                continue
+            phase = float(pairs[0, 0]) if len(pairs) else 0.0
+            state = (
+                np.array([float(self.system_at(solution.values).model.contact), 0.0])
+                if len(pairs)
+                else unknowns
+            )
+            again = self.carried(state, phase, phase + math.tau * periods, solution.values)
+            moved = (
+                math.inf if again is None else np.abs((again - state) / self.natural.state).max()
+            )
+            if moved < TOLERANCES.touching_state:
+                return periods
+        return None
+
     def nearest(
         self, unknowns: np.ndarray, values: np.ndarray, other: OrbitPoint
     ) -> np.ndarray | None:
@@ -254,8 +294,21 @@ class OneContactEquations(OrbitEquations):
                 least = distance
         return best
 
+    def witnesses(self, solution: Solution) -> list[Witness]:
+        natural = self.natural
+        extremes: Any = solution.evaluation.extremes
+        gaps = extremes[:, SegmentColumn.LOWEST_GAP] / natural.length
+        found = [Witness("gap", True, float(gap)) for gap in gaps]
+        speeds = self.impacts(solution)[1] / natural.speed
+        found += [Witness("speed of an impact", True, float(speed)) for speed in speeds]
+        pressing = self.pressing(solution)
+        return [*found, Witness("gap at phase 0", True, pressing)]
+
     def barrier(self, point: OrbitPoint) -> TestFunction:
         return GRAZING
+
+    def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
+        return Cut(zero.point, with_witness(zero))
 
     def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
         return other_side(cut.point)

@@ -454,26 +454,29 @@ class SampledMotion:
             least.append(self._turning_of(course, sign * self.velocity[place], is_open))
         return float(min(least))
 
-    def nearest_touch(self, smooth: frozenset[int] = frozenset()) -> float:
+    def nearest_touch(self, smooth: frozenset[int] = frozenset()) -> tuple[float, str]:
         """How near the motion comes to a further change of its mode: the least of the inner minima
         of the gaps of open contacts and of the distances from surfaces, the speeds of sliding
         frictions, the reactions of closed contacts, and the forces that sticking frictions still
         lack to slip. Surfaces of the numbers `smooth` do not count.
 
         For reactions and sticking frictions the value just after an event counts too. inf without
-        such minima.
+        such minima. The second part of the result names the quantity.
         """
         modes = modes_in(self.motion.system)
-        least = [self._lowest_of(modes.gaps(self.side, smooth))]
+        least = [(self._lowest_of(modes.gaps(self.side, smooth)), "gap")]
         for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
             course[:, 0] = course[:, 0] - s * ground_speed
-            least.append(self._turning_of(course, s[:, None] * self.acceleration[place], s != 0))
+            speed = self._turning_of(course, s[:, None] * self.acceleration[place], s != 0)
+            least.append((speed, "sliding speed"))
         for chosen, forces in modes.holding(self.side):
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
             if steps.size:
-                least.append(self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces))
-        return float(min(least))
+                force = self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces)
+                least.append((force, "reaction or friction force"))
+        value, what = min(least)
+        return float(value), what
 
     def _turning_of(self, course: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
         """The least of the minima of series (steps, orders), where their rates turn from negative

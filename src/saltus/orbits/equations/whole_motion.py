@@ -36,6 +36,7 @@ from saltus.orbits.branches.beyond_events import (
     events_of,
     first_step,
     jump_over,
+    located_beyond,
     parent_at,
     refused_beyond,
     same_events,
@@ -49,7 +50,6 @@ from saltus.orbits.equations.contract import (
     MotionToRead,
     OrbitEquations,
     OrbitEvaluation,
-    Restart,
     Solution,
 )
 from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
@@ -195,11 +195,14 @@ class WholeMotionEquations(OrbitEquations):
     def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
         return change_at(zero, point)
 
-    def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | Restart | End:
+    def beyond(self, cut: Cut, points: list[OrbitPoint]) -> OrbitPoint | End:
         return beyond(cut, points)
 
     def born_at(self, cut: Cut, points: list[OrbitPoint]) -> Zero | None:
         return parent_at(cut, points)
+
+    def located_beyond(self, cut: Cut, following: OrbitPoint) -> Zero | None:
+        return located_beyond(cut, following)
 
     def also_at(self, cut: Cut, following: OrbitPoint) -> Zero | None:
         return jump_over(cut, following)

@@ -313,7 +313,7 @@ def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> np.ndarray
     return np.asarray(np.minimum(apart, np.abs(seen - image).max(axis=-1)) if mirrored else apart)
 
 
-BRANCHING = (SpecialKind.PD, SpecialKind.BPC)  # at which other families are born
+BRANCHING = (SpecialKind.PD, SpecialKind.BPC, SpecialKind.CH)  # at which other families begin
 
 
 @dataclass(frozen=True)
