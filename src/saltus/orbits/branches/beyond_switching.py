@@ -339,9 +339,9 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
         # several impacts that appear or are lost at once belong together, as both of a symmetric
         # orbit: with one of them alone the branch would be left
         alike = _with_all_impacts(point)
-        ahead = None if alike is None else _admissible(alike)
-        if ahead is not None:
-            return ahead
+        together = None if alike is None else _admissible(alike)
+        if together is not None:
+            return together
     known = (*known, cycle_of(point.orbit.signature))
     for events in here.other_signatures():
         begun = _begun(here, events, known)
