@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError
-from saltus.systems.contact_model import ContactModel, mass_rows, normal_forces
+from saltus.systems.contact_model import ContactModel, mass_and_force, mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import IMAGE_ROUNDING, Model
 from saltus.systems.signals import Constant, Harmonic, Signal, scaled
@@ -381,13 +381,23 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
     there = (t, _of(q), _of(v))
     image = (t + later, _of(-q[places]), _of(-v[places]))
     image_side = -side if model.sides else side
-    own = _rows(model.acceleration(*there, side, load), n)
-    other = _rows(model.acceleration(*image, image_side, image_load), n)
-    if not _alike(own[places], -other):
+    # M and r say what M^-1 r does, which takes seconds for hundreds of coordinates
+    by_force = isinstance(model, ContactModel) and not system.dependent
+    if by_force:
+        forces = [
+            _rows(mass_and_force(model, *at, own_load)[1], n)
+            for at, own_load in ((there, load), (image, image_load))
+        ]
+    else:
+        forces = [
+            _rows(model.acceleration(*at, own_side, own_load), n)
+            for at, own_side, own_load in ((there, side, load), (image, image_side, image_load))
+        ]
+    if not _alike(forces[0][places], -forces[1]):
         return False
     if isinstance(model, ContactModel):
         masses = [
-            np.array([_rows(row, n) for row in mass_rows(model, at, time, own_load)])
+            _square(mass_rows(model, at, time, own_load))
             for time, at, own_load in ((t, there[1], load), (t + later, image[1], image_load))
         ]
         if not _alike(masses[0][np.ix_(places, places)], masses[1]):
@@ -410,6 +420,12 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
             turned = model.reset(float(t[i]) + later, -speed, image_side, image_load, twin.impact)
             if after[0] != -turned[0] or not _alike(_rows(after[1], 1), -_rows(turned[1], 1)):
                 return False
+    if not model.margin_names(system.load):
+        return True
+    own, other = forces
+    if by_force:
+        own = _rows(model.acceleration(*there, side, load), n)
+        other = _rows(model.acceleration(*image, image_side, image_load), n)
     return _margins_are_alike(
         model, (*there, _of(own), side, load), (*image, _of(other), image_side, image_load)
     )
@@ -457,6 +473,13 @@ def _alike(one: np.ndarray, other: np.ndarray) -> bool:
 
 def _of(values: np.ndarray) -> Any:
     return values[0] if len(values) == 1 else tuple(values)
+
+
+def _square(rows: list[list[Any]]) -> np.ndarray:
+    """A matrix of numbers or arrays, (n, n, probes), or (n, n, 1) if all of it are numbers."""
+    if all(isinstance(entry, (int, float)) for row in rows for entry in row):
+        return np.array(rows, dtype=float)[..., None]
+    return np.array([_rows(row, len(rows)) for row in rows])
 
 
 def _rows(values: Any, count: int) -> np.ndarray:
