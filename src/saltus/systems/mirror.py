@@ -127,7 +127,8 @@ def has_half_the_period(system: System) -> bool:
     system
         What moves.
     """
-    if system.load.period is None:
+    period = system.load.period
+    if period is None:
         return False
     inner = system.in_gap_coordinates
     model: Any = inner.model
@@ -135,7 +136,7 @@ def has_half_the_period(system: System) -> bool:
     units = natural_units(inner)
     random = np.random.default_rng(4)
     n = len(model.coordinates)
-    t = random.uniform(size=PROBES) * inner.load.period
+    t = random.uniform(size=PROBES) * period
     q = random.normal(size=(n, PROBES)) * units.lengths[:, None]
     v = random.normal(size=(n, PROBES)) * units.speeds[:, None]
     frictions = len(model.frictions)
@@ -149,7 +150,7 @@ def has_half_the_period(system: System) -> bool:
                             _rows(normal_forces(model, time, _of(q), _of(v), load), frictions),
                         ]
                     )
-                    for time in (t, t + 0.5 * inner.load.period)
+                    for time in (t, t + 0.5 * period)
                 ]
                 if not _alike(*values):
                     return False

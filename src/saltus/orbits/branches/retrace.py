@@ -63,9 +63,9 @@ def _is_on_step(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:
     ends = [
         one.place if curve.joins(one.curve) else nearest(one, one.place, point) for one in (a, b)
     ]
-    if ends[0] is None or ends[1] is None:
-        return False
     first, last = ends
+    if first is None or last is None:
+        return False
     chord = last - first
     length = curve.norm(chord)
     if length == 0.0:

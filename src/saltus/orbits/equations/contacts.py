@@ -398,7 +398,8 @@ class ContactsEquations(OrbitEquations):
             first = equations.split(goal)[1][0]
             begun = begun + math.tau * round((first - begun[0]) / math.tau)
             found.append(equations.joined(begin, begun))
-        return min(found, key=lambda one: float(np.abs(one - goal).max()))
+        best: np.ndarray = min(found, key=lambda one: float(np.abs(one - goal).max()))
+        return best
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
         return GRAZING
