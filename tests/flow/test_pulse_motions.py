@@ -143,6 +143,21 @@ def test_lanes_of_blocks_under_pulses_are_the_single_motions():
         assert int(many.impact_count[i]) == len(one.impacts)
 
 
+@pytest.mark.parametrize("start", [1.0, 1000.0])
+@pytest.mark.parametrize("duration", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_a_short_ramp_is_a_step(start, duration):
+    if start + duration == start:
+        return
+    load = Load(force=Ramp(amplitude=0.7, duration=duration, start=start))
+    model = WallOscillator(stiffness=0.0, wall=1e9)
+    system = System(model=model, load=load, impact=VelocityReduction())
+    motion = simulate(system, x=0.0, duration=start + 10.0)
+    # 0.7 for 10 units of time, less half of the ramp; its end is rounded to 2e-16 of the time
+    exact = 0.7 * (10.0 - 0.5 * duration)
+    assert motion.velocity == pytest.approx(exact, abs=1e-12 * max(1.0, start * 0.1), rel=0)
+    assert load.force(start + 5.0) == 0.7
+
+
 def test_no_motion_is_said_to_rest_for_ever_before_its_own_pulse():
     pulse = HalfSine(amplitude=0.4, frequency=3.0, quantity="acceleration", start=1.0)
     system = System(

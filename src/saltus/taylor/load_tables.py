@@ -96,9 +96,8 @@ def _fill_clock(table: np.ndarray, breaks: np.ndarray, pulse: Any, order: int) -
     past = breaks >= end
     pieces = table[:, 1:]
     if order == SINCE:
-        pieces[..., 0] = np.where(
-            past, end - pulse.start, np.where(within, breaks - pulse.start, 0.0)
-        )
+        # the length itself at the end, of which end - start is no rounding where it is short
+        pieces[..., 0] = np.where(past, pulse.length, np.where(within, breaks - pulse.start, 0.0))
     if order == AFTER:
         pieces[..., 0] = np.where(past, breaks - end, 0.0)
     slope = {SINCE: within, WITHIN: within, AFTER: past, AFTER + 1: past}.get(order)
