@@ -304,8 +304,14 @@ def test_balls_come_to_rest_under_a_ceiling_as_they_do_without_it(e):
     start = {"x0": 1.0, "x1": 2.3, "x2": 3.6, "velocity": 0.0, "duration": 6.0}
     under, free = simulate(one, **start), simulate(other, **start)
     assert str(under.stop) == str(free.stop) == "rest"
-    assert [(e.kind, e.contact) for e in under.events] == [(e.kind, e.contact) for e in free.events]
-    np.testing.assert_allclose(under.events.times, free.events.times, rtol=0, atol=1e-11)
+    # the natural time of a system without a load depends on the ceiling, and with it, how many
+    # impacts of the last accumulation are followed one by one
+    alike = 40
+    kinds = [[(e.kind, e.contact) for e in each.events[:alike]] for each in (under, free)]
+    assert kinds[0] == kinds[1]
+    times = [each.events.times[:alike] for each in (under, free)]
+    np.testing.assert_allclose(*times, rtol=0, atol=1e-11)
+    assert under.rest_time == pytest.approx(free.rest_time, abs=1e-9)
     np.testing.assert_allclose(under.position, [0.0, 1.0, 2.0], rtol=0, atol=1e-13)
     times = np.linspace(0.0, 6.0, 200)
     np.testing.assert_allclose(under.at(times), free.at(times), rtol=0, atol=1e-11)

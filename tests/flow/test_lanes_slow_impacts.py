@@ -16,7 +16,7 @@ from saltus.systems import EnergyRestitution, Load, System, VelocityReduction, W
 from saltus.taylor import pointer
 from saltus.taylor.private_numba import OPTIONS
 
-TOL = 1e-10
+TOL = 1e-9
 THRESHOLD = SLOW * math.sqrt(TOL)  # below it a speed may be the end of an accumulation
 ENDED = int(Status.NOT_FINITE)
 assert THRESHOLD > 2 * CHATTER_SPEED
@@ -36,10 +36,10 @@ def ball(speed, e=1.0):
     """
     system = System(
         model=WallOscillator(stiffness=0.0, wall=0.0),
-        load=Load(force=0.3),
+        load=Load(force=1.0),  # the natural speed is then 1
         impact=VelocityReduction(e),
     )
-    return system, {"x": -(speed**2) / 0.6, "velocity": 0.0, "tol": TOL}, 2 * speed / 0.3
+    return system, {"x": -(speed**2) / 2.0, "velocity": 0.0, "tol": TOL}, 2.0 * speed
 
 
 @pytest.mark.parametrize("flights", [3, 1000])
@@ -84,4 +84,4 @@ def test_an_impact_that_changes_the_speed_and_the_next_one_back_loses_nothing(no
     np.testing.assert_array_equal(ends.impact_count, 2 * done + (beyond > first))
     mass = np.where(ends.theta > 0, heavy, 1.0)
     energy = mass * ends.velocity**2 / 2 + pull * abs(ends.theta)
-    np.testing.assert_allclose(energy, heavy * speed**2 / 2, rtol=1e-8)
+    np.testing.assert_allclose(energy, heavy * speed**2 / 2, rtol=100 * TOL)

@@ -173,7 +173,9 @@ def test_a_motion_that_is_asked_for_again_is_the_same(name):
         assert all(a == b for a, b in zip(first.events, again.events, strict=True))
     for start in STARTS[:4]:
         longer = "MotionRequest.__init__" in calls(lambda start=start: motion(start, system))
-        assert longer == (motion(start, system).limit is not None)
+        found = motion(start, system)
+        # more events than the buffers of one call hold take the longer way too
+        assert longer == (found.limit is not None or len(found.events) > 150)
 
 
 def test_what_is_wrong_is_refused_however_often_a_system_was_followed():

@@ -465,7 +465,10 @@ class Recipe:
         return found
 
     def _load(self) -> saltus.Load:
-        return saltus.Load(frequency=self.frequency, **self._signals())
+        signals = {
+            name: parts[0] if len(parts) == 1 else parts for name, parts in self._signals().items()
+        }
+        return saltus.Load(frequency=self.frequency, **signals)
 
     def _one_contact(self) -> saltus.System:
         wall = self.contacts[0]

@@ -54,6 +54,7 @@ from saltus.flow.contacts.impacts import (
     hold_coordinates,
     impact_impulses,
     jump_first_order,
+    press_of,
     record_contact_event,
     settle_contact,
     undecide,
@@ -105,14 +106,14 @@ def violated(motion, candidates, zero):
             continue
         known = motion.contacts[i, ContactColumn.RELEASED]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            k = leading(motion.margin_series[i], known, order, zero)
+            k = leading(motion.margin_series[i], known, order, zero, press_of(motion, i), 0)
             if k < order and motion.margin_series[i, k] < 0.0:
                 wrong |= 1 << i
         else:
             gap_series(motion, i, contact_position(motion, i), order, g)
-            if known == 1 and rubs_along(motion, i) and abs(g[2]) > ALIKE:
+            if known == 1 and rubs_along(motion, i) and abs(g[2]) > ALIKE * motion.press:
                 known = 0  # its friction has changed with the release
-            k = leading(g, 2 + known, order, zero)
+            k = leading(g, 2 + known, order, zero, motion.press, 2)
             if k == order or g[k] < 0.0:
                 wrong |= 1 << i
         motion.contacts[i, ContactColumn.SKIP] = k
@@ -288,7 +289,7 @@ def note_ties(motion, candidates, t):
     hold_coordinates(motion)
     expand(motion, t, 1.0, 2)
     for i in range(motion.contacts.shape[0]):
-        if candidates >> i & 1 and abs(motion.margin_series[i, 0]) <= TIED:
+        if candidates >> i & 1 and abs(motion.margin_series[i, 0]) <= TIED * press_of(motion, i):
             motion.contacts[i, ContactColumn.RELEASED] = 1
 
 

@@ -15,7 +15,7 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate
-from saltus.flow.contacts.impacts import record_contact_event
+from saltus.flow.contacts.impacts import mobility, record_contact_event
 from saltus.flow.contacts.layout import (
     TOGETHER,
     ContactColumn,
@@ -33,8 +33,8 @@ from saltus.taylor import lean_jit
 # --- compiled from here on ---------------------------------------------------
 
 # If mu_s = mu_k, the acceleration with which sliding begins is 0, that is, by rounding, smaller
-# than this. So is a margin of a friction that can only just stick when its speed becomes that of
-# the ground. In both cases the next coefficients decide.
+# than this, in units of what presses (`note_press`). So is a margin of a friction that can only just
+# stick when its speed becomes that of the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
 
 
@@ -53,28 +53,58 @@ def hold_frictions(motion):
 
 
 @lean_jit
+def is_on_surface(motion, k):
+    """Whether a row is that of a surface on which the motion is exactly, unless it has just passed
+    it."""
+    row = motion.frictions[k]
+    if row[FrictionColumn.MARGIN] != NoMargin.SURFACE or row[FrictionColumn.REACHED] == 3:
+        return False
+    return motion.coordinates[row[FrictionColumn.COORDINATE]] == ground_speed(motion, k)
+
+
+@lean_jit
+def on_surfaces(motion):
+    """Whether the motion is on a surface that it has not just passed."""
+    found = False
+    for k in range(motion.frictions.shape[0]):
+        found = found or is_on_surface(motion, k)
+    return found
+
+
+@lean_jit
 def begin_on_surfaces(motion, t):
-    """Choose the sides of surfaces on which a motion starts: those to which it moves on; False if
-    there is none, or if both sides of one lead away from it."""
+    """Choose the sides of surfaces on which a motion is: those to which it moves on.
+
+    0 if there is none, or if both sides of one lead away from it; else 1, or 2 if one has changed.
+    """
+    changed = 1
     for _ in range(2):
         hold_frictions(motion)
         agrees = True
         for k in range(motion.frictions.shape[0]):
             row = motion.frictions[k]
-            if row[FrictionColumn.MARGIN] != NoMargin.SURFACE:
+            if not is_on_surface(motion, k):
                 continue
             expand(motion, t, 1.0, motion.order)
-            sliding_series(
-                motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series
-            )
-            i = leading(motion.gap_series, 0, motion.order)
+            i = away(motion, k)
             row[FrictionColumn.SKIP] = i
-            if i > 0 and i < motion.order and motion.gap_series[i] < 0.0:
+            if i < motion.order and motion.gap_series[i] < 0.0:
                 row[FrictionColumn.SLIDES] *= -1
                 agrees = False
+                changed = 2
         if agrees:
-            return leads_one_way(motion, t)
-    return False
+            return changed if leads_one_way(motion, t) else 0
+    return 0
+
+
+@lean_jit
+def away(motion, k):
+    """The first coefficient of the distance from a surface that is not 0, which is in `gap_series`
+    afterwards; the order if there is none.
+    """
+    side = 1.0 * motion.frictions[k, FrictionColumn.SLIDES]
+    sliding_series(motion, k, side, motion.order, motion.gap_series)
+    return leading(motion.gap_series, 1, motion.order, ZERO, motion.press, 2)
 
 
 @lean_jit
@@ -85,17 +115,11 @@ def leads_one_way(motion, t):
     one_way = True
     for k in range(motion.frictions.shape[0]):
         row = motion.frictions[k]
-        if (
-            row[FrictionColumn.MARGIN] == NoMargin.SURFACE
-            and 1 < row[FrictionColumn.SKIP] < motion.order
-        ):
+        if is_on_surface(motion, k) and 1 < row[FrictionColumn.SKIP] < motion.order:
             row[FrictionColumn.SLIDES] *= -1
             hold_frictions(motion)
             expand(motion, t, 1.0, motion.order)
-            sliding_series(
-                motion, k, 1.0 * row[FrictionColumn.SLIDES], motion.order, motion.gap_series
-            )
-            i = leading(motion.gap_series, 0, motion.order)
+            i = away(motion, k)
             one_way = one_way and not (i < motion.order and motion.gap_series[i] > 0.0)
             row[FrictionColumn.SLIDES] *= -1
     hold_frictions(motion)
@@ -126,6 +150,12 @@ def sliding_series(motion, k, direction, order, g):
 
 
 @lean_jit
+def margin_size(motion, k):
+    """The natural size of a friction's margins."""
+    return motion.press / mobility(motion, motion.frictions[k, FrictionColumn.COORDINATE])
+
+
+@lean_jit
 def friction_step_size(motion, count, natural):
     """The step, at most `natural`, that the series of the friction forces of sticking coordinates
     allow.
@@ -135,7 +165,9 @@ def friction_step_size(motion, count, natural):
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.SLIDES] == 0 and not leans(motion, k):
             r = motion.margin_series[count + 2 * k : count + 2 * k + 2]
-            natural = min(natural, step_size(r, motion.order, max(1.0, abs(r[0, 0])), sharp))
+            size = max(margin_size(motion, k), abs(r[0, 0]))
+            if size > 0.0:
+                natural = min(natural, step_size(r, motion.order, size, sharp))
     return natural
 
 
@@ -160,7 +192,7 @@ def first_friction(motion, count, h, whole):
             if slides == 0:
                 known = skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0
                 guard = motion.margin_series[count + 2 * k + b]
-                if known == 0 and guard[0] < -ZERO:
+                if known == 0 and guard[0] < -ZERO * margin_size(motion, k):
                     return k, 0.0, b, False
             elif b == 1:
                 continue
@@ -251,7 +283,7 @@ def undecided(motion):
             continue
         elif rate == 0.0:
             bits |= 1 << k
-        elif abs(rate) > ZERO or rate * slides >= 0.0 or slides == 2:
+        elif abs(rate) > ZERO * motion.swiftest or rate * slides >= 0.0 or slides == 2:
             motion.frictions[k, FrictionColumn.SLIDES] = 1 if rate > 0.0 else -1
             motion.frictions[k, FrictionColumn.SKIP] = 0
     return bits
@@ -263,7 +295,7 @@ def rounding_of_speed(motion, k):
     instant as another one.
     """
     speed = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
-    unit = motion.period_length if motion.period_length > 0.0 else 1.0
+    unit = motion.period_length if motion.period_length > 0.0 else motion.natural_time
     return TOGETHER * (abs(speed[0]) + abs(ground_speed(motion, k)) + abs(speed[1]) * unit)
 
 
@@ -318,12 +350,10 @@ def slides_so(motion, count, candidates, held):
         if slides == 0:
             for b in range(2):
                 row = motion.margin_series[count + 2 * k + b]
-                i = leading(
-                    row,
-                    1 if reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE) else 0,
-                    order,
-                )
-                if reached == 0 and held >> k & 1 and abs(row[0]) <= ZERO:
+                size = margin_size(motion, k)
+                known = reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE * size)
+                i = leading(row, 1 if known else 0, order, ZERO, size, 0)
+                if reached == 0 and held >> k & 1 and abs(row[0]) <= ZERO * size:
                     continue  # its own event is next if this margin falls
                 if i < order and row[i] < 0.0:
                     return False
@@ -332,7 +362,8 @@ def slides_so(motion, count, candidates, held):
                     motion.frictions[k, FrictionColumn.MARGIN] = b
             continue
         sliding_series(motion, k, 1.0 * slides, order, g)
-        i = leading(g, 2 if reached > 0 and abs(g[1]) <= ALIKE else 1, order)
+        known = reached > 0 and abs(g[1]) <= ALIKE * motion.press
+        i = leading(g, 2 if known else 1, order, ZERO, motion.press, 1)
         if i == order or g[i] < 0.0:
             return False
         motion.frictions[k, FrictionColumn.SKIP] = i
@@ -347,7 +378,10 @@ def record_slides(motion, before, t):
         was = before % 4 - 1
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         before //= 4
-        if slides != was and slides != 2 and was != 2:
+        # the side that a motion leaves a surface to, on which it was, is no passage of it
+        on_side = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
+        on_side = on_side and motion.frictions[k, FrictionColumn.REACHED] != 3
+        if slides != was and slides != 2 and was != 2 and not on_side:
             kind = (
                 EventCode.SLIP
                 if was == 0

@@ -12,16 +12,19 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert, push, tell_instant
 from saltus.flow.contacts.layout import (
+    EXCESS,
     FINISHED,
+    MOST_EXCESS,
     MOST_FROZEN_IMPACTS,
     VANISHED,
     ContactColumn,
+    FrictionColumn,
     contact_position,
     jumping,
     restitution,
 )
 from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
-from saltus.flow.kernel.steps import column_step, leaps, step_size
+from saltus.flow.kernel.steps import column_step, leaps, natural_speed, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -58,6 +61,37 @@ def gap_series(motion, i, position, order, g):
 
 
 @lean_jit
+def measure_gap(motion, i):
+    """Set the gap of a contact that is kept beside the coordinate."""
+    place = motion.contacts[i, ContactColumn.COORDINATE]
+    gap = motion.coordinates[place] - contact_position(motion, i)
+    motion.open_gaps[i] = motion.signs[i] * gap
+    motion.contacts[i, ContactColumn.EXCESS] = 0
+
+
+@lean_jit
+def keep_gap(motion, i):
+    """Keep the digits of a gap that the difference of the coordinate and the position does not have
+    for the next call of the kernel."""
+    position = contact_position(motion, i)
+    difference = motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]] - position
+    excess = (motion.open_gaps[i] - motion.signs[i] * difference) / (EXCESS * abs(position))
+    if abs(excess) < MOST_EXCESS:
+        motion.contacts[i, ContactColumn.EXCESS] = int(excess)
+    else:
+        measure_gap(motion, i)
+
+
+@lean_jit
+def open_gap_series(motion, i, order, g):
+    """`gap_series` at the start of a step, with the gap that is kept beside the coordinate: it has
+    all of its digits where the position is far from 0.
+    """
+    gap_series(motion, i, 0.0, order, g)
+    g[0] = motion.open_gaps[i]
+
+
+@lean_jit
 def contact_step_size(motion, t, target, size):
     """The step that the series of the free coordinates and of the reactions allow."""
     order = motion.order
@@ -70,7 +104,9 @@ def contact_step_size(motion, t, target, size):
     for i in range(motion.contacts.shape[0]):
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             r = motion.margin_series[i : i + 1]
-            natural = min(natural, step_size(r, order, max(1.0, abs(r[0, 0])), sharp))
+            size = max(press_of(motion, i), abs(r[0, 0]))
+            if size > 0.0:
+                natural = min(natural, step_size(r, order, size, sharp))
     while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size):
         natural = 0.5 * min(natural, target - t)
     return natural
@@ -246,6 +282,9 @@ def settle_contact(motion, i, rate):
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     motion.coordinates[coordinate] = contact_position(motion, i)
     motion.velocities[coordinate] = motion.signs[i] * rate + 0.0
+    for j in range(motion.contacts.shape[0]):
+        if motion.contacts[j, ContactColumn.COORDINATE] == coordinate:
+            measure_gap(motion, j)
     motion.contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
     motion.contacts[i, ContactColumn.SKIP] = 1
     motion.contacts[i, ContactColumn.RELEASED] = 0
@@ -389,7 +428,7 @@ def near_contacts(motion, slow):
         x = motion.gaps[i]
         u = motion.rates[i]
         b = motion.pulls[i]
-        if abs(u) <= slow and x * max(abs(b), 1.0) <= slow * slow:
+        if abs(u) <= slow and x * max(abs(b), motion.pull) <= slow * slow:
             near |= 1 << i
             bounces = bounces or u > 0.0
     return near if bounces else 0
@@ -433,11 +472,52 @@ def bring_to_rest(motion, near):
 
 
 @lean_jit
-def slow_impacts(tol):
+def slow_impacts(motion):
     """The speed of an impact below which the end of an accumulation may be near, as with one
     contact (`slow_speed`).
     """
-    return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
+    return max(SLOW * math.sqrt(motion.tolerance), CHATTER_SPEED) * natural_speed(motion)
+
+
+@lean_jit
+def mobility(motion, coordinate):
+    """The acceleration of a coordinate by a force of 1 on it, which makes an acceleration of a
+    reaction."""
+    entry = motion.inverse[coordinate, coordinate]
+    return entry if entry > 0.0 else 1.0
+
+
+@lean_jit
+def press_of(motion, i):
+    """The natural size of a contact's reaction."""
+    return motion.press / mobility(motion, motion.contacts[i, ContactColumn.COORDINATE])
+
+
+@lean_jit
+def note_press(motion):
+    """Note what presses on contacts at the start of a step, for the natural scales."""
+    for i in range(motion.contacts.shape[0]):
+        coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+        press = abs(motion.acceleration_series[coordinate, 0])
+        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+            reaction = abs(motion.margin_series[i, 0])
+            press = max(press, reaction * mobility(motion, coordinate))
+        motion.press = max(motion.press, press)
+
+
+@lean_jit
+def note_rubs(motion):
+    """Note what presses on frictions and surfaces at the start of a step, and sliding speeds, for
+    the natural scales."""
+    for k in range(motion.frictions.shape[0]):
+        coordinate = motion.frictions[k, FrictionColumn.COORDINATE]
+        press = abs(motion.acceleration_series[coordinate, 0])
+        motion.swiftest = max(motion.swiftest, abs(motion.velocities[coordinate]))
+        if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+            row = motion.contacts.shape[0] + 2 * k
+            margin = max(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
+            press = max(press, margin * mobility(motion, coordinate))
+        motion.press = max(motion.press, press)
 
 
 @lean_jit

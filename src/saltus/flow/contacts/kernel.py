@@ -35,6 +35,7 @@ from saltus.flow.contacts.frictions import (
     first_friction,
     friction_step_size,
     hold_frictions,
+    on_surfaces,
     reach_ground_speed,
     record_slides,
     slide_bits,
@@ -49,14 +50,20 @@ from saltus.flow.contacts.impacts import (
     contact_step_size,
     fill_contact_matrices,
     frozen_accumulation,
-    gap_series,
     hold_coordinates,
+    keep_gap,
+    measure_gap,
     near_contacts,
+    note_press,
+    note_rubs,
+    open_gap_series,
+    press_of,
     record_contact_event,
     slow_impacts,
     smaller_set,
 )
 from saltus.flow.contacts.layout import (
+    EXCESS,
     GAP_ROUNDING,
     MOST_TRIED,
     NEAR,
@@ -64,10 +71,18 @@ from saltus.flow.contacts.layout import (
     TRIED_AGAIN,
     ContactColumn,
     FrictionColumn,
+    NoMargin,
     contact_position,
+    ground_speed,
     solver_arrays,
 )
-from saltus.flow.contacts.rubbing import free_pulls, rubbed_accumulation, turns_with, unknown_shifts
+from saltus.flow.contacts.rubbing import (
+    free_pulls,
+    frozen_limit,
+    rubbed_accumulation,
+    turns_with,
+    unknown_shifts,
+)
 from saltus.flow.contacts.tangent import (
     accumulation_shifts,
     clear_shifts,
@@ -78,12 +93,13 @@ from saltus.flow.contacts.tangent import (
     release_columns,
     start_columns,
 )
-from saltus.flow.kernel.layout import SHORTEST, ZERO, EventCode, Mode, Status
+from saltus.flow.kernel.layout import ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
 from saltus.flow.kernel.roots import (
     NEVER,
     SIMPLE,
     contact_root,
+    horner,
     margin_root,
     nudged_share,
     value_and_slope,
@@ -92,10 +108,14 @@ from saltus.flow.kernel.steps import (
     columns_at_event,
     expand,
     in_modes,
+    is_away,
     mode_arrays,
     motion_end,
     move,
+    natural_speed,
+    note_impact,
     record_step,
+    shortest_step,
     step_arrays,
 )
 from saltus.taylor import jit, lean_jit
@@ -115,10 +135,12 @@ def end_accumulation_of(motion, t):
     t if there is none.
     """
     count = motion.contacts.shape[0]
-    tol = motion.tolerance
     if not fill_contact_matrices(motion):
         return t
-    slowest = slow_impacts(tol)
+    if motion.pull == 0.0:  # the motion begins at a contact
+        motion.pull = motion.press
+    slow = slow_impacts(motion)
+    slowest = slow
     last = -1
     for i in range(count):
         if 0.0 < motion.rates[i] <= slowest and motion.gaps[i] == 0.0:
@@ -128,12 +150,12 @@ def end_accumulation_of(motion, t):
         if last >= 0:
             motion.contacts[last, ContactColumn.WAITS] -= 1
         return t
-    change = free_pulls(motion, t)
-    near = near_contacts(motion, slow_impacts(tol))
+    free_pulls(motion, t)
+    near = near_contacts(motion, slow)
     turns = turns_with(motion, last)
     if near == 0 or (turns and not slides_on(motion, near)):
         return t
-    limit = min(np.sqrt(10.0 * tol / change), motion_end(motion) - t)
+    limit = min(frozen_limit(motion, near), motion_end(motion) - t)
     together = near
     left = (
         rubbed_accumulation(motion, t, near, last, limit)
@@ -151,7 +173,6 @@ def end_accumulation_of(motion, t):
             near = together & block
             again = rest_after(motion, near, block, limit)
             left = again if again >= 0.0 else left + again
-    slow = slow_impacts(tol)
     # on ever smaller scales, as of bodies beside others that still move
     while left < 0.0 and slow >= slowest and not turns:
         slow *= 1e-3
@@ -197,6 +218,65 @@ def decide_columns(motion, t):
 
 
 @lean_jit
+def choose_holding(motion, candidates, still, held, t):
+    """Decide which of the candidates stay closed and which frictions in `still` stick; False if no
+    choice is consistent.
+    """
+    if (not candidates and not still) or choose_closed(motion, candidates, still, held, t, ZERO):
+        return True
+    note_ties(motion, candidates, t)
+    # where nothing presses, what an accumulation leaves of gaps decides nothing
+    return choose_closed(motion, candidates, still, held, t, ZERO) or choose_closed(
+        motion, candidates, still, held, t, 1e3 * TIED
+    )
+
+
+@lean_jit
+def choose_all(motion, candidates, still, held, t):
+    """`choose_holding`, together with the sides of the surfaces on which the motion is; False if no
+    choice is consistent, or the sides are not unique.
+
+    What holds decides where the motion leaves a surface to, and the forces on its sides decide what
+    holds.
+    """
+    on = on_surfaces(motion)
+    if motion.leave_by == 1 and on and begin_on_surfaces(motion, t) == 0:
+        return False
+    for _ in range(3 if on else 1):
+        if not choose_holding(motion, candidates, still, held, t):
+            return False
+        hold_coordinates(motion)
+        hold_frictions(motion)
+        moved = begin_on_surfaces(motion, t) if on else 1
+        if moved < 2:
+            return moved == 1
+    return False
+
+
+@lean_jit
+def first_press(motion, t):
+    """Begin the natural size of what presses, from the accelerations without contacts and their
+    first derivatives in the natural time of the load."""
+    first = motion.parameters.size - motion.local
+    span = motion.natural_time
+    for i in range(motion.local):
+        motion.parameters[first + i] = 1.0
+    expand(motion, t, 1.0, 2)
+    for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
+        place = 0
+        if row < motion.contacts.shape[0]:
+            place = motion.contacts[row, ContactColumn.COORDINATE]
+        else:
+            k = row - motion.contacts.shape[0]
+            place = motion.frictions[k, FrictionColumn.COORDINATE]
+        a = motion.acceleration_series[place]
+        size = max(abs(a[0]), abs(a[1]) * span, 2.0 * abs(a[2]) * span * span)
+        motion.press = max(motion.press, size)
+    hold_coordinates(motion)
+    hold_frictions(motion)
+
+
+@lean_jit
 def decide_contacts(motion):
     """Decide which contacts are closed and which frictions stick from here on.
 
@@ -206,22 +286,16 @@ def decide_contacts(motion):
     count = motion.contacts.shape[0]
     rested = motion.rested == 1
     event_shifts(motion)
+    if motion.press == 0.0:
+        first_press(motion, t)
     settled = end_accumulation_of(motion, t)
     candidates = closed_bits(motion)
     before = slides_before(motion)
     fill_contact_matrices(motion)
-    if motion.leave_by == 1 and not begin_on_surfaces(motion, t):
-        return Status.NOT_UNIQUE
     still = undecided(motion)
     held = sticking(motion, before)
-    if (candidates or still) and not choose_closed(motion, candidates, still, held, t, ZERO):
-        note_ties(motion, candidates, t)
-        if not (
-            choose_closed(motion, candidates, still, held, t, ZERO)
-            or choose_closed(motion, candidates, still, held, t, 1e3 * TIED)
-        ):
-            # where nothing presses, what an accumulation leaves of gaps decides nothing
-            return Status.NOT_UNIQUE
+    if not choose_all(motion, candidates, still, held, t):
+        return Status.NOT_UNIQUE
     hold_coordinates(motion)
     hold_frictions(motion)
     opened = candidates & ~closed_bits(motion)
@@ -254,8 +328,10 @@ def decide_contacts(motion):
 
 
 # Series of a lower order than usual, for a step to the next impact on the same contact.
-FAST_IMPACT = 0.3  # After a faster impact the usual order is needed to reach the next one.
-# A series of order n is assumed to be exact up to this times the n-th root of the tolerance.
+# In natural speeds: after a faster impact the usual order is needed to reach the next one.
+FAST_IMPACT = 0.3
+# A series of order n is assumed to be exact up to this, in natural times, times the n-th root of the
+# tolerance.
 RADIUS = 0.5
 LEAST_ORDER = 6  # At lower orders the last coefficients may all vanish by symmetry.
 WORTH = 0.8  # A lower order is tried only below this share of the usual one.
@@ -275,12 +351,12 @@ def first_guard(motion, h, whole):
         guard = motion.gap_series
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             guard = motion.margin_series[i]
-            if skip == 0 and guard[0] < -ZERO:
+            if skip == 0 and guard[0] < -ZERO * press_of(motion, i):
                 return i, 0.0, False
             if skip >= order:
                 continue
         else:
-            gap_series(motion, i, contact_position(motion, i), order, guard)
+            open_gap_series(motion, i, order, guard)
         kind, u, touch = contact_root(guard, skip, order, h, motion.polynomial)
         if motion.nudged == 1 + i:
             u = nudged_share(motion, u, h)
@@ -303,7 +379,7 @@ def contacts_closing_with(motion, hit, tau):
     for i in range(count):
         if i == hit or motion.contacts[i, ContactColumn.CLOSED] == 1:
             continue
-        gap_series(motion, i, contact_position(motion, i), order, g)
+        open_gap_series(motion, i, order, g)
         size = (
             abs(g[0])
             + abs(g[1]) * tau
@@ -326,12 +402,14 @@ def short_order(motion, t):
     """
     order = motion.order
     flight = np.inf
+    fast = FAST_IMPACT * natural_speed(motion)
+    radius = RADIUS * motion.natural_time
     for i in range(motion.contacts.shape[0]):
         rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
         if (
             motion.contacts[i, ContactColumn.CLOSED] == 0
             and motion.contacts[i, ContactColumn.SKIP] == 1
-            and 0.0 < rate < FAST_IMPACT
+            and 0.0 < rate < fast
         ):
             if flight == np.inf:
                 expand(motion, t, 1.0, 0)
@@ -341,9 +419,9 @@ def short_order(motion, t):
             )
             if pull < 0.0:
                 flight = min(flight, -2.0 * rate / pull)
-    if not flight < RADIUS:
+    if not flight < radius:
         return order
-    lower = max(LEAST_ORDER, math.ceil(math.log(motion.tolerance) / math.log(flight / RADIUS)))
+    lower = max(LEAST_ORDER, math.ceil(math.log(motion.tolerance) / math.log(flight / radius)))
     return lower if lower < WORTH * order else order
 
 
@@ -361,6 +439,8 @@ def seek_event(motion, t, target):
     size = (
         expand(motion, t, 1.0, order) if motion.eigenmodes.size == 0 else in_modes(motion, t, order)
     )
+    note_press(motion)
+    note_rubs(motion)
     natural = contact_step_size(motion, t, target, size)
     natural = friction_step_size(motion, count, natural)
     h = min(natural, target - t)
@@ -392,6 +472,63 @@ def seek_event(motion, t, target):
 
 
 @lean_jit
+def keep_gaps(motion, tau):
+    """Take the gaps of open contacts that are not at 0 to `tau` within the step."""
+    g = motion.gap_series
+    for i in range(motion.contacts.shape[0]):
+        if contact_position(motion, i) != 0.0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
+            open_gap_series(motion, i, motion.order, g)
+            motion.open_gaps[i] = horner(g, motion.order, tau)
+
+
+@lean_jit
+def measure_gaps(motion):
+    """Set the gaps of contacts that are closed, or at 0, and keep those of the others."""
+    for i in range(motion.contacts.shape[0]):
+        if contact_position(motion, i) == 0.0 or motion.contacts[i, ContactColumn.CLOSED] == 1:
+            measure_gap(motion, i)
+        else:
+            keep_gap(motion, i)
+
+
+@lean_jit
+def note_hit(motion, bits, tau):
+    """Note the speeds and the accelerations of the contacts in `bits`, which close at `tau`, for the
+    natural scales."""
+    for i in range(motion.contacts.shape[0]):
+        if bits >> i & 1:
+            place = motion.contacts[i, ContactColumn.COORDINATE]
+            speed, pull = value_and_slope(motion.velocity_series[place], motion.order, tau)
+            note_impact(motion, speed, pull)
+
+
+@lean_jit
+def passes(motion, bits, rubs, tau):
+    """Whether, at the end of a step of the length `tau`, the motion is beyond an open contact, or
+    away from those in `bits` that close, or from the surface `rubs` that it reaches, by more than
+    rounding.
+    """
+    for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
+        i = row
+        k = row - motion.contacts.shape[0]
+        place = 0
+        position = 0.0
+        gap = 0.0
+        if k < 0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
+            place = motion.contacts[i, ContactColumn.COORDINATE]
+            position = contact_position(motion, i)
+            gap = motion.signs[i] * (motion.coordinates[place] - position)
+            gap = -abs(gap) if bits >> i & 1 else gap
+        if k >= 0 and k == rubs and motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+            place = motion.frictions[k, FrictionColumn.COORDINATE]
+            position = ground_speed(motion, k)
+            gap = -abs(motion.coordinates[place] - position)
+        if gap < 0.0 and is_away(motion, gap, place, position, tau):
+            return True
+    return False
+
+
+@lean_jit
 def contact_arc(motion, target):
     """One smooth step, up to the first zero of a guard or of a margin.
 
@@ -411,7 +548,11 @@ def contact_arc(motion, target):
     bits = 0
     if hit >= 0 and motion.contacts[hit, ContactColumn.CLOSED] == 0:
         bits = contacts_closing_with(motion, hit, tau)
+    note_hit(motion, bits, tau)
+    keep_gaps(motion, tau)
     finite = move(motion, tau)
+    measure_gaps(motion)
+    passed = passes(motion, bits, rubs if which == 2 else -1, tau)
     for i in range(motion.dof):
         for k in range(motion.order + 2, order + 2):
             motion.coordinate_series[i, k] = 0.0
@@ -419,6 +560,8 @@ def contact_arc(motion, target):
     record_step(motion, motion.side, t, tau)
     if not finite or not h >= 0.0:
         return Status.NOT_FINITE
+    if passed:
+        return Status.PASSED
     motion.time = target if not found and limit < 0 and h == target - t else t + tau
     for i in range(count):
         motion.contacts[i, ContactColumn.SKIP] = 0
@@ -448,8 +591,7 @@ def contact_arc(motion, target):
             columns_at_event(motion, EventCode.LIMIT, limit - held, motion.time, 1.0)
             note_shifts(motion, motion.shifts)
         return Status.LIMITED
-    unit = min(motion.period_length, 1.0) if motion.period_length > 0.0 else 1.0
-    ended = found or natural > 0.1 * SHORTEST * unit or h == target - t
+    ended = found or natural > 0.1 * shortest_step(motion) or h == target - t
     return Status.PAUSED if ended else Status.STALLED
 
 
@@ -457,6 +599,12 @@ def contact_arc(motion, target):
 def begin(motion):
     """Fill the memory that depends on the contacts and on the state."""
     fill_contact_matrices(motion)
+    for i in range(motion.contacts.shape[0]):
+        excess = motion.contacts[i, ContactColumn.EXCESS]
+        measure_gap(motion, i)
+        if excess != 0:
+            motion.open_gaps[i] += excess * EXCESS * abs(contact_position(motion, i))
+            motion.contacts[i, ContactColumn.EXCESS] = excess
     hold_coordinates(motion)
     hold_frictions(motion)
 

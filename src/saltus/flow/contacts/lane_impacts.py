@@ -13,6 +13,7 @@ closed contacts. Lanes in which neither is a solution are solved one at a time (
 from __future__ import annotations
 
 from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.lanes.lane_steps import natural_speeds
 from saltus.flow.lanes.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
@@ -45,7 +46,7 @@ def read_contacts(lane, contacts):
         contacts[i, ContactColumn.COORDINATE] = coordinate
         contacts[i, ContactColumn.CLOSED] = 1 if there and not free else 0
         contacts[i, ContactColumn.SKIP] = 1 if there and free else 0
-        contacts[i, ContactColumn.RELEASED] = 0
+        contacts[i, ContactColumn.RELEASED] = contacts[i, ContactColumn.EXCESS] = 0
 
 
 @inline_jit
@@ -164,6 +165,7 @@ def impulses_hold(lanes, closing):
     """
     local = lanes.sizes.local
     jump = lanes.jump
+    slowest = lanes.settings.slowest_impact * natural_speeds(lanes)
     good = closing.hit
     freed = splat(1.0 * lanes.sizes.own)
     for i in range(lanes.sizes.contacts):
@@ -179,7 +181,7 @@ def impulses_hold(lanes, closing):
         lanes.rates[i] = rate
         solved = (acts & bits(sign * impulse >= 0.0)) | (concerned & ~acts & bits(rate >= aimed))
         stays = bits(rate * rate <= 0.0)
-        good &= (solved & (stays | bits(rate > lanes.settings.slowest_impact))) | ~concerned
+        good &= (solved & (stays | bits(rate > slowest))) | ~concerned
         freed = select(mask(concerned & stays), freed - 1.0, freed)
     return good & bits(freed > 0.5)
 

@@ -21,6 +21,8 @@ from saltus.flow.lanes.lane_steps import (
     commit,
     find_contact,
     natural_step,
+    note_impacts,
+    rate_of_change,
     row_step,
     series_true,
     state_size,
@@ -78,7 +80,7 @@ def begin_contact(lane, env, state):
         contacts[i, ContactColumn.CLOSED] = 1 if gap == 0.0 and rate == 0.0 else 0
         contacts[i, ContactColumn.SKIP] = 1 if gap == 0.0 else 0
         contacts[i, ContactColumn.RELEASED] = 0
-        contacts[i, ContactColumn.WAITS] = 0
+        contacts[i, ContactColumn.WAITS] = contacts[i, ContactColumn.EXCESS] = 0
         if not (gap > 0.0 or (gap == 0.0 and rate >= 0.0)):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
@@ -365,6 +367,8 @@ def step_all(lanes):
     hit &= sound & alive
     resolved = 0
     moved = alive & sound & ~hit
+    if hit:
+        note_closings(lanes, hit, step, single)
     if hit and lanes.sizes.columns == 0:  # impacts with a tangent are left to the scalar kernel
         resolved = resolve_all(lanes, hit, step.contact)
     moved |= resolved
@@ -378,6 +382,17 @@ def step_all(lanes):
         record_step(lanes, step, single, past, moved)
     commit(lanes, moved, resolved, lanes.new_speed)
     return alive & ~moved, 0, past
+
+
+@inline_jit
+def note_closings(lanes, hit, step, single):
+    """Note the impacts of a step for the natural scales of the lanes."""
+    for i in range(lanes.sizes.contacts):
+        this = hit & bits(absolute(step.contact - 1.0 * i) < 0.5)
+        if this:
+            row = lanes.sizes.coordinates[i]
+            pull = rate_of_change(lanes, lanes.velocities[0 if single else row], step.taken)
+            note_impacts(lanes, this, lanes.new_velocity[row], pull)
 
 
 @inline_jit

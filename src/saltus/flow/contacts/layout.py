@@ -21,6 +21,9 @@ class ContactColumn(IntEnum):
     SKIP = 2
     RELEASED = 3  # 1 if its reaction has just fallen to 0, and is known to be 0
     WAITS = 4  # after how many more of its impacts the end of an accumulation is looked for again
+    # of an open contact, between two calls of the kernel: what its gap has more than the difference
+    # of its coordinate and its position, in units of EXCESS times the position
+    EXCESS = 5
 
 
 class FrictionColumn(IntEnum):
@@ -125,6 +128,8 @@ GAP_ROUNDING = 2.0**-6  # The rounding of a gap, in units of NEAR times the cont
 # Events of frictions are at one instant if no more than this share of the period lies between them:
 # some 1e3 units in the last place.
 TOGETHER = 2.0**-42
+EXCESS = 2.0**-92
+MOST_EXCESS = 2.0**50  # beyond it the coordinate was moved, and the difference is the gap
 # For models with more contacts sets of them are found by exchanges, as there are too many to try
 # them all.
 MOST_TRIED = 8
@@ -152,7 +157,8 @@ FINISHED = 1e-14
 # would keep the other one going.
 # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
 TRIED_AGAIN = 32
-# Reactions smaller than this vanish together: the rounding of the loads that hold the contacts.
+# Reactions smaller than this vanish together, in units of the largest one so far: the rounding of
+# the loads that hold the contacts.
 TIED = 1e-12
 
 
@@ -187,6 +193,7 @@ def solver_arrays(local, count, columns, frictions, first_order):
         rows_of_zeros(count, count),
         rows_of_zeros(max(local, rows), most),
         rows_of_zeros(count, count),
+        zeros(count),
         zeros(count),
         zeros(count),
         zeros(count),

@@ -283,10 +283,9 @@ def rest_columns(motion, near):
 
 @lean_jit
 def free_pulls(motion, t):
-    """Fill the second derivatives of the gaps with all contacts open; returns 1 plus their largest
-    relative rate of change.
+    """Fill the second derivatives of the gaps with all contacts open, and in `falling_pulls` their
+    relative rates of change.
     """
-    change = 0.0
     first = motion.parameters.size - motion.local
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
@@ -294,9 +293,22 @@ def free_pulls(motion, t):
     for i in range(motion.contacts.shape[0]):
         a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
         motion.pulls[i] = motion.signs[i] * a[0]
+        motion.falling_pulls[i] = 0.0
         if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
-            change = max(change, abs(a[1] / a[0]) if a[0] != 0.0 else np.inf)
-    return 1.0 + change
+            motion.falling_pulls[i] = abs(a[1] / a[0]) if a[0] != 0.0 else np.inf
+
+
+@lean_jit
+def frozen_limit(motion, near):
+    """The time for which the accelerations of the contacts in `near` may be taken as constant, from
+    what `free_pulls` has filled.
+    """
+    span = motion.natural_time
+    change = 1.0 / span
+    for i in range(motion.contacts.shape[0]):
+        if near >> i & 1:
+            change = max(change, 1.0 / span + motion.falling_pulls[i])
+    return np.sqrt(10.0 * motion.tolerance) / change if change > 0.0 else np.inf
 
 
 @lean_jit

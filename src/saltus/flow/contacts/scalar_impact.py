@@ -22,10 +22,16 @@ from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
 from saltus.flow.kernel.memory import LaneImpactParts, MotionMemory
 from saltus.flow.kernel.steps import state_arrays
 from saltus.flow.lanes.function_types import CONTACTS_IMPACT
-from saltus.flow.lanes.handoff import own_env
-from saltus.taylor import by_reference, cached_jit
+from saltus.flow.lanes.handoff import natural_time_of, own_env
+from saltus.taylor import by_reference, cached_jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
+
+
+@lean_jit
+def lane_speed(lane):
+    """The natural speed of a lane (`steps.natural_speed`)."""
+    return lane.pull * natural_time_of(lane) if lane.pull > 0.0 else lane.fastest
 
 
 @cached_jit(CONTACTS_IMPACT)
@@ -43,6 +49,7 @@ def contacts_impact(lane, hit):
     numbers = array[0]
     rates = solver.rates
     speed = np.inf
+    slowest = lane.settings.slowest_impact * lane_speed(lane)
     numbers.dof, numbers.own, numbers.local, numbers.piece = own, own, lane.sizes.local, lane.piece
     numbers.first_order = lane.sizes.first_order
     numbers.time, numbers.origin = lane.new_time, lane.origin
@@ -69,7 +76,7 @@ def contacts_impact(lane, hit):
             settle_contact(motion, i, rates[i])
             if rates[i] == 0.0:
                 free -= 1
-            elif rates[i] <= lane.settings.slowest_impact:
+            elif rates[i] <= slowest:
                 return 0
     if free == 0:
         return 0

@@ -30,6 +30,7 @@ from saltus.flow.contacts.impacts import (
     hold_coordinates,
     impact_impulses,
     jump_first_order,
+    note_press,
 )
 from saltus.flow.contacts.layout import (
     ContactColumn,
@@ -98,6 +99,7 @@ def follow_segment(motion, begin, end, seen):
     forwards = end >= begin
     for count in range(MOST_STEPS):
         size = expand(motion, t, 1.0, order)
+        note_press(motion)
         natural = contact_step_size(motion, t, t + abs(end - t), size)
         if not natural > 0.0:
             return 0

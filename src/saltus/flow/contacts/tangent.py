@@ -26,7 +26,7 @@ from saltus.flow.contacts.complementarity import (
     push,
     tell_instant,
 )
-from saltus.flow.contacts.impacts import frozen_accumulation, jump_place
+from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, press_of
 from saltus.flow.contacts.layout import (
     APART,
     RELATIVE_STEP,
@@ -153,7 +153,7 @@ def release_columns(motion, t, released):
         if (
             i != released
             and motion.contacts[i, ContactColumn.CLOSED] == 1
-            and abs(motion.margin_series[i, 0]) <= TIED
+            and abs(motion.margin_series[i, 0]) <= TIED * press_of(motion, i)
         ):
             release_shifts(motion, t, i)
             for j in range(motion.columns):

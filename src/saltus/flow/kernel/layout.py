@@ -77,6 +77,7 @@ class Status(IntEnum):
     SETTLED = 10
     OUTSIDE = 11
     UNRESOLVED = 12
+    PASSED = 13  # a contact or a surface was passed by more than rounding, without an event
 
 
 class GrazingDetail(IntEnum):
@@ -137,8 +138,8 @@ SAFETY = 0.9
 GAP = 0.65
 # The error of a step is relative to the size of the state, but absolute below this size.
 SMALLEST = 1e-6
-# A shorter step, in units of time or of a shorter forcing period, means that the acceleration is
-# singular.
+# A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that the
+# acceleration is singular.
 SHORTEST = 1e-9
 # The tolerance of a column's series in units of tol; so the motion alone decides nearly all steps.
 ROUGHER = 100.0
@@ -148,7 +149,8 @@ DEFECT = 100.0
 BATCH = 100_000  # passes of the loop before the kernel returns to Python, which can then see Ctrl-C
 
 # Rest and release.
-# A smaller acceleration at the contact counts as zero, as it is a difference of loads of order 1.
+# A smaller acceleration at the contact counts as zero, as it is a difference of loads: in units of
+# the largest one so far.
 ZERO = 1e-14
 # The tolerance at rest: a small error could turn a touch into a release, and steps cost little
 # there.
@@ -156,11 +158,16 @@ EXACT = 1e-15
 TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a number
 
 # Accumulations of impacts.
-SLOW = 3.0  # in sqrt(tol): after faster impacts the end of an accumulation is not looked for
+# In sqrt(tol) and natural speeds (`natural_speed`): after faster impacts the end of an accumulation
+# is not looked for.
+SLOW = 3.0
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
-# Here the averaged law has an error of 5e-5 of the speed, and a unit of time would have 1e5
-# impacts.
-CHATTER_SPEED = 1e-5
+# In natural speeds. Here the averaged law has an error of 5e-5 of the speed, and a unit of time would
+# have 1e5 impacts.
+CHATTER_SPEED = 4e-5
+# A gap below minus this share of the terms of its sum is no rounding, and no error of a step of the
+# tolerance 0; the tolerance comes ten times on top.
+PENETRATED = 2.0**-40
 # the largest change of the contact accelerations over two impacts for which the averaged law is
 # used
 SLOWLY = 0.02

@@ -38,6 +38,7 @@ MOTION = np.dtype(
         ("last_period", _WHOLE),  # in which the motion ends
         ("end", _REAL),  # of the motion, as a time within its last forcing period
         ("period_length", _REAL),
+        ("natural_time", _REAL),  # of the load, P / 2 pi, or of a system without a period
         ("tolerance", _REAL),
         # What the kernel itself begins with 0.
         ("origin", _REAL),  # the time at which the forcing period began
@@ -47,6 +48,12 @@ MOTION = np.dtype(
         ("new_piece", _WHOLE),  # whether it has just begun, so that the load may have jumped
         ("rested", _WHOLE),  # whether the motion was at rest or in chatter before
         ("chatter_speed", _REAL),  # of the gap, while impacts without loss are averaged
+        # natural scales, the largest so far: of the acceleration at an impact, of the speed of an
+        # impact, of what presses on contacts and frictions (an acceleration), of sliding speeds
+        ("pull", _REAL),
+        ("fastest", _REAL),
+        ("press", _REAL),
+        ("swiftest", _REAL),
         ("recorded_steps", _WHOLE),  # in the buffer
         ("recorded_events", _WHOLE),  # in the buffer
         (
@@ -277,6 +284,8 @@ class SolverArrays(NamedTuple):
     tried: Any
     rates: Any  # of the gaps before an impact
     gaps: Any
+    # of open contacts, kept beside the coordinates, as differences of large numbers have few digits
+    open_gaps: Any
     pulls: Any  # the second derivatives of the gaps with no contact closed
     falling_gaps: Any  # while an accumulation is followed
     falling_rates: Any

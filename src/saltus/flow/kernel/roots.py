@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.kernel.layout import ZERO
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -261,13 +260,26 @@ def margin_root(m, order, h, poly):
 
 
 @lean_jit
-def leading(coefficients, start, order, zero=ZERO):
-    """The index from `start` on of the first coefficient that is larger than `zero`; `order` if
+def leading(coefficients, start, order, zero, size, base):
+    """The index from `start` on of the first coefficient that is more than rounding; `order` if
     there is none.
+
+    The coefficients up to `base` exclusively are exactly 0 or not; `size` is the natural size of
+    that at `base`, of which the share `zero` is rounding. With the rate w at which the later ones
+    grow from `size` on, the rounding of coefficient k is that times w^(k - base).
     """
+    rate = 0.0
+    if size > 0.0:
+        for k in range(max(start, base) + 1, order):
+            if coefficients[k] != 0.0:
+                rate = max(rate, (abs(coefficients[k]) / size) ** (1.0 / (k - base)))
+    rounding = zero * size
+    rounding *= rate ** max(start - base, 0)
     for k in range(start, order):
-        if abs(coefficients[k]) > zero:
+        if abs(coefficients[k]) > (rounding if k >= base else 0.0):
             return k
+        if k >= base:
+            rounding *= rate
     return order
 
 

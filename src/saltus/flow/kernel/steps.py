@@ -10,7 +10,16 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
-from saltus.flow.kernel.layout import DEFECT, GAP, ROUGHER, SAFETY, SMALLEST, EventCode
+from saltus.flow.kernel.layout import (
+    DEFECT,
+    GAP,
+    PENETRATED,
+    ROUGHER,
+    SAFETY,
+    SHORTEST,
+    SMALLEST,
+    EventCode,
+)
 from saltus.flow.kernel.memory import ModeArrays, StateArrays, StepArrays
 from saltus.flow.kernel.roots import NOISE, both_sums, horner
 from saltus.taylor import jit, lean_jit
@@ -287,6 +296,42 @@ def next_target(motion, t_end):
     if motion.piece < breaks.size:
         return min(t_end, breaks[motion.piece] - motion.origin)
     return t_end
+
+
+@lean_jit
+def natural_speed(motion):
+    """The speed of the largest pull at an impact so far in the natural time; where nothing pulls,
+    that of the fastest impact.
+    """
+    return motion.pull * motion.natural_time if motion.pull > 0.0 else motion.fastest
+
+
+@lean_jit
+def shortest_step(motion):
+    """The step below which the acceleration counts as singular."""
+    whole = motion.period_length if motion.period_length > 0.0 else motion_end(motion)
+    return SHORTEST * min(whole, 1.0)
+
+
+@lean_jit
+def note_impact(motion, speed, pull):
+    """Note the speed and the acceleration at an impact for the natural scales."""
+    motion.fastest = max(motion.fastest, abs(speed))
+    motion.pull = max(motion.pull, abs(pull))
+
+
+@lean_jit
+def is_away(motion, gap, place, position, tau):
+    """Whether the distance of a coordinate from a position, at the end of a step, is more than the
+    rounding of the terms of their sums.
+    """
+    terms = 0.0
+    series = motion.coordinate_series[place]
+    for k in range(motion.order, -1, -1):
+        terms = terms * tau + abs(series[k])
+    # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed
+    terms += abs(position) + max(motion.press, motion.pull) * tau * tau
+    return abs(gap) > (PENETRATED + 10.0 * motion.tolerance) * terms
 
 
 @lean_jit

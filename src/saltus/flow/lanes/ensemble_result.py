@@ -30,6 +30,7 @@ STOPS = {
     Status.STALLED: Stop.STALLED,
     Status.OUTSIDE: Stop.OUTSIDE,
     Status.UNRESOLVED: Stop.UNRESOLVED,
+    Status.PASSED: Stop.PASSED,
 }  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
 NUMBERS = {stop: number for number, stop in enumerate(Stop)}  # in a dataset
 

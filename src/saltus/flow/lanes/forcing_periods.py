@@ -86,6 +86,7 @@ def begin_time(lane, job):
     lane.period = float(job.first_period)
     lane.periods_done = 0.0
     lane.step_share = 1.0
+    lane.pull = lane.fastest = 0.0
     lane.next_check = impacts_between_checks(lane)
     lane.recorded_from = first_recorded(lane)
 

@@ -9,6 +9,8 @@ of them.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from saltus.flow.kernel.layout import Mode, Status
@@ -143,12 +145,21 @@ def scalar_state(lane):
     )
     motion.first_order, motion.local = sizes.first_order, sizes.local
     motion.time, motion.chatter_speed = lane.now, lane.chatter_speed
+    motion.pull, motion.fastest = lane.pull, lane.fastest
     for row in range(2 * sizes.rows):  # in both memories velocities follow the positions
         state[row] = lane.position[row]
     motion.period_length, motion.tolerance = length, lane.settings.tolerance
+    motion.natural_time = natural_time_of(lane)
     motion.end = lane.end_time if period == last else lane.period_start + length
     motion.horizon = (last - period) * length + lane.end_time
     return numbers, state
+
+
+@lean_jit
+def natural_time_of(lane):
+    """The natural time of a lane's load, or of its system."""
+    length = lane.period_length
+    return length / (2.0 * math.pi) if length > 0.0 else lane.settings.natural_time
 
 
 @jit
@@ -203,6 +214,7 @@ def put_state(lane, motion, state):
         motion.piece,
     )
     lane.now, lane.side = motion.time, float(motion.side)
+    lane.pull, lane.fastest = motion.pull, motion.fastest
     for row in range(2 * rows):
         lane.position[row] = state[row]
     for j in range(motion.columns):  # the shifts of the last event, for `finish`

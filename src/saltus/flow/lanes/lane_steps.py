@@ -63,6 +63,35 @@ NEARLY = 1e-5
 
 
 @inline_jit
+def rate_of_change(lanes, series, tau):
+    """The derivative of a series at `tau`: of that of a velocity, the acceleration."""
+    order = lanes.sizes.order
+    value = (1.0 * order) * series[order]
+    for k in range(order - 1, 0, -1):
+        value = fma(value, tau, (1.0 * k) * series[k])
+    return value
+
+
+@inline_jit
+def note_impacts(lanes, hit, speed, pull):
+    """Note the speeds and the accelerations at impacts in the lanes `hit` for the natural scales
+    (`steps.note_impact`).
+    """
+    chosen = mask(hit)
+    lanes.fastest = select(chosen, maximum(lanes.fastest, absolute(speed)), lanes.fastest)
+    lanes.pull = select(chosen, maximum(lanes.pull, absolute(pull)), lanes.pull)
+
+
+@inline_jit
+def natural_speeds(lanes):
+    """The natural speed of each lane (`steps.natural_speed`)."""
+    length = lanes.period_length
+    own = splat(lanes.settings.natural_time)
+    time = select(mask(bits(length > 0.0)), length * (0.5 / math.pi), own)
+    return select(mask(bits(lanes.pull > 0.0)), lanes.pull * time, lanes.fastest)
+
+
+@inline_jit
 def state_size(lanes):
     """The largest coordinate or velocity, without the velocities of coordinates of first order."""
     size = splat(SMALLEST)

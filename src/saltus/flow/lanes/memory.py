@@ -70,6 +70,9 @@ class Slots(NamedTuple):
     free_velocity: int = 33
     step_share: int = 34  # the share of the step allowed by the series that the next step takes
     recorded_from: int = 35  # number of the first forcing period in which extrema are recorded
+    # natural scales, the largest so far: of the acceleration at an impact, and of its speed
+    pull: int = 36
+    fastest: int = 37
 
 
 class Parts(NamedTuple):
@@ -192,8 +195,10 @@ class LaneSettings(NamedTuple):
     """Tolerances of a call, and what follows from them."""
 
     tolerance: float
+    natural_time: float  # of trajectories without a forcing period
     shortest_step: float
-    # after an impact with a lower speed of the gap, the end of an accumulation may be near
+    # after an impact with a lower speed of the gap, in natural speeds, the end of an accumulation may
+    # be near
     slowest_impact: float
     limits: tuple[Any, ...]  # `step_limits` of the coordinates
     column_limits: tuple[Any, ...]  # of the tangent's columns

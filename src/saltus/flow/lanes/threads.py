@@ -171,6 +171,7 @@ class Lanes:
     # whether from the start of a motion, not only in the forcing periods that are kept
     from_start: bool
     settle: bool  # whether a trajectory ends when it repeats itself
+    natural_time: float  # of trajectories without a forcing period
 
     def run(
         self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0
@@ -370,7 +371,7 @@ class Lanes:
         order = lane_order(self.tol)
         slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
         limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
-        return LaneSettings(self.tol, SHORTEST, slowest, *limits)
+        return LaneSettings(self.tol, self.natural_time, SHORTEST, slowest, *limits)
 
     def _code(self) -> Code:
         """The functions of the structure."""

@@ -371,6 +371,7 @@ class Stop(StrEnum):
     STALLED = "stalled", "the acceleration is singular"
     SINGULAR = "singular", "the mass matrix has no inverse"
     OUTSIDE = "outside", "the state at the start lies beyond the contact"
+    PASSED = "passed", "an event was lost in the rounding of positions that are far from 0"
     UNRESOLVED = (
         "unresolved",
         "impacts accumulate too slowly to be followed: more than a million in a unit of time",

@@ -29,6 +29,7 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
+from saltus.systems import natural_units
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -39,6 +40,15 @@ if TYPE_CHECKING:
 # of the time its events are moved, as by rounding. None moves none.
 NUDGE: tuple[int, float] | None = None
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
+
+
+def natural_time(system: System, length: float) -> float:
+    """The natural time of a motion under a load with a period, 0 for none."""
+    if length > 0.0:
+        return length / (2.0 * math.pi)
+    # what has no contact has no use for it
+    bounces = system.model.has_one_contact or system.model.holds_coordinates
+    return natural_units(system).time if bounces else 1.0
 
 
 class KernelState:
@@ -65,7 +75,8 @@ class KernelState:
             request.dense or request.sample_times is not None or _is_nonlinear(request.system)
         )
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
-        AT_START.pack_into(self._memory, 0, *where, at.last, at.end, at.length, request.tol)
+        span = at.length, natural_time(request.system, at.length)
+        AT_START.pack_into(self._memory, 0, *where, at.last, at.end, *span, request.tol)
         if NUDGE is not None:
             self.array["nudged"], self.array["nudge"] = NUDGE
 
@@ -158,8 +169,8 @@ def remember(request: MotionRequest, run: Program) -> None:
     steps = buffers.steps
     geometry = model.geometry.tolist()
     most = 2.0 * math.pi if request.plan.angles else np.inf  # beyond it `simulate` warns
-    same = {"tol": request.tol, "start": request.time} | dict.fromkeys(
-        ("limit", "dense", "kept", "sampled_validity")
+    same = {"tol": request.tol, "start": request.time, "ties": 0} | dict.fromkeys(
+        ("limit", "dense", "kept", "sampled_validity", "first_tie")
     )
 
     def motion(system: System, coordinates: Mapping[str, Any], velocity: Any) -> Motion | None:

@@ -36,7 +36,7 @@ from saltus.flow.motion.kernel_state import (
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
 from saltus.progress import Progress, silent
-from saltus.systems import System, check_system, read_start
+from saltus.systems import System, check_system, natural_units, read_start
 from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
@@ -408,7 +408,6 @@ def _advance(
     end = at.last * at.length + at.end
     checked_at = begin
     counted = 0
-    unit = min(at.length or 1.0, 1.0) * many / MOST.rate
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
@@ -422,7 +421,7 @@ def _advance(
                 _refuse(system, status, now)
             return status, numbers
         if recorder.total > counted + many:
-            if time < checked_at + unit:
+            if time < checked_at + natural_units(system).time * many / MOST.rate:
                 _refuse_crushed(system, now, recorder.last_hit() if system.model.contacts else [])
                 raise MotionError(
                     f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
@@ -486,7 +485,7 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     position = now.state[:own]
     velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
-    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT):
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT, Status.PASSED):
         gaps = [
             each.gap(position[system.model.coordinates.index(each.coordinate)])
             for each in system.model.contacts
@@ -528,6 +527,11 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
             f"the motion leaves the range of numbers {at}; its velocity was last "
             f"{velocity}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
             "there, such as abs(x)**1.5 at x = 0; a Hertz contact is written as (x**2 + 1e-12)**0.75 behind a Surface"
+        )
+    if status == Status.PASSED:
+        return (
+            f"the motion passed a contact or a surface {at} without an event, which was lost in the rounding of positions "
+            "that are far from 0 beside the motion: give positions from an origin nearer to it"
         )
     if status == Status.STALLED and not system.model.singularity:
         return f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large"

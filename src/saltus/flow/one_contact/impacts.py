@@ -16,6 +16,7 @@ from saltus.flow.kernel.layout import (
     SLOW,
     SLOWLY,
     TINY,
+    ZERO,
     EventCode,
     Geometry,
     GrazingDetail,
@@ -29,6 +30,7 @@ from saltus.flow.kernel.steps import (
     columns_at_event,
     forget,
     motion_end,
+    natural_speed,
     record_event,
     record_shift,
     record_step,
@@ -76,6 +78,17 @@ def contact_accelerations(motion, t):
 
 
 @lean_jit
+def note_press(motion):
+    """Note the contact accelerations, and those that follow from their derivatives in the natural
+    time of the load, for the natural scales."""
+    span = motion.natural_time
+    b = motion.pull_series
+    for i in range(motion.sides):
+        size = max(abs(b[i, 0]), abs(b[i, 1]) * span, 2.0 * abs(b[i, 2]) * span * span)
+        motion.press = max(motion.press, size, motion.pull)
+
+
+@lean_jit
 def leave_or_stay(motion):
     """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if
     that is not unique.
@@ -90,9 +103,10 @@ def leave_or_stay(motion):
     released = motion.skip
     outward = 0
     contact_accelerations(motion, motion.time)
+    note_press(motion)
     for i in range(motion.sides):
         side = 1 - 2 * i
-        skip = leading(b[i], 1 if released == side else 0, order)
+        skip = leading(b[i], 1 if released == side else 0, order, ZERO, motion.press, 0)
         if skip < order and b[i, skip] > 0.0 and (outward == 0 or motion.leave_by != motion.side):
             outward += 1
             motion.side = side
@@ -119,7 +133,8 @@ def accumulation(motion, speed, t, tol):
     REST: impacts accumulate soon. From the gap's speed v on side s the time left is 2 v (1/abs(a_s)
     + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next
     side and e1, e2 the factors of the next two impacts; its error is of the order of the square of
-    the time left times the relative rate of change of the accelerations. CHATTER: impacts lose
+    the time left times the relative rate of change of the accelerations, here in units of the time
+    of this change. CHATTER: impacts lose
     nothing, are slower than CHATTER_SPEED, and the accelerations change slowly over two of them.
     ARC: neither of these.
     """
@@ -134,6 +149,7 @@ def accumulation(motion, speed, t, tol):
     there, slope_there = contact_pull(motion, next_side, t)
     if there >= 0.0 or after != after:
         return Mode.ARC, 0.0
+    motion.pull = max(motion.pull, abs(here), abs(there))
     next_speed = rate_of(motion, next_side) * after
     first = next_speed / speed
     second = 0.0
@@ -142,19 +158,21 @@ def accumulation(motion, speed, t, tol):
         second = rate_of(motion, third_side) * last / next_speed
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
-    change = 1.0 + abs(slope_here / here) + abs(slope_there / there)
+    span = motion.natural_time
+    change = 1.0 / span + abs(slope_here / here) + abs(slope_there / there)
     if abs(loss) < LOSSLESS:
-        return Mode.CHATTER if speed < CHATTER_SPEED and cycle * change < SLOWLY else Mode.ARC, 0.0
+        slow = speed < CHATTER_SPEED * natural_speed(motion)
+        return Mode.CHATTER if slow and cycle * change < SLOWLY else Mode.ARC, 0.0
     if not loss > 0.0:
         return Mode.ARC, 0.0
     left = cycle / loss
-    return Mode.REST if 0.1 * left * left * change <= tol else Mode.ARC, left
+    return Mode.REST if 0.1 * (left * change) ** 2 <= tol else Mode.ARC, left
 
 
 @lean_jit
-def slow_speed(tol):
+def slow_speed(motion, tol):
     """The speed of the gap after an impact below which the end of an accumulation may be near."""
-    return max(SLOW * math.sqrt(tol), CHATTER_SPEED)
+    return max(SLOW * math.sqrt(tol), CHATTER_SPEED) * natural_speed(motion)
 
 
 @lean_jit
@@ -182,7 +200,7 @@ def release_columns(motion, t):
     if (
         motion.skip == 2
         and piece > 0
-        and abs(breaks[piece - 1] - motion.origin - t) < 1e-12 * max(1.0, abs(motion.origin))
+        and abs(breaks[piece - 1] - motion.origin - t) <= 1e-12 * (abs(t) + abs(motion.origin))
     ):
         detail = ReleaseDetail.AT_A_JUMP
     columns_at_event(motion, EventCode.RELEASE, detail, t, float(motion.side))
@@ -244,7 +262,11 @@ def decide(motion, t_end):
     motion.skip = 1
     motion.rested = 0
     speed = rate_of(motion, float(motion.side)) * velocity
-    if speed < slow_speed(tol):
+    if motion.pull == 0.0:  # the motion begins at the contact
+        for i in range(motion.sides):
+            pull, _ = contact_pull(motion, 1.0 - 2.0 * i, t)
+            motion.pull = max(motion.pull, abs(pull))
+    if speed < slow_speed(motion, tol):
         mode, left = accumulation(motion, speed, t, tol)
         if mode == Mode.REST and t + left > motion_end(motion):
             mode = Mode.ARC  # the motion ends before the accumulation does

@@ -17,13 +17,16 @@ no derivative.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from saltus.flow.kernel.layout import (
     CHATTER_SPEED,
     EXACT,
-    SHORTEST,
+    ZERO,
     EventCode,
+    Geometry,
     GrazingDetail,
     Mode,
     Status,
@@ -38,16 +41,21 @@ from saltus.flow.kernel.roots import (
     leading,
     margin_root,
     scale_gap,
+    value_and_slope,
 )
 from saltus.flow.kernel.steps import (
     column_step,
     columns_at_event,
     expand,
+    is_away,
     leaps,
     move,
+    natural_speed,
+    note_impact,
     record_event,
     record_shift,
     record_step,
+    shortest_step,
     step_arrays,
     step_size,
 )
@@ -57,6 +65,7 @@ from saltus.flow.one_contact.impacts import (
     decide,
     hold,
     impact,
+    note_press,
     rate_of,
 )
 from saltus.taylor import jit, lean_jit
@@ -88,6 +97,17 @@ def first_margin(motion, h, hit, first):
             hit = j
             first = u
     return hit, first
+
+
+@lean_jit
+def passes(motion, closes, tau):
+    """Whether, at the end of a step of the length `tau`, the motion is beyond the contact, or away
+    from it where it `closes`, by more than rounding.
+    """
+    contact = motion.geometry[Geometry.CONTACT]
+    gap = motion.coordinates[0] - contact
+    gap = -abs(gap) if closes else math.copysign(gap, gap * rate_of(motion, float(motion.side)))
+    return gap < 0.0 and is_away(motion, gap, 0, contact, tau)
 
 
 @lean_jit
@@ -127,8 +147,14 @@ def arc(motion, target):
         )
     tau = first * h if hit >= 0 else h
     record_step(motion, side, t, tau)
+    if hit == motion.margin_count:
+        rate = rate_of(motion, float(side))
+        speed, pull = value_and_slope(motion.velocity_series[0], order, tau)
+        note_impact(motion, rate * speed, rate * pull)
     if not move(motion, tau) or not h >= 0.0:
         return Status.NOT_FINITE
+    if motion.sides > 0 and passes(motion, hit == motion.margin_count, tau):
+        return Status.PASSED
     motion.time = target if hit < 0 and h == target - t else t + tau
     motion.skip = 0
     velocity = motion.velocities[0]
@@ -140,8 +166,8 @@ def arc(motion, target):
             columns_at_event(motion, EventCode.LIMIT, hit, motion.time, float(side))
             record_shift(motion)
         return Status.LIMITED
-    unit = min(motion.period_length, 1.0) if motion.period_length > 0.0 else 1.0
-    return Status.PAUSED if natural > SHORTEST * unit or h == target - t else Status.STALLED
+    goes_on = natural > shortest_step(motion) or h == target - t
+    return Status.PAUSED if goes_on else Status.STALLED
 
 
 @lean_jit
@@ -151,7 +177,7 @@ def first_release(motion, b, order, h, poly):
     first = NEVER
     released = 0
     for i in range(motion.sides):
-        skip = leading(b[i], 0, order)
+        skip = leading(b[i], 0, order, ZERO, motion.press, 0)
         if skip < order and b[i, skip] > 0.0:
             first = 0.0
             released = 0
@@ -176,10 +202,11 @@ def wait_at_contact(motion, target):
     t = motion.time
     h = target - t
     contact_accelerations(motion, t)
+    note_press(motion)
     for i in range(motion.sides):
-        h = min(
-            h, step_size(b[i : i + 1], order, max(1.0, abs(b[i, 0])), min(motion.tolerance, EXACT))
-        )
+        size = max(motion.press, abs(b[i, 0]))
+        if size > 0.0:
+            h = min(h, step_size(b[i : i + 1], order, size, min(motion.tolerance, EXACT)))
     first, released = first_release(motion, b, order, h, motion.polynomial)
     tau = min(first, 1.0) * h
     if motion.mode == Mode.CHATTER and tau > 0.0:
@@ -188,7 +215,7 @@ def wait_at_contact(motion, target):
     record_step(motion, 0, t, tau)
     if first > 1.0:
         motion.time = target if h == target - t else t + tau
-        grown = motion.chatter_speed > 2.0 * CHATTER_SPEED
+        grown = motion.chatter_speed > 2.0 * CHATTER_SPEED * natural_speed(motion)
         # the impacts are followed one by one from here on
         if motion.mode == Mode.CHATTER and grown:
             motion.mode = Mode.CONTACT

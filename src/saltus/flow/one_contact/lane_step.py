@@ -13,7 +13,10 @@ from saltus.flow.lanes.lane_steps import (
     commit,
     find_contact,
     margins_certain,
+    natural_speeds,
     natural_step,
+    note_impacts,
+    rate_of_change,
     series_true,
     state_size,
     sweep,
@@ -112,8 +115,9 @@ def reset(lanes, hit):
     impact(lanes.memory, lanes.places)
     approach = rate_on(lanes, lanes.side) * lanes.new_velocity[0]
     speed = rate_on(lanes, lanes.new_side) * lanes.after_velocity[0]
-    good = bits(approach < 0.0) & bits(speed > CHATTER_SPEED) & hit
-    slow = good & ~bits(speed > lanes.settings.slowest_impact)
+    natural = natural_speeds(lanes)
+    good = bits(approach < 0.0) & bits(speed > CHATTER_SPEED * natural) & hit
+    slow = good & ~bits(speed > lanes.settings.slowest_impact * natural)
     if slow:
         good &= ~slow | loses_nothing(lanes, speed)
     captured = bits(speed < lanes.capture_speed) & good
@@ -152,6 +156,9 @@ def step_all(lanes):
     captured = 0
     resolved = hit
     if hit:
+        rate = rate_on(lanes, lanes.side)
+        pull = rate_of_change(lanes, lanes.velocities[0], step.taken)
+        note_impacts(lanes, hit, rate * lanes.new_velocity[0], rate * pull)
         resolved, unsolved, captured = reset(lanes, hit)
         doubtful |= unsolved
     moved = lanes.busy & ~lanes.scalar & ~doubtful & ~waits

@@ -79,7 +79,7 @@ export class Run {
     new Uint8Array(engine.exports.memory.buffer, engine.address("numbers"), layout.record_size).fill(0);
     const record = engine.record();
     const numbers = {
-      ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length,
+      ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length, natural_time: this.length > 0 ? this.length / (2 * Math.PI) : 1,
       order: this.order, tolerance: this.tolerance, piece: placeAbove(system.breaks, this.first), leave_by: side, dense: 1,
     };
     for (const [name, value] of Object.entries(numbers)) record.set(name, value);

@@ -1,0 +1,188 @@
+"""Decisions of the kernels that do not depend on how large numbers are: balls on floors far from 0,
+bodies with large loads, motions that rest on a surface until their load begins.
+"""
+
+import contextlib
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import saltus
+from saltus import Contact, Friction, NewtonImpact, Surface
+from saltus.errors import MotionError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball(saltus.ContactModel):
+    """A ball above a floor, with a friction along its coordinate."""
+
+    floor: float = 0.0
+    gravity: float = 1.0
+    rub: float = 0.0
+
+    coordinates = ("y",)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        return (Contact(name="floor", coordinate="y", position=self.floor),)
+
+    @property
+    def frictions(self) -> tuple[Friction, ...]:
+        return (Friction(name="rub", coordinate="y", kinetic=self.rub),)
+
+    def force(self, t: Any, y: Any, velocity: Any, load: Any) -> Any:
+        return -self.gravity
+
+    def normal_forces(self, t: Any, y: Any, velocity: Any, load: Any) -> Any:
+        return (1.0,)
+
+
+@pytest.mark.parametrize("e", [0.5, 0.8])
+@pytest.mark.parametrize("gravity", [1e-9, 9.81, 9810.0, 1e6])
+@pytest.mark.parametrize("floor", [0.0, 1.0, -1000.0, 1e6])
+def test_a_ball_comes_to_rest_on_a_floor_anywhere(floor: float, gravity: float, e: float) -> None:
+    """It rests after sqrt(2 h / g) (1 + 2 e / (1 - e))."""
+    height = 1.0
+    model = Ball(floor=floor, gravity=gravity)
+    fall = math.sqrt(2.0 * height / gravity)
+    rest = fall * (1.0 + 2.0 * e / (1.0 - e))
+    ball = saltus.System(model=model, impact=NewtonImpact(e))
+    motion = saltus.simulate(ball, y=floor + height, duration=1.5 * rest)
+    assert motion.stop is saltus.Stop.REST
+    assert motion.position == floor
+    assert motion.rest_time == pytest.approx(rest, rel=1e-9 + 1e-14 * abs(floor))
+    many = saltus.simulate_many(ball, y=floor + height, duration=1.5 * rest)
+    assert float(many.y) == floor
+
+
+def test_friction_shortens_the_bounces_of_a_ball_in_millimetres() -> None:
+    """Up with g + mu, down with g - mu: each bounce has e sqrt((g - mu) / (g + mu)) of the speed."""
+    gravity, mu, e, floor = 9810.0, 1962.0, 0.6, 1000.0
+    ball = saltus.System(model=Ball(floor=floor, gravity=gravity, rub=mu), impact=NewtonImpact(e))
+    motion = saltus.simulate(ball, y=floor + 500.0, duration=3.0)
+    down, up = gravity - mu, gravity + mu
+    speed = math.sqrt(2.0 * down * 500.0)
+    time = speed / down
+    ratio = e * math.sqrt(down / up)
+    first = e * speed * (1.0 / up + 1.0 / math.sqrt(up * down))
+    assert motion.impacts.time[:3] == pytest.approx(
+        [time, time + first, time + first * (1.0 + ratio)], rel=1e-12
+    )
+    assert motion.rest_time == pytest.approx(time + first / (1.0 - ratio), rel=1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block(saltus.ContactModel):
+    """A block that slides and hops on a floor with friction."""
+
+    gravity: float = 1.0
+
+    coordinates = ("x", "y")
+    channels = ("fx", "fy")
+    contacts = (Contact(name="floor", coordinate="y"),)
+    frictions = (Friction(name="rub", coordinate="x", contact="floor", kinetic=0.25),)
+
+    def force(self, t: Any, q: Any, velocity: Any, load: Any) -> Any:
+        return load.fx(t), load.fy(t) - self.gravity
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e4, 1e6])
+def test_a_hopping_block_is_followed_whatever_its_loads_are(length: float) -> None:
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        frequency, across, up = rng.uniform([0.5, 0.2, 0.2], [2.0, 2.0, 1.5])
+        e, height = rng.uniform([0.0, 0.1], [0.8, 2.0])
+        ends = []
+        for unit in (1.0, length):
+            load = saltus.Load(
+                frequency=frequency,
+                fx=saltus.Harmonic(amplitude=across * unit),
+                fy=saltus.Harmonic(amplitude=up * unit, phase=1.0),
+            )
+            system = saltus.System(
+                model=Block(gravity=unit), load=load, impact=NewtonImpact(float(e))
+            )
+            start = {"x": 0.0, "y": height * unit, "velocity": (0.2 * unit, 0.0)}
+            motion = saltus.simulate(system, **start, periods=4)
+            ends.append((len(motion.events), *np.divide(motion.position, unit)))
+        assert ends[0][0] == ends[1][0]
+        assert ends[1] == pytest.approx(ends[0], abs=1e-7)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bilinear(saltus.ContactModel):
+    """A spring with other stiffnesses above and below 0."""
+
+    above: float = 0.0
+    below: float = 0.0
+
+    coordinates = ("x",)
+    channels = ("force",)
+    surfaces = (Surface(name="middle", coordinate="x"),)
+
+    def force(self, t: Any, x: Any, velocity: Any, load: Any, sides: Any) -> Any:
+        s = sides.middle
+        return load.force(t) - 0.5 * ((self.above + self.below) + (self.above - self.below) * s) * x
+
+
+DELAYED = {
+    "record": saltus.Record([0.0, 0.1, 0.2, 10.0], [0.0, 0.0, 1.0, 1.0]),
+    "ramp": saltus.Ramp(amplitude=1.0, start=0.1, duration=0.1),
+}
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("name", DELAYED)
+def test_a_motion_leaves_a_surface_to_either_side_when_its_load_begins(
+    name: str, sign: float
+) -> None:
+    """Without a stiffness x is the load's second integral: 0.1^2 / 6 at 0.2, then a parabola."""
+    signal: Any = DELAYED[name]
+    field = "amplitude" if name == "ramp" else "value"
+    values = {"amplitude": sign} if name == "ramp" else {"value": sign * signal.value}
+    load = saltus.Load(force=type(signal)(**{**vars_of(signal), field: values[field]}))
+    motion = saltus.simulate(saltus.System(model=Bilinear(), load=load), x=0.0, duration=1.0)
+    exact = 0.01 / 6.0 + 0.05 * 0.8 + 0.5 * 0.64
+    assert motion.position == pytest.approx(sign * exact, abs=1e-14)
+    assert motion.sides == {"middle": int(sign)}
+    # with the stiffness of that side, the same oscillator without a surface
+    model = Bilinear(above=4.0, below=1.0)
+    motion = saltus.simulate(saltus.System(model=model, load=load), x=0.0, duration=1.2)
+    k = 4.0 if sign > 0.0 else 1.0
+    plain = saltus.System(model=saltus.WallOscillator(stiffness=k, wall=1e9), load=load)
+    assert motion.position == pytest.approx(
+        saltus.simulate(plain, x=0.0, duration=1.2).position, abs=1e-13
+    )
+
+
+def vars_of(signal: Any) -> dict[str, Any]:
+    """The numbers of a signal."""
+    names = ("time", "value") if isinstance(signal, saltus.Record) else ("start", "duration")
+    return {name: getattr(signal, name) for name in names}
+
+
+@pytest.mark.parametrize("scale", [1e-14, 1e-12, 1e-9])
+def test_a_pressed_mass_is_let_go_however_small_the_forces_are(scale: float) -> None:
+    """The load 1 - 1.2 sin(t) presses until asin(1 / 1.2)."""
+    load = saltus.Load(
+        frequency=1.0, force=saltus.Harmonic(amplitude=-1.2 * scale, mean=1.0 * scale)
+    )
+    system = saltus.System(
+        model=saltus.TwoStops(left=-1e9, right=0.0, stiffness=0.0),
+        load=load,
+        impact=NewtonImpact(0.5),
+    )
+    motion = saltus.simulate(system, x=0.0, duration=2.0)
+    released = motion.events.of(saltus.flow.EventKind.RELEASE)
+    assert [event.time for event in released] == pytest.approx([math.asin(1.0 / 1.2)], abs=1e-12)
+
+
+def test_no_motion_is_beyond_its_floor() -> None:
+    """A bounce below the rounding of the floor's position cannot be followed."""
+    ball = saltus.System(model=Ball(floor=1e15, gravity=1.0), impact=NewtonImpact(0.9))
+    with contextlib.suppress(MotionError):
+        motion = saltus.simulate(ball, y=1e15 + 1.0, duration=60.0)
+        assert motion.position >= 1e15
