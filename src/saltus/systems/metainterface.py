@@ -69,9 +69,9 @@ class Metainterface(LayeredCell, OneContactModel):
     again (errata 20); `reaction`, the closed layer's reaction, positive while it keeps the layer
     closed (errata 21): with the lower layer open -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 +
     theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0, with the upper one open R1
-    = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2
-    - [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one
-      of `eomnl`.
+    = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2 -
+    [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of
+    `eomnl`.
 
     Parameters
     ----------

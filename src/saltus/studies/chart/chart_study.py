@@ -427,8 +427,9 @@ def bordered_chart(
         What moves, under a load with a frequency.
     curves
         The largest number of curves that are followed on which motions end, see `with_borders`.
-    horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows, store,
-    workers, scheduler
+    horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows
+        As for `stability_chart`.
+    store, workers, scheduler
         As for `stability_chart`.
     progress
         Called with the fraction done and what is being done, first when all arguments have been

@@ -428,8 +428,9 @@ def response_spectrum(
         What moves, under a load with a frequency.
     path, bounds
         The dotted path of the frequency, its lowest and its highest value.
-    effort, max_period, values, starts, window, seed, repelling, switch, step, bands, store,
-    workers, scheduler, progress
+    effort, max_period, values, starts, window, seed, repelling, switch, step, bands
+        As for `bifurcation_diagram`.
+    store, workers, scheduler, progress
         As for `bifurcation_diagram`.
 
     Examples
