@@ -1,8 +1,6 @@
 """Motions on which nothing acts that varies: a cycle has no forcing period, and one judge says so."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -63,18 +61,7 @@ def test_an_equilibrium_under_a_constant_load_is_found_as_before():
     assert [a.period for a in saltus.find_attractors(system, starts=4)] == [1]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Swing(saltus.Model):
-    """A pendulum whose length oscillates: the model itself reads the time."""
-
-    coordinates: ClassVar[tuple] = ("x",)
-
-    def acceleration(self, t, x, velocity, side, load):
-        return -(1.0 + 0.3 * np.cos(load.frequency * t)) * np.sin(x) - 0.1 * velocity
-
-
-def test_a_model_that_reads_the_time_is_forced():
-    assert not is_unforced(saltus.System(model=Swing(), load=saltus.Load(frequency=2.0)))
+def test_a_load_that_varies_by_little_forces():
     assert is_unforced(belt(frequency=2.0))
     assert not is_unforced(belt(frequency=2.0, force=saltus.Harmonic(1e-9)))
 

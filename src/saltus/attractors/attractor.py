@@ -66,7 +66,8 @@ REST = 0  # the label of rest at the contact, always
 # of a motion that does not settle, which lies on a set if their median distance is small; most that
 # are written
 LAST_STATES = 64
-# two states at phase 0 this near to one another count as one, relative to their size or to 1
+# two states at phase 0 this near to one another count as one, relative to their size or to natural
+# units
 SAME_STATE = 1e-6
 
 
@@ -78,6 +79,8 @@ class Target:
     label: int
     kind: Ending
     states: np.ndarray  # (n, d), coordinates and velocities at phase 0
+    # the natural units of the state variables, (d,), in which distances are measured
+    units: Any = 1.0
 
     @property
     def dense(self) -> bool:
@@ -88,7 +91,7 @@ class Target:
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        return cKDTree(self.states)
+        return cKDTree(self.states / self.units)
 
     @cached_property
     def grain(self) -> float:
@@ -96,31 +99,38 @@ class Target:
         within which 95 % of the sample have a neighbour; 0 for other sets."""
         if not self.dense:
             return 0.0
-        apart, _ = self._tree.query(self.states, k=2, p=np.inf)
+        apart, _ = self._tree.query(self.states / self.units, k=2, p=np.inf)
         return float(2.0 * np.quantile(apart[:, 1], 0.95))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """The distances of states (..., d) from the attractor's nearest state, as the largest
-        difference of a variable, (...).
+        difference of a variable in its unit, (...).
         """
         if self.dense:
             finite = np.isfinite(points).all(axis=-1)
-            apart, _ = self._tree.query(np.where(finite[..., None], points, 0.0), p=np.inf)
+            apart, _ = self._tree.query(
+                np.where(finite[..., None], points, 0.0) / self.units, p=np.inf
+            )
             return np.where(finite, apart, np.inf)
         distance = np.full(points.shape[:-1], np.inf)
         for state in self.states:
-            np.fmin(distance, np.abs(points - state).max(axis=-1), out=distance)
+            np.fmin(distance, np.abs((points - state) / self.units).max(axis=-1), out=distance)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
         return {"label": self.label, "kind": str(self.kind), "states": self.states.tolist()}
 
+    def size(self, states: np.ndarray) -> Any:
+        """The largest variable of states (..., d) in natural units, at least 1, (...)."""
+        return np.maximum(1.0, np.abs(states / self.units).max(axis=-1))
+
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Target:
+    def from_dict(cls, data: dict[str, Any], units: Any = 1.0) -> Target:
         """The inverse of `to_dict`."""
         kind = Ending[str(data["kind"]).upper().replace("-", "_")]
-        return cls(int(data["label"]), kind, np.atleast_2d(np.asarray(data["states"], dtype=float)))
+        states = np.atleast_2d(np.asarray(data["states"], dtype=float))
+        return cls(int(data["label"]), kind, states, units)
 
 
 @dataclass(frozen=True, eq=False)

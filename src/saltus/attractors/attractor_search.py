@@ -51,6 +51,7 @@ from saltus.systems import (
     check_window,
     image_of,
     initial_states,
+    natural_units,
     rest_state,
     state_of,
 )
@@ -74,7 +75,7 @@ class AttractorSearchSettings:
     sample: int = 2048  # Number of stroboscopic states that represent a set that does not repeat.
     # If the sum of the exponents is above minus this, areas of the state plane do not shrink, and
     # the set attracts nothing.
-    lossless: float = 1e-6
+    lossless: float = 1e-6  # in natural units
     # The largest distance, in units of SAME_STATE, between an orbit and the states of the motions
     # that settle on it.
     beside: float = 100.0
@@ -92,6 +93,17 @@ class KnownAttractors:
     members: list[Attractor] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)  # why motions are undecided
 
+    @property
+    def _units(self) -> np.ndarray:
+        return natural_units(self.system).state
+
+    def _cycle(self, states: np.ndarray) -> Target:
+        return Target(0, Ending.PERIODIC, states, self._units)
+
+    def _near(self, states: np.ndarray) -> float:
+        """The distance in natural units below which two of these states are one."""
+        return float(SAME_STATE * np.max(self._cycle(np.atleast_2d(states)).size(states)))
+
     def assign(self, ends: Recurrence) -> np.ndarray:
         """The label of the attractor on which each motion ends, or WAITING or UNDECIDED, (n,)."""
         labels = np.full(len(ends), WAITING)
@@ -107,7 +119,8 @@ class KnownAttractors:
             rows = np.flatnonzero(ends.period == period)
             while rows.size:
                 states = ends.states[rows[0], -period:]
-                here = _cycle(states).distance(ends.states[rows, -1]) < _near(states)
+                cycle = self._cycle(states)
+                here = cycle.distance(ends.states[rows, -1]) < self._near(states)
                 here[0] = True
                 labels[rows[here]] = self._settled(states)
                 rows = rows[~here]
@@ -127,9 +140,8 @@ class KnownAttractors:
         if cycle is not None:
             return self._fail(f"{where}: {cycle.sentence}")
         orbit = solved_orbit(self.system, states[-1], len(states))
-        if orbit is None or _cycle(states).distance(orbit.section_state) > SETTINGS.beside * _near(
-            states
-        ):
+        far = SETTINGS.beside * self._near(states)
+        if orbit is None or self._cycle(states).distance(orbit.section_state) > far:
             return self._fail(
                 f"motions repeat themselves every {len(states)} periods {where}, but no orbit "
                 "solves its equations there"
@@ -149,7 +161,8 @@ class KnownAttractors:
     def add_rest(self, state: np.ndarray) -> int:
         """The label of rest in a state (d,)."""
         for member in self.members:
-            if member.kind is Ending.REST and np.abs(member.states[0] - state).max() < _near(state):
+            near = member.target.distance(state) < self._near(state)
+            if member.kind is Ending.REST and near:
                 return member.label
         held = state[: len(self.system.model.coordinates)]
         # contacts may hold it to a wall that moves
@@ -184,7 +197,7 @@ class KnownAttractors:
         orbit: PeriodicOrbit | None = None,
     ) -> int:
         low, high = extrema
-        target = Target(len(self.members), kind, states)
+        target = Target(len(self.members), kind, states, self._units)
         self.members.append(
             Attractor(target, high, low, orbit, starts=0, of=0, mirror=UNDECIDED, evidence=evidence)
         )
@@ -195,7 +208,10 @@ class KnownAttractors:
         known.
         """
         for member in self.members:
-            if not member.target.dense and (member.target.distance(states) < _near(states)).all():
+            if (
+                not member.target.dense
+                and (member.target.distance(states) < self._near(states)).all()
+            ):
                 return member.label
         return None
 
@@ -210,7 +226,7 @@ class KnownAttractors:
                 if (
                     np.median(apart) < target.grain
                     if target.dense
-                    else apart[-len(target.states) :].max() < _near(last[-1:])
+                    else apart[-len(target.states) :].max() < self._near(last[-1:])
                 ):
                     labels[i] = target.label
                     break
@@ -229,7 +245,8 @@ class KnownAttractors:
         where = f"from {_shown(state)}"
         if verdict.kind is Ending.UNDECIDED or verdict.exponents is None:
             return self._fail(f"{where}: {verdict.reason}")
-        if float(verdict.exponents.values.sum()) > -SETTINGS.lossless:
+        lossless = SETTINGS.lossless / natural_units(self.system).time
+        if float(verdict.exponents.values.sum()) > -lossless:
             return self._fail(
                 f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts"
             )
@@ -284,16 +301,8 @@ class KnownAttractors:
         return self.add_orbit(orbit) if orbit is not None and orbit.stable else None
 
 
-def _cycle(states: np.ndarray) -> Target:
-    return Target(0, Ending.PERIODIC, states)
-
-
 def _shown(state: np.ndarray) -> str:
     return f"({', '.join(f'{value:.6g}' for value in state)})"
-
-
-def _near(states: np.ndarray) -> float:
-    return float(SAME_STATE * max(1.0, np.abs(states).max()))
 
 
 def _check(

@@ -517,7 +517,8 @@ class _Judgement:
         options = {"max_period": longest, "kept": 2 * longest + 2}
         ends = self._ends(rows, self.states[rows, :1], self.settings.patience, silent, **options)
         rows, ends = rows[ends.periodic], ends.only(ends.periodic)
-        fewest = return_period(ends.states, longest, RECURRENCE.long_agreement)
+        units = natural_units(self.system).state
+        fewest = return_period(ends.states, longest, RECURRENCE.long_agreement, units)
         self.period[rows] = fewest
         self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
 

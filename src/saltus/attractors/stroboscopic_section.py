@@ -13,7 +13,6 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Stop, motions_from, nearest_return, simulate, stroboscopic
 from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from
 from saltus.systems import (
-    DeclaredLoad,
     Load,
     System,
     arguments_of,
@@ -80,23 +79,7 @@ def is_unforced(system: System) -> bool:
         for term in getattr(signal, "terms", (signal,)):
             if term.once or (term.periodic and getattr(term, "amplitude", 1.0) != 0.0):
                 return False
-    return system.load.frequency is None or not _reads_time(system)
-
-
-def _reads_time(system: System) -> bool:
-    """Whether the model itself reads the time, as one with an oscillating stiffness does."""
-    model = system.model
-    load = DeclaredLoad(system.load, model)
-    size = len(model.coordinates)
-    place = 0.1 * natural_units(system).lengths
-    rest: Any = (place[0], 0.0) if size == 1 else (tuple(place), (0.0,) * size)
-    period = system.load.period or 1.0
-    side = model.every_side[0]
-    found = [
-        np.ravel(np.array(model.acceleration(share * period, *rest, side, load), dtype=float))
-        for share in (0.0, 0.17, 0.41)
-    ]
-    return not np.allclose(found, found[0], rtol=1e-12, atol=0.0, equal_nan=True)
+    return True
 
 
 def section_states(
@@ -149,7 +132,7 @@ class Certificate:
                 "the orbit there does not attract: its largest multiplier is "
                 f"{abs(orbit.multipliers[0]):.9g}"
             )
-        if not orbit.defect < SETTINGS.defect:
+        if not orbit.defect < SETTINGS.defect * orbit.equations.natural.state.max():
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
         if not self.distance < self.within:
             return f"the orbit found passes {self.distance:.1g} beside the motion"
@@ -190,12 +173,13 @@ def certify(
     """
     later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
     states = np.concatenate([[state], later])
-    q = period or nearest_return(states[::-1], max_period)
+    units = natural_units(system).state
+    q = period or nearest_return(states[::-1], max_period, units)
     orbit = solved_orbit(system, state, q, admissible=False)
     within = SETTINGS.defect if period else SETTINGS.slow
     if orbit is None:
         return Certificate(None, np.inf, within)
-    apart = np.abs(states[:q] - orbit.section_state).max(axis=1)
+    apart = np.abs((states[:q] - orbit.section_state) / units).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
 
 
@@ -220,14 +204,15 @@ def approached_orbit(
     """
     later = section_states(system, state[None], SETTINGS.approach, tol=1e-12)[0]
     states = np.concatenate([[state], later])
-    orbit = solved_orbit(system, state, nearest_return(states[::-1], max_period))
+    units = natural_units(system).state
+    orbit = solved_orbit(system, state, nearest_return(states[::-1], max_period, units))
     if orbit is None or not orbit.stable or orbit.period > max_period:
         return None
     q = orbit.period
-    apart = np.abs(states - orbit.section_state).max(axis=1)
+    apart = np.abs((states - orbit.section_state) / units).max(axis=1)
     apart = apart[int(np.argmin(apart[:q])) :: q]  # at the phase of the orbit's own state
     quarter = max(1, len(apart) // 4)
-    is_near = apart[0] <= within * orbit.amplitude
+    is_near = apart[0] <= within * orbit.amplitude / orbit.equations.natural.length
     return orbit if is_near and apart[-quarter:].max() < apart[:quarter].max() else None
 
 

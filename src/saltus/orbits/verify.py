@@ -19,16 +19,19 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
     counts, speeds and extrema agree."""
     if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
-    one = np.array([a.highest, a.lowest])
-    other = np.array([b.highest, b.lowest])
+    natural = a.equations.natural
+    one = np.array([a.highest, a.lowest]) / natural.length
+    other = np.array([b.highest, b.lowest]) / natural.length
     same = np.abs(one - other).max() < TOLERANCES.same_orbit or (
         mirrored and np.abs(one + other[::-1]).max() < TOLERANCES.same_orbit
     )
-    return bool(same) and _same_speeds(np.sort(a.speeds)[::-1], np.sort(b.speeds)[::-1])
+    return bool(same) and _same_speeds(
+        np.sort(a.speeds)[::-1] / natural.speed, np.sort(b.speeds)[::-1] / natural.speed
+    )
 
 
 def _same_speeds(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two lists of speeds in falling order agree; one may be longer by very slow impacts,
+    """Whether two lists of speeds, in natural units and in falling order, agree; one may be longer by very slow impacts,
     since rounding decides which impact of an accumulation is the last one that is listed."""
     n = min(one.size, other.size)
     last = np.append(one[n:], other[n:]).max(initial=0.0)

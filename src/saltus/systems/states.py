@@ -17,6 +17,7 @@ from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.gap_places import CLOSED_BELOW, held_exactly, led, normal_of, pushed, reflected
 from saltus.systems.model import Model
 from saltus.systems.system import System
+from saltus.systems.system_units import natural_units
 
 
 def read_start(
@@ -421,12 +422,14 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
             system, states_beside(inner, begin, in_gaps(system, states + shifts) - begin)
         )
     names = system.model.coordinates
+    units = natural_units(system).state
     moved = on_this_side(system, states + shifts)
     held = held_by_contacts(system, states)
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
         least = np.maximum(
-            np.abs(contact.gap(moved[..., place])), np.abs(moved[..., len(names) + place])
+            np.abs(contact.gap(moved[..., place])) / units[place],
+            np.abs(moved[..., len(names) + place]) / units[len(names) + place],
         )
         closed = held[..., place] & (np.asarray(contact.gap(states[..., place])) == 0.0) | (
             least < CLOSED_BELOW
@@ -478,18 +481,22 @@ def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
 
 
 def held_values(
-    system: System, state: np.ndarray, within: float, closed: int = 0
+    system: System, state: np.ndarray, within: float, closed: int = 0, units: Any = None
 ) -> dict[int, float]:
     """The variables of a state (d,) that are fixed, by their places, with their values: the
     coordinates and velocities that contacts hold, and the velocities of coordinates that stick, up
     to rounding; those of the contacts in `closed`, a bit each, in any case.
+
+    Gaps and speeds are compared in the natural `units` of the state (d,), by default the system's.
     """
     found = dict[int, float]()
+    units = natural_units(system).state if units is None else units
     names = system.model.coordinates
     for i, contact in enumerate(system.model.contacts):
         place = names.index(contact.coordinate)
         speed = len(names) + names.index(contact.coordinate)
-        if closed >> i & 1 or max(abs(contact.gap(state[place])), abs(state[speed])) < within:
+        gap = abs(contact.gap(state[place])) / units[place]
+        if closed >> i & 1 or max(gap, abs(state[speed]) / units[speed]) < within:
             found |= {place: float(contact.position), speed: 0.0}
     for friction in system.model.frictions:
         place = len(names) + names.index(friction.coordinate)
@@ -499,9 +506,8 @@ def held_values(
             for c in system.model.contacts
             if c.name == friction.contact
         )
-        found |= (
-            {place: ground_speed} if touching and abs(state[place] - ground_speed) < within else {}
-        )
+        if touching and abs(state[place] - ground_speed) / units[place] < within:
+            found[place] = ground_speed
     return found
 
 

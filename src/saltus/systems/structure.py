@@ -135,7 +135,7 @@ def canonical(shapes: np.ndarray, squares: np.ndarray, mass: np.ndarray) -> np.n
             found[:, group] = part @ turned
     sizes = np.abs(found)
     first = np.argmax(sizes >= (1.0 - TIED) * sizes.max(axis=0), axis=0)
-    return found * np.sign(found[first, range(found.shape[1])])
+    return np.asarray(found * np.sign(found[first, range(found.shape[1])]))
 
 
 def fixed_weights(count: int) -> np.ndarray:

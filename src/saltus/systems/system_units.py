@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 INSTANTS = 8
 # A load that moves d by a smaller share of it than this has no part in the unit.
 FARTHEST = 1e-7
+TINY = float(np.finfo(float).tiny)
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
 # A distance that is this share of the largest one is rounding.
 ROUNDING = 1e-12
@@ -61,11 +62,14 @@ class NaturalUnits:
         The unit of time.
     masses
         The inertia of each coordinate, (n,): the entry of the mass matrix, 1 where there is none.
+    own_time
+        The time in which the system moves by itself, sqrt(d / a), at most `time`.
     """
 
     lengths: np.ndarray
     time: float
     masses: np.ndarray
+    own_time: float
 
     @property
     def length(self) -> float:
@@ -101,7 +105,8 @@ class NaturalUnits:
     def powers_of_two(self) -> NaturalUnits:
         """These units rounded to the nearest powers of 2, so that scaling by them is exact."""
         lengths, masses = (np.exp2(np.round(np.log2(x))) for x in (self.lengths, self.masses))
-        return NaturalUnits(lengths, _power_of_two(self.time), masses)
+        own_time = _power_of_two(self.own_time)
+        return NaturalUnits(lengths, _power_of_two(self.time), masses, own_time)
 
 
 def natural_units(system: System) -> NaturalUnits:
@@ -127,6 +132,7 @@ def _found(system: System) -> NaturalUnits:
     instants = _instants(system.load)
     nearest: np.ndarray | None = None
     stiffest = 0.0
+    quickest = 0.0
     push = np.zeros(len(model.coordinates))
     with np.errstate(all="ignore"):
         for place in _places(model):
@@ -134,6 +140,7 @@ def _found(system: System) -> NaturalUnits:
             if found is None:
                 continue
             stiffest = max(stiffest, found.stiffness)
+            quickest = max(quickest, found.rate)
             if found.distance.any() and (
                 nearest is None or np.linalg.norm(found.distance) < np.linalg.norm(nearest)
             ):
@@ -152,7 +159,8 @@ def _found(system: System) -> NaturalUnits:
     lengths = np.where(first_order & moved, nearest, largest)
     lengths = np.where(angular, 1.0, lengths)
     sound = np.isfinite(lengths) & (lengths > 0.0)
-    return NaturalUnits(np.where(sound, lengths, 1.0), time, _masses(model))
+    own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
+    return NaturalUnits(np.where(sound, lengths, 1.0), time, _masses(model), own_time)
 
 
 def _places(model: Any) -> Iterator[np.ndarray]:
@@ -202,6 +210,7 @@ class Held(NamedTuple):
     distance: np.ndarray  # d, (n,)
     acceleration: np.ndarray  # a in the mean of squares over a period, (n,)
     stiffness: float  # the largest one there
+    rate: float  # sqrt(a / d) of all that acts
 
 
 def _held_away(
@@ -224,10 +233,12 @@ def _held_away(
     moved = np.array(pushes) @ left
     moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right
     distance = _mean(moved)
+    acceleration = _mean(np.array(pushes))
+    squared = float(np.linalg.norm(acceleration)) / max(float(np.linalg.norm(distance)), TINY)
     swing = SWING * _mean(moved - moved.mean(axis=0))
     if np.linalg.norm(swing) > FARTHEST * np.linalg.norm(distance):
         distance = swing
-    return Held(distance, _mean(np.array(pushes)), float(sizes.max()))
+    return Held(distance, acceleration, float(sizes.max()), math.sqrt(squared))
 
 
 def _masses(model: Any) -> np.ndarray:

@@ -18,7 +18,7 @@ from saltus.errors import ParameterError
 from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus.progress import Progress, silent
 from saltus.result import check_provenance, identity, provenance
-from saltus.systems import System, before_impacts
+from saltus.systems import System, before_impacts, natural_units
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan
@@ -112,9 +112,7 @@ class Labelling:
         """Which motions are at rest for good in the state of an attractor, (n,); a model with one
         contact has one such state.
         """
-        here = target.distance(ends.last) < SAME_STATE * max(
-            1.0, float(np.abs(target.states).max())
-        )
+        here = target.distance(ends.last) < SAME_STATE * target.size(target.states).max()
         return np.asarray(
             here & (ends.rest | (ends.period == 1))
             if self.system.model.holds_coordinates
@@ -148,7 +146,7 @@ def _on_orbit(target: Target, ends: Recurrence) -> np.ndarray:
     """
     last = ends.states[:, -1]
     q = len(target.states)
-    near = SAME_STATE * np.maximum(1.0, np.abs(last).max(axis=1))
+    near = SAME_STATE * target.size(last)
     here: np.ndarray = (target.distance(last) < near) & (ends.periodic | ends.unsettled)
     rows = np.flatnonzero(here & ends.unsettled)
     here[rows] = False
@@ -214,7 +212,8 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     """
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
-    targets = tuple(Target.from_dict(item) for item in arguments["attractors"])
+    units = natural_units(with_clock(system)).state
+    targets = tuple(Target.from_dict(item, units) for item in arguments["attractors"])
     x, y = arguments["plane"]
     grid = Grid(
         (x, y),

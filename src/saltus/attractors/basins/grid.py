@@ -310,8 +310,8 @@ def basins_of_attraction(
     periods
         The largest number of forcing periods of each motion.
     within
-        The distance from an attractor, as the largest difference of a variable, within which a
-        motion has reached it.
+        The distance from an attractor, as the largest difference of a variable in natural units,
+        within which a motion has reached it.
     curves
         Whether to add the curves at which basins meet, computed by the backward flow (see
         `basin_boundaries`), as `boundary_...` over `boundary_point`, nan between curves.
@@ -438,7 +438,7 @@ def _same(one: Target, other: Target) -> bool:
     apart = other.distance(one.states)
     if other.dense:
         return bool(np.median(apart) < other.grain)
-    return bool(apart.max() < 10.0 * SAME_STATE * (1.0 + np.abs(one.states).max()))
+    return bool(apart.max() < 10.0 * SAME_STATE * (1.0 + one.size(one.states).max()))
 
 
 def _relabelled(new: list[Attractor], known: list[int]) -> list[Attractor]:

@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_count, check_number
 from saltus.flow import Stop, ensemble_from
-from saltus.systems import System, check_system, states_beside
+from saltus.systems import System, check_system, natural_units, states_beside
 
 
 @dataclass(frozen=True)
@@ -32,21 +32,22 @@ class LyapunovSettings:
     batches: int = 16  # The least number of batches from which a standard error is taken.
     # The two-sided 95 % point of Student's t with batches - 1 degrees of freedom.
     student: float = 2.131449545559323
-    # Derivatives grow and shrink by less than 1e6 in this time, a forcing period at Omega = 1.
+    # Derivatives grow and shrink by less than 1e6 in this time, in natural units, a forcing period
+    # at Omega = 1.
     longest_span: float = 6.5
     # The forcing periods after the run within which it is tested whether a motion repeats itself.
     look_back: int = 160
     lossless: float = 1.0 - 1e-14  # A product of impact factors below this counts as below 1.
     # The most motions that one thread follows together: enough to make the cost of a call small.
     largest_group: int = 256
-    # Of two trajectories: far above the error of a period, small enough for the map to be linear.
+    # Of two trajectories, in natural units: far above the error of a period, small enough for the map to be linear.
     distance: float = 1e-7
     # The error of the exponent from two trajectories that their own numerical errors cause.
     accuracy: float = 1e-5
     tolerance: float = 1e-14  # The error of a step of the two trajectories.
     # Derivatives below this share of the largest are 0: contacts or frictions hold that direction.
     rounding: float = 1e-13
-    # The longest time between two renormalisations of a pair of motions, in units of time, but at
+    # The longest time between two renormalisations of a pair of motions, in natural units, but at
     # least a forcing period: with an exponent of 0.3 the distance of neighbours grows by a factor
     # of 2000 in it, to 2e-4.
     pair_span: float = 26.0
@@ -129,21 +130,25 @@ class Estimate:
         averages, errors = ([measure(part) for part in parts] for measure in (average, uncertainty))
         return cls(average(rates), uncertainty(rates), np.stack(averages), np.stack(errors))
 
-    def positive(self, duration: Any) -> np.ndarray:
+    def positive(self, duration: Any, unit: float = 1.0) -> np.ndarray:
         """Whether rates of growth over runs of these durations are above 0 by more than their error
         and the resolution, over the whole run and over both of its halves."""
-        above = self.value - self.error > resolution(duration)
+        above = self.value - self.error > resolution(duration, unit)
         return np.asarray(
             above
-            & (self.halves - self.half_errors > resolution(np.asarray(duration) / 2)).all(axis=0)
+            & (self.halves - self.half_errors > resolution(np.asarray(duration) / 2, unit)).all(
+                axis=0
+            )
         )
 
 
-def resolution(duration: Any) -> Any:
+def resolution(duration: Any, unit: float = 1.0) -> Any:
     """2 ln(t) / t: the mean rate of growth over a run of duration t of a perturbation that grows as
-    the square of the time.
+    the square of the time, which is measured in a natural unit.
     """
-    return np.vectorize(lambda t: 2.0 * math.log(max(t, math.e)) / t, otypes=[float])(duration)
+    return np.vectorize(lambda t: 2.0 * math.log(max(t / unit, math.e)) / t, otypes=[float])(
+        duration
+    )
 
 
 def _largest_standard_error(series: np.ndarray) -> Any:
@@ -175,13 +180,14 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
 
 
 def period_length(system: System) -> float:
-    """The forcing period; under constant loads 1, a unit of time, is taken instead."""
-    return system.load.period or 1.0
+    """The forcing period; under constant loads a natural unit of time, rounded to a power of 2, is
+    taken instead."""
+    return system.load.period or natural_units(system).powers_of_two.time
 
 
-def span_count(length: float) -> int:
+def span_count(length: float, system: System) -> int:
     """Into how many spans a period of this length is cut."""
-    return max(1, math.ceil(length / LYAPUNOV.longest_span))
+    return max(1, math.ceil(length / (LYAPUNOV.longest_span * natural_units(system).own_time)))
 
 
 def first_frame(size: int) -> np.ndarray:
@@ -229,6 +235,7 @@ class Perturbations(ABC):
         self.lengths = np.broadcast_to(2.0 * math.pi / frequency, groups)
         self.columns = {path: np.repeat(values, self.size) for path, values in parameters.items()}
         self.here = states.reshape(-1, d).copy()  # (n, d): nan once a motion is lost
+        self.units = natural_units(system).state  # in which perturbations are measured
         self.direction = np.full_like(self.here, math.sqrt(1.0 / d))
         # ln of the factor by which each has grown; nan once its motion is lost
         self.growth = np.zeros(groups * self.size)
@@ -293,8 +300,8 @@ def stretched(
     periods: int,
     tol: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States, directions and ln of the growth of small perturbations after so many periods; nan
-    where a motion is lost.
+    """States, directions in natural units and ln of the growth of small perturbations after so many
+    periods; nan where a motion is lost.
 
     If a rest, closed contacts or sticking frictions reduce a perturbation to 0, its factor is the
     smallest positive number.
@@ -306,11 +313,12 @@ def stretched(
     if not here.any():
         return later, turned, growth
     chosen = {path: values[here] for path, values in columns.items()}
+    units = natural_units(system).state
     ends = ensemble_from(
         system, states[here], periods, parameters=chosen, tol=tol, until=("rest",), derivatives=True
     )
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        grown = np.einsum("nij,nj->ni", ends.derivatives, direction[here])
+        grown = np.einsum("nij,nj->ni", ends.derivatives, direction[here] * units) / units
         # squares of perturbations that have grown by 1e200 would overflow
         size = np.abs(grown).max(axis=1, keepdims=True)
         length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
@@ -333,7 +341,11 @@ class Neighbours(Perturbations):
         chaotic.
         """
         return np.asarray(
-            np.clip(LYAPUNOV.pair_span / self.lengths[rows], 1, LYAPUNOV.pair_periods).astype(int)
+            np.clip(
+                LYAPUNOV.pair_span * natural_units(self.system).own_time / self.lengths[rows],
+                1,
+                LYAPUNOV.pair_periods,
+            ).astype(int)
         )
 
     def step(self, motions: np.ndarray, periods: int) -> None:
@@ -341,7 +353,7 @@ class Neighbours(Perturbations):
         if not motions.size:
             return
         here = self.here[motions]
-        away = LYAPUNOV.distance * self.direction[motions]
+        away = LYAPUNOV.distance * self.direction[motions] * self.units
         beside = states_beside(self.system, here, away)
         twice = {path: np.tile(values[motions], 2) for path, values in self.columns.items()}
         ends = ensemble_from(
@@ -351,8 +363,10 @@ class Neighbours(Perturbations):
         first, second = ends.last.reshape(2, *here.shape)
         going = moving.reshape(2, -1).all(axis=0) & np.isfinite(first).all(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            factor = np.linalg.norm(second - first, axis=1) / np.linalg.norm(beside - here, axis=1)
-            turned = (second - first) / np.linalg.norm(second - first, axis=1)[:, None]
+            apart = (second - first) / self.units
+            length = np.linalg.norm(apart, axis=1)
+            factor = length / np.linalg.norm((beside - here) / self.units, axis=1)
+            turned = apart / length[:, None]
             growth = np.log(factor)
         weak = np.flatnonzero(going & ~(factor > LYAPUNOV.least_of_pair))
         if weak.size:
@@ -434,14 +448,15 @@ class LargestExponents:
 
     def go_on(self, rows: np.ndarray, periods: int) -> None:
         """Measure the exponents of these groups over so many forcing periods in all."""
-        self.found.put(rows, _averaged(*self._perturbations.rates(rows, periods)))
+        unit = natural_units(self._perturbations.system).time
+        self.found.put(rows, _averaged(*self._perturbations.rates(rows, periods), unit))
 
 
-def _averaged(rates: np.ndarray, duration: np.ndarray) -> Largest:
+def _averaged(rates: np.ndarray, duration: np.ndarray, unit: float) -> Largest:
     """The averages of rates (groups, size) over these times, (groups,); averages within the
     resolution are of neither sign.
     """
-    least = resolution(duration)
+    least = resolution(duration, unit)
     surely = np.abs(rates) > least[:, None]
     grows = surely & (rates > 0.0)
     shrinks = surely & (rates < 0.0)

@@ -27,7 +27,7 @@ from saltus.checks import Numbers
 from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, arguments_of, read_start, states_beside
+from saltus.systems import System, arguments_of, natural_units, read_start, states_beside
 from saltus.taylor import Expr, differentiate, substitute, trace
 
 if TYPE_CHECKING:
@@ -147,19 +147,20 @@ def separation_growth(
     states are the same.
 
     After each period the second state is moved along the line to the first one, back to the
-    distance of 1e-7 (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may
+    distance of 1e-7 in natural units (Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9). The two may
     lie on different sides of the contact, or have different numbers of impacts. Of several
     contacts, those that are closed in the first state are closed in the second.
     """
     here = state
-    away = np.full(here.size, LYAPUNOV.distance / np.sqrt(here.size))
+    units = natural_units(system).state
+    away = units * (LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
         beside = states_beside(system, here, away)
         following = _mapped(system, here, length)
-        before = float(np.linalg.norm(beside - here))
+        before = float(np.linalg.norm((beside - here) / units))
         apart = _mapped(system, beside, length) - following
-        distance = float(np.linalg.norm(apart))
+        distance = float(np.linalg.norm(apart / units))
         if distance == 0.0 or before == 0.0:
             break
         growth[p] = np.log(distance / before)
@@ -213,6 +214,8 @@ class Exponents(Result):
         The state at the end of the run, at phase 0, as arguments of `simulate`.
     note
         Why the exponents are not finite.
+    unit
+        The natural unit of time.
 
     Examples
     --------
@@ -233,6 +236,7 @@ class Exponents(Result):
     largest_condition: float
     state: dict[str, Any]
     note: str | None
+    unit: float = 1.0
 
     @property
     def at_half(self) -> np.ndarray:
@@ -253,7 +257,8 @@ class Exponents(Result):
     @property
     def agrees(self) -> bool:
         """Whether the stroboscopic map has the same largest exponent, to within both error bars."""
-        allowed = math.hypot(float(self.errors[0]), self.stroboscopic_error) + LYAPUNOV.accuracy
+        allowed = math.hypot(float(self.errors[0]), self.stroboscopic_error)
+        allowed += LYAPUNOV.accuracy / self.unit
         return abs(float(self.values[0]) - self.stroboscopic) <= allowed
 
     @property
@@ -261,7 +266,7 @@ class Exponents(Result):
         """2 ln(t) / t after a time t: regular motion, whose perturbations may grow like t^2, may
         show an exponent up to this.
         """
-        return float(resolution(self.duration))
+        return float(resolution(self.duration, self.unit))
 
     @property
     def positive(self) -> bool:
@@ -271,7 +276,7 @@ class Exponents(Result):
         largest = Estimate(
             self.values[0], self.errors[0], self.halves[:, 0], self.half_errors[:, 0]
         )
-        return bool(largest.positive(self.duration))
+        return bool(largest.positive(self.duration, self.unit))
 
     def to_xarray(self) -> xarray.Dataset:
         """`exponent`, its `error` and those of both halves over `index`, and the checks."""
@@ -445,7 +450,7 @@ class _Run:
         for p in range(len(self.areas) if self.note is None else 0):
             self.stretch[p] = 0.0
             self.areas[p] = 0.0
-            for j in range(span_count(self.length)):
+            for j in range(span_count(self.length, self.system)):
                 frame = self._advance(p, j, frame, contraction, tol)
                 if self.note is not None:
                     self.state = begin
@@ -456,7 +461,7 @@ class _Run:
         self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float
     ) -> np.ndarray:
         """Go on over span j of period p; returns the frame at its end, orthonormal again."""
-        span = self.length / span_count(self.length)
+        span = self.length / span_count(self.length, self.system)
         found = sensitivities(
             self.system, **self.state, time=j * span, duration=span, tol=tol, dense=False
         )
@@ -466,7 +471,8 @@ class _Run:
             return frame
         # behind them are the velocities of coordinates of first order, which follow from the rest
         count = len(frame)
-        derivatives = found.state[:count, :count]
+        units = natural_units(self.system).state[:count]
+        derivatives = found.state[:count, :count] * units / units[:, None]
         if not derivatives.any():
             self.note = (
                 "the motion rests at contact, and so do all beside it: nothing is left "
@@ -504,6 +510,7 @@ class _Run:
             largest_condition=self.condition,
             state=self.state,
             note=self.note,
+            unit=natural_units(self.system).time,
         )
 
 

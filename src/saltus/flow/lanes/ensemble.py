@@ -39,7 +39,7 @@ from saltus.flow.lanes.threads import Jobs, Lanes
 from saltus.flow.motion.kernel_state import natural_time
 from saltus.flow.motion.simulate import Clock, clock
 from saltus.progress import Progress, silent
-from saltus.systems import System, check_system, numbers
+from saltus.systems import System, check_system, natural_units, numbers
 from saltus.taylor import record_tables
 
 if TYPE_CHECKING:
@@ -216,6 +216,7 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
         ],
         extrema=Sample.EXTREMA in options.sample,
         from_start=options.from_start,
+        natural_length=natural_units(system).length,
         settle=Until.SETTLED in options.until,
         natural_time=natural_time(system, 0.0),
     )

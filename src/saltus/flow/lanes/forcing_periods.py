@@ -5,6 +5,8 @@ Its compiled part goes into one module with that of `driver.py`.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from saltus.flow.kernel.layout import Mode, Status
@@ -238,7 +240,9 @@ def end_period(lane):
         state[own + d] = lane.ended_velocity[d]
     if lane.mode == Mode.CHATTER:
         state[own] = lane.chatter_speed
-    period, agrees = recurrence_period(states, agreements, done, own)
+    length = lane.settings.natural_length
+    speed = length * (2.0 * math.pi / lane.period_length) if lane.period_length > 0.0 else length
+    period, agrees = recurrence_period(states, agreements, done, own, length, speed)
     lane.recorded_from = -np.inf if agrees else first_recorded(lane)
     return period
 

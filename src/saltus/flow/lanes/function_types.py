@@ -58,7 +58,7 @@ TURNING_RANGE = types.UniTuple(_f, 2)(_f1, _i, _f, _f, _f1)
 TABLES = types.Tuple((_f2, _f4))
 _LIMITS = types.Tuple((_f, _f, _f, types.UniTuple(_f, 4)))
 _SIZES = named_tuple(LaneSizes, *(25 * (_i,)), _i1, _i1)
-_SETTINGS = named_tuple(LaneSettings, _f, _f, _f, _f, _LIMITS, _LIMITS)
+_SETTINGS = named_tuple(LaneSettings, _f, _f, _f, _f, _LIMITS, _LIMITS, _f)
 _WORK = named_tuple(Work, _f2, _records(JOB), _f2, TABLES, _f2, _records(END), _f2, _f3, _i1)
 _SOLVER = named_tuple(SolverArrays, _f1, *4 * (_f2,), *13 * (_f1,), _f2)
 

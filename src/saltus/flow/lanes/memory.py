@@ -202,6 +202,7 @@ class LaneSettings(NamedTuple):
     slowest_impact: float
     limits: tuple[Any, ...]  # `step_limits` of the coordinates
     column_limits: tuple[Any, ...]  # of the tangent's columns
+    natural_length: float  # in which states that recur are compared
 
 
 ROW = np.dtype(

@@ -27,7 +27,8 @@ from saltus.taylor.vectors import WIDTH
 
 # --- compiled from here on ---------------------------------------------------
 
-# largest distance of two states, relative to their size or to 1, at which they count as one
+# largest distance of two states, relative to their size or to natural units, at which they count
+# as one
 RECURRENT = 1e-10
 # largest distance, in units of RECURRENT, at which two states may still approach one another
 NEARLY_RECURRENT = 1e4
@@ -248,7 +249,7 @@ def keep_ended(lanes, past):
 
 
 @lean_jit
-def recurrence_period(states, agreements, done, own):
+def recurrence_period(states, agreements, done, own, length, speed):
     """The period of a trajectory that repeats itself, in forcing periods, or 0; and whether its
     last state agrees with an earlier one.
 
@@ -256,8 +257,14 @@ def recurrence_period(states, agreements, done, own):
     states in a row agree with those q forcing periods before; the smallest such q counts. As long
     as states a divisor of q apart are still near to one another, 0 is returned, because the
     trajectory may be approaching a recurrence with this shorter period.
+
+    Coordinates are compared in the largest of them, or in the natural `length` where that is
+    larger; velocities in the same size times `speed` / `length`, or in the largest of them.
     """
     here = states[done % (2 * LONGEST_RECURRENCE)]
+    size = 1.0
+    for i in range(own):
+        size = max(size, max(abs(here[i]) / length, abs(here[own + i]) / speed))
     found = 0
     near = 0
     agrees = False
@@ -267,7 +274,7 @@ def recurrence_period(states, agreements, done, own):
         close = True
         for i in range(2 * own):
             apart = abs(here[i] - there[i])
-            allowed = RECURRENT * max(1.0, abs(here[i]))
+            allowed = RECURRENT * size * (length if i < own else speed)
             if not apart <= allowed:
                 same = False
                 if not apart <= NEARLY_RECURRENT * allowed:

@@ -170,6 +170,7 @@ class Lanes:
     extrema: bool  # whether extrema are recorded
     # whether from the start of a motion, not only in the forcing periods that are kept
     from_start: bool
+    natural_length: float  # in which states that recur are compared
     settle: bool  # whether a trajectory ends when it repeats itself
     natural_time: float  # of trajectories without a forcing period
 
@@ -371,7 +372,8 @@ class Lanes:
         order = lane_order(self.tol)
         slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
         limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
-        return LaneSettings(self.tol, self.natural_time, SHORTEST, slowest, *limits)
+        scales = self.natural_time, SHORTEST, slowest
+        return LaneSettings(self.tol, *scales, *limits, self.natural_length)
 
     def _code(self) -> Code:
         """The functions of the structure."""

@@ -24,7 +24,7 @@ from saltus.flow.long_time.load_release import load_releases
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import state_names
 from saltus.progress import Progress, silent
-from saltus.systems import System
+from saltus.systems import System, natural_units
 
 if TYPE_CHECKING:
     import xarray
@@ -153,7 +153,7 @@ class RecurrenceSettings:
     # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in
     # flow/lanes/memory.py). A motion has settled with the period q if 2 q + 2 successive states
     # agree with those q forcing periods before to within `RECURRENT` (same file): 1e-10 of their
-    # size, or of 1 where they are smaller.
+    # size, or of natural units where they are smaller.
     compiled_max_period: int = 16
     # Longer periods are looked for in the last states of a motion that was followed to the end: the
     # states of one period must agree with those of the period before to within this. It is larger
@@ -399,8 +399,9 @@ def find_recurrence(
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
     if found.extrema is not None and not options.from_start:
         found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
+    units = natural_units(system).state
     found = _with_periods(
-        found, result.recurrence_period if stop_early else None, max_period, settings
+        found, result.recurrence_period if stop_early else None, max_period, settings, units
     )
     if not beside:
         return found
@@ -460,29 +461,34 @@ def last_states(system: System, result: xarray.Dataset) -> np.ndarray:
     )
 
 
-def return_distances(states: np.ndarray, max_period: int) -> np.ndarray:
+def return_distances(states: np.ndarray, max_period: int, units: Any = 1.0) -> np.ndarray:
     """The distance of the last of the states (..., kept, d) from those q = 1, 2, ... periods
-    before, (..., max_period or fewer)."""
+    before, in units of the state variables (d,), (..., max_period or fewer)."""
     count = min(max_period, states.shape[-2] - 1)
-    apart = np.abs(states[..., -1:, :] - states[..., -1 - count : -1, :]).max(axis=-1)
+    apart = states[..., -1:, :] - states[..., -1 - count : -1, :]
+    apart = np.abs(apart / units).max(axis=-1)
     return np.asarray(apart[..., ::-1])
 
 
 def return_period(
-    states: np.ndarray, max_period: int, within: float = RECURRENCE.near_return
+    states: np.ndarray,
+    max_period: int,
+    within: Any = RECURRENCE.near_return,
+    units: Any = 1.0,
 ) -> np.ndarray:
     """The shortest period after which the last of the states (..., kept, d) has come back to within
-    a distance; 0 if none has.
+    a distance, in units of the state variables (d,); 0 if none has.
     """
-    near = return_distances(states, max_period) < within
+    near = return_distances(states, max_period, units) < within
     if not near.shape[-1]:  # one state alone
         return np.zeros(near.shape[:-1], dtype=int)
     return np.where(near.any(axis=-1), 1 + np.argmax(near, axis=-1), 0)
 
 
-def nearest_return(states: np.ndarray, max_period: int) -> int:
-    """The period after which the last of the states (kept, d) is nearest to an earlier one."""
-    return 1 + int(np.argmin(return_distances(states, max_period)))
+def nearest_return(states: np.ndarray, max_period: int, units: Any = 1.0) -> int:
+    """The period after which the last of the states (kept, d) is nearest to an earlier one, in
+    units of the state variables (d,)."""
+    return 1 + int(np.argmin(return_distances(states, max_period, units)))
 
 
 def _read(result: EnsembleResult) -> Recurrence:
@@ -529,7 +535,11 @@ def _rest_lasts(system: System) -> bool:
 
 
 def _with_periods(
-    found: Recurrence, compiled: Any, max_period: int, settings: RecurrenceSettings
+    found: Recurrence,
+    compiled: Any,
+    max_period: int,
+    settings: RecurrenceSettings,
+    units: np.ndarray,
 ) -> Recurrence:
     """The results with the periods that the compiled lanes have found, or that the kept states
     show.
@@ -537,12 +547,12 @@ def _with_periods(
     outcome = found.outcome.copy()
     period = found.period.copy()
     if compiled is None:
-        period[:] = return_period(found.states, max_period, settings.near_return)
+        period[:] = return_period(found.states, max_period, settings.near_return, units)
     else:
         period[:] = np.where(compiled <= max_period, compiled, 0)
         longer = found.unsettled & (period == 0) & (max_period > settings.compiled_max_period)
         for row in np.flatnonzero(longer):
-            period[row] = _long_period(found.states[row], max_period, settings)
+            period[row] = _long_period(found.states[row] / units, max_period, settings)
     period[~found.unsettled] = 0
     outcome[period > 0] = Ending.PERIODIC
     return replace(found, outcome=outcome, period=period)

@@ -725,7 +725,7 @@ class ContactsEquations(OrbitEquations):
         without speed, up to rounding.
         """
         for place, value in held_values(
-            self.system_at(values), state, TOLERANCES.touch, closed
+            self.system_at(values), state, TOLERANCES.touch, closed, self.natural.state
         ).items():
             state[place] = value
         return state

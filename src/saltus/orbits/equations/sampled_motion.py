@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.flow import EventCode, EventKind, Motion, contact_pull, modes_of
-from saltus.systems import System, reactions, stick_margins
+from saltus.systems import System, natural_units, reactions, stick_margins
 
 # in each step; minima of parabolas through them have errors of the fourth power of their distance
 SAMPLES = 33
@@ -25,7 +25,8 @@ MOST_ORDER = 24  # the highest order of a step's series
 # Events nearer to each other than this share of the period happen at one instant, and steps between
 # them are left out.
 ONE_INSTANT = 1e-9
-DYING = 1e-5  # Slower impacts are not listed: they belong to an accumulation.
+# Slower impacts, in natural units, are not listed: they belong to an accumulation.
+DYING = 1e-5
 
 SHARES = np.linspace(0.0, 1.0, SAMPLES)
 ORDERS = np.arange(MOST_ORDER + 1)
@@ -245,7 +246,8 @@ class ContactModes(SideModes):
         """Without those of accumulations."""
         impacts = motion.impacts
         speeds = self._closing_speeds(motion.impacts)
-        contact, impact = np.nonzero((speeds > DYING) & np.isfinite(speeds))
+        slowest = DYING * natural_units(self.system).speed
+        contact, impact = np.nonzero((speeds > slowest) & np.isfinite(speeds))
         found = np.column_stack([impacts.time[impact], speeds[contact, impact]])
         return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 

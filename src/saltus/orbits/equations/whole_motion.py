@@ -60,7 +60,8 @@ from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, substitute
 from saltus.taylor import FREQUENCY
 
-# A contact is closed at the section if its gap and the gap's rate are smaller than this there.
+# A contact is closed at the section if its gap and the gap's rate are smaller than this there, in
+# natural units.
 CLOSED = 1e-9
 
 
@@ -226,7 +227,8 @@ class WholeMotionEquations(OrbitEquations):
 
     def held(self, unknowns: np.ndarray, system: System) -> dict[int, float]:
         """The state variables that are fixed at the section, up to rounding, with their values."""
-        return held_values(system, self._completed(unknowns, system), CLOSED)
+        state = self._completed(unknowns, system)
+        return held_values(system, state, CLOSED, units=self.natural.state)
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
         """The state at the section, in which contacts that are closed, and frictions that stick, up

@@ -38,6 +38,7 @@ from saltus.systems import (
     check_path,
     check_system,
     held_by_contacts,
+    natural_units,
     on_this_side,
     read_start,
     state_of,
@@ -224,9 +225,11 @@ def _returning(
 ) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
     states = _stroboscopic_states(system, state, period or max_period)[::-1]
+    units = natural_units(system).state
     if period is None:
-        return int(return_period(states, max_period)) or None
-    return period if return_distances(states, period)[-1] < RECURRENCE.near_return else None
+        return int(return_period(states, max_period, units=units)) or None
+    near = return_distances(states, period, units)[-1] < RECURRENCE.near_return
+    return period if near else None
 
 
 def _period_of(system: System, state: dict[str, Any], period: int | None, max_period: int) -> int:
@@ -235,7 +238,8 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     """
     if period is not None:
         return period
-    return nearest_return(_stroboscopic_states(system, state, max_period)[::-1], max_period)
+    states = _stroboscopic_states(system, state, max_period)[::-1]
+    return nearest_return(states, max_period, natural_units(system).state)
 
 
 def _polish(
@@ -360,9 +364,10 @@ def orbits_near_returns(
         returned again.
     """
     found: list[tuple[int, PeriodicOrbit]] = []
+    units = natural_units(system).state
     known = [other.reshape(-1, system.dimension) for other in known]
     for period in range(1, min(max_period, states.shape[2] - 1) + 1):
-        guesses = [_guesses(at_value, period) for at_value in states]
+        guesses = [_guesses(at_value, period, units) for at_value in states]
         rows = np.repeat(np.arange(len(values)), [len(at_value) for at_value in guesses])
         begin = np.concatenate(system.to_gaps(0.0, *np.split(np.concatenate(guesses).T, 2))).T
         improved, good = _improved(system.in_gap_coordinates, path, values[rows], begin, period)
@@ -370,7 +375,7 @@ def orbits_near_returns(
         for row, state in zip(rows[good].tolist(), improved[good], strict=True):
             if (
                 len(known[row])
-                and np.abs(known[row] - state).max(axis=1).min() < NEAR_RETURNS.same_state
+                and np.abs((known[row] - state) / units).max(axis=1).min() < NEAR_RETURNS.same_state
             ):
                 continue
             known[row] = np.concatenate([known[row], state[None]])
@@ -393,17 +398,17 @@ def solved_near(system: System, path: str, state: np.ndarray, period: int) -> Pe
         orbit = orbit_from(equations_of(system, Signature((), 1), (path,)), start, period)
     except MotionError:
         return None
-    return (
-        orbit
-        if orbit is not None and orbit.admissible and orbit.amplitude > NEAR_RETURNS.still
-        else None
-    )
+    if orbit is None or not orbit.admissible:
+        return None
+    still = NEAR_RETURNS.still * orbit.equations.natural.length
+    return orbit if orbit.amplitude > still else None
 
 
-def _guesses(states: np.ndarray, period: int) -> np.ndarray:
+def _guesses(states: np.ndarray, period: int, units: np.ndarray) -> np.ndarray:
     """The states (k, d) at which motions (n, kept, d) nearly return after `period`, without
-    repeating themselves; nearest first."""
-    distance = np.abs(states[:, period:] - states[:, :-period]).max(axis=2).ravel()
+    repeating themselves, in units of the state variables; nearest first."""
+    apart = (states[:, period:] - states[:, :-period]) / units
+    distance = np.abs(apart).max(axis=2).ravel()
     begin = states[:, :-period].reshape(-1, states.shape[-1])
     chosen = begin[:0]
     for i in np.flatnonzero(distance < NEAR_RETURNS.near)[
@@ -411,7 +416,8 @@ def _guesses(states: np.ndarray, period: int) -> np.ndarray:
     ]:
         if len(chosen) >= NEAR_RETURNS.guesses:
             break
-        again = len(chosen) and np.abs(begin[i] - chosen).max(axis=1).min() < NEAR_RETURNS.apart
+        beside = np.abs((begin[i] - chosen) / units).max(axis=1)
+        again = len(chosen) and beside.min() < NEAR_RETURNS.apart
         if distance[i] > RECURRENCE.near_return and not again:
             chosen = np.concatenate([chosen, begin[i : i + 1]])
     return chosen
@@ -424,13 +430,14 @@ def _improved(
     converged.
     """
     states, active, good = states.copy(), np.arange(len(states)), np.zeros(len(states), dtype=bool)
+    units = natural_units(system).state
     for _ in range(NEAR_RETURNS.iterations):
         if not active.size:
             break
         ends, slope = _mapped(system, path, values[active], states[active], period)
         apart = ends - states[active]
         sound = np.isfinite(slope).all(axis=(1, 2)) & np.isfinite(apart).all(axis=1)
-        good[active] = sound & (np.abs(apart).max(axis=1) < NEAR_RETURNS.converged)
+        good[active] = sound & (np.abs(apart / units).max(axis=1) < NEAR_RETURNS.converged)
         going = sound & ~good[active]
         active, apart, slope = active[going], apart[going], slope[going]
         steps = [
@@ -438,10 +445,8 @@ def _improved(
             for d, a in zip(slope, apart, strict=True)
         ]
         step = np.array(steps).reshape(-1, states.shape[1])
-        step = (
-            step
-            / np.maximum(1.0, np.abs(step).max(axis=1, initial=0.0) / NEAR_RETURNS.longest)[:, None]
-        )
+        longest = np.abs(step / units).max(axis=1, initial=0.0)
+        step = step / np.maximum(1.0, longest / NEAR_RETURNS.longest)[:, None]
         states[active] = states_beside(system, states[active], step)
     return states, np.flatnonzero(good)
 

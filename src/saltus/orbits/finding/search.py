@@ -27,6 +27,7 @@ from saltus.systems import (
     check_window,
     initial_states,
     is_still,
+    natural_units,
     rest_state,
 )
 
@@ -294,7 +295,7 @@ def _moving(system: System, late: Recurrence, rows: np.ndarray) -> tuple[np.ndar
     alive = rows[np.isfinite(late.states[rows]).all(axis=(1, 2))]
     high = late.extrema[alive, :, 0].max(axis=1, initial=-np.inf)
     low = late.extrema[alive, :, 1].min(axis=1, initial=np.inf)
-    moving = alive[~is_still(system, high, low, NEAR_RETURNS.still)]
+    moving = alive[~is_still(system, high, low, NEAR_RETURNS.still * natural_units(system).length)]
     return moving, len(alive) - len(moving)
 
 
@@ -310,7 +311,8 @@ def _attracting(
     for states, period, highest, lowest in zip(
         late.states, late.period.tolist(), late.highest, late.lowest, strict=True
     ):
-        if known.size and np.abs(known - states[-1]).max(axis=1).min() < NEAR_RETURNS.same_state:
+        apart = np.abs((known - states[-1]) / natural_units(system).state)
+        if known.size and apart.max(axis=1).min() < NEAR_RETURNS.same_state:
             continue
         if not period:
             unsettled += 1
