@@ -64,12 +64,15 @@ class NaturalUnits:
         The inertia of each coordinate, (n,): the entry of the mass matrix, 1 where there is none.
     own_time
         The time in which the system moves by itself, sqrt(d / a), at most `time`.
+    free_time
+        The time of its free oscillation, 1 / sqrt(abs(J)), or `time` without a stiffness.
     """
 
     lengths: np.ndarray
     time: float
     masses: np.ndarray
     own_time: float
+    free_time: float
 
     @property
     def length(self) -> float:
@@ -101,12 +104,19 @@ class NaturalUnits:
         """The units of a state, coordinates and then velocities, (2 n,)."""
         return np.concatenate([self.lengths, self.speeds])
 
+    @cached_property
+    def perturbation(self) -> np.ndarray:
+        """The units of a perturbation of a state, (2 n,): in these the free oscillation of one
+        coordinate is a circle, on which its length does not oscillate."""
+        return np.concatenate([self.lengths, self.lengths / self.free_time])
+
     @property
     def powers_of_two(self) -> NaturalUnits:
         """These units rounded to the nearest powers of 2, so that scaling by them is exact."""
         lengths, masses = (np.exp2(np.round(np.log2(x))) for x in (self.lengths, self.masses))
-        own_time = _power_of_two(self.own_time)
-        return NaturalUnits(lengths, _power_of_two(self.time), masses, own_time)
+        times = (self.time, self.own_time, self.free_time)
+        time, own_time, free_time = map(_power_of_two, times)
+        return NaturalUnits(lengths, time, masses, own_time, free_time)
 
 
 def natural_units(system: System) -> NaturalUnits:
@@ -160,7 +170,9 @@ def _found(system: System) -> NaturalUnits:
     lengths = np.where(angular, 1.0, lengths)
     sound = np.isfinite(lengths) & (lengths > 0.0)
     own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
-    return NaturalUnits(np.where(sound, lengths, 1.0), time, _masses(model), own_time)
+    free_time = 1.0 / math.sqrt(stiffest) if stiffest > 0.0 else time
+    lengths = np.where(sound, lengths, 1.0)
+    return NaturalUnits(lengths, time, _masses(model), own_time, free_time)
 
 
 def _places(model: Any) -> Iterator[np.ndarray]:

@@ -130,7 +130,7 @@ class Estimate:
         averages, errors = ([measure(part) for part in parts] for measure in (average, uncertainty))
         return cls(average(rates), uncertainty(rates), np.stack(averages), np.stack(errors))
 
-    def positive(self, duration: Any, unit: float = 1.0) -> np.ndarray:
+    def positive(self, duration: Any, unit: Any = 1.0) -> np.ndarray:
         """Whether rates of growth over runs of these durations are above 0 by more than their error
         and the resolution, over the whole run and over both of its halves."""
         above = self.value - self.error > resolution(duration, unit)
@@ -142,12 +142,12 @@ class Estimate:
         )
 
 
-def resolution(duration: Any, unit: float = 1.0) -> Any:
+def resolution(duration: Any, unit: Any = 1.0) -> Any:
     """2 ln(t) / t: the mean rate of growth over a run of duration t of a perturbation that grows as
     the square of the time, which is measured in a natural unit.
     """
-    return np.vectorize(lambda t: 2.0 * math.log(max(t / unit, math.e)) / t, otypes=[float])(
-        duration
+    return np.vectorize(lambda t, unit: 2.0 * math.log(max(t / unit, math.e)) / t, otypes=[float])(
+        duration, unit
     )
 
 
@@ -185,9 +185,9 @@ def period_length(system: System) -> float:
     return system.load.period or natural_units(system).powers_of_two.time
 
 
-def span_count(length: float, system: System) -> int:
-    """Into how many spans a period of this length is cut."""
-    return max(1, math.ceil(length / (LYAPUNOV.longest_span * natural_units(system).own_time)))
+def span_count(length: float, unit: float = 1.0) -> int:
+    """Into how many spans a period of this length is cut, with a natural unit of time."""
+    return max(1, math.ceil(length / (LYAPUNOV.longest_span * unit)))
 
 
 def first_frame(size: int) -> np.ndarray:
@@ -235,7 +235,7 @@ class Perturbations(ABC):
         self.lengths = np.broadcast_to(2.0 * math.pi / frequency, groups)
         self.columns = {path: np.repeat(values, self.size) for path, values in parameters.items()}
         self.here = states.reshape(-1, d).copy()  # (n, d): nan once a motion is lost
-        self.units = natural_units(system).state  # in which perturbations are measured
+        self.units = natural_units(system).perturbation  # in which perturbations are measured
         self.direction = np.full_like(self.here, math.sqrt(1.0 / d))
         # ln of the factor by which each has grown; nan once its motion is lost
         self.growth = np.zeros(groups * self.size)
@@ -313,7 +313,7 @@ def stretched(
     if not here.any():
         return later, turned, growth
     chosen = {path: values[here] for path, values in columns.items()}
-    units = natural_units(system).state
+    units = natural_units(system).perturbation
     ends = ensemble_from(
         system, states[here], periods, parameters=chosen, tol=tol, until=("rest",), derivatives=True
     )
@@ -448,11 +448,11 @@ class LargestExponents:
 
     def go_on(self, rows: np.ndarray, periods: int) -> None:
         """Measure the exponents of these groups over so many forcing periods in all."""
-        unit = natural_units(self._perturbations.system).time
+        unit = self._perturbations.lengths[rows] / (2.0 * math.pi)
         self.found.put(rows, _averaged(*self._perturbations.rates(rows, periods), unit))
 
 
-def _averaged(rates: np.ndarray, duration: np.ndarray, unit: float) -> Largest:
+def _averaged(rates: np.ndarray, duration: np.ndarray, unit: np.ndarray) -> Largest:
     """The averages of rates (groups, size) over these times, (groups,); averages within the
     resolution are of neither sign.
     """

@@ -38,7 +38,7 @@ from saltus.flow import (
 )
 from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
 from saltus.result import provenance
-from saltus.systems import System, natural_units
+from saltus.systems import System
 
 if TYPE_CHECKING:
     import xarray
@@ -73,7 +73,7 @@ def stretch_many(
     result = Stretched(
         np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan)
     )
-    counts = np.array([span_count(length, system) for length in lengths])
+    counts = np.array([span_count(length) for length in lengths])
     groups = [
         group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))
     ]
@@ -343,7 +343,7 @@ def _measures(
         growth = np.where((captured & lossy)[None, :, None], -np.inf, growth)
     found = Estimate.of(growth / run.lengths[None, :, None])
     duration = len(growth) * run.lengths
-    unit = natural_units(system).time
+    unit = run.lengths / (2.0 * math.pi)  # 1 / Omega of each motion
     # Contacts and frictions that hold a coordinate for a while make an exponent -inf also where the
     # motion goes on.
     rested = captured | (
@@ -356,7 +356,7 @@ def _measures(
         "later_half": found.halves[1],
         "error": found.error,
         "resolution": resolution(duration, unit),
-        "positive": found.positive(duration[:, None], unit)[:, 0],
+        "positive": found.positive(duration[:, None], unit[:, None])[:, 0],
         "ending": np.where(
             rested, Ending.REST, np.where(moving, Ending.UNDECIDED, Ending.ENDED)
         ).astype(np.int8),

@@ -152,7 +152,7 @@ def separation_growth(
     contacts, those that are closed in the first state are closed in the second.
     """
     here = state
-    units = natural_units(system).state
+    units = natural_units(system).perturbation
     away = units * (LYAPUNOV.distance / np.sqrt(here.size))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
@@ -450,7 +450,7 @@ class _Run:
         for p in range(len(self.areas) if self.note is None else 0):
             self.stretch[p] = 0.0
             self.areas[p] = 0.0
-            for j in range(span_count(self.length, self.system)):
+            for j in range(span_count(self.length, natural_units(self.system).own_time)):
                 frame = self._advance(p, j, frame, contraction, tol)
                 if self.note is not None:
                     self.state = begin
@@ -461,7 +461,7 @@ class _Run:
         self, p: int, j: int, frame: np.ndarray, contraction: Contraction, tol: float
     ) -> np.ndarray:
         """Go on over span j of period p; returns the frame at its end, orthonormal again."""
-        span = self.length / span_count(self.length, self.system)
+        span = self.length / span_count(self.length, natural_units(self.system).own_time)
         found = sensitivities(
             self.system, **self.state, time=j * span, duration=span, tol=tol, dense=False
         )
@@ -471,7 +471,7 @@ class _Run:
             return frame
         # behind them are the velocities of coordinates of first order, which follow from the rest
         count = len(frame)
-        units = natural_units(self.system).state[:count]
+        units = natural_units(self.system).perturbation[:count]
         derivatives = found.state[:count, :count] * units / units[:, None]
         if not derivatives.any():
             self.note = (
