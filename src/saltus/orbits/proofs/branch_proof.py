@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -219,7 +219,7 @@ def prove_branch(
     )
 
 
-def _runs(points: list[OrbitPoint]) -> Iterator[tuple[int, int]]:
+def _runs(points: Sequence[OrbitPoint]) -> Iterator[tuple[int, int]]:
     """The numbers of the first and last points of one signature, without those at a grazing."""
     start: int | None = None
     for i, point in enumerate(points):
@@ -445,7 +445,7 @@ def _row_along(shooting: Shooting, x: np.ndarray, tangent: np.ndarray) -> np.nda
     row[:count] = along[:count]
     row[-1] = along[-1]
     row /= np.linalg.norm(row)
-    return row if float(along @ tangent) > 0.0 else -row
+    return np.asarray(row if float(along @ tangent) > 0.0 else -row)
 
 
 def _tangent(shooting: Shooting, x: np.ndarray, row: np.ndarray) -> np.ndarray | None:
