@@ -289,17 +289,17 @@ def _acceleration(model: Any, t: float, q: list[Any], side: int, load: Any) -> n
 def _slopes(model: Any, place: np.ndarray, side: int, load: Any) -> np.ndarray:
     """J = da/dq at rest, (n, n), 0 where it is not known."""
     size = len(place)
-    slopes = np.zeros((size, size))
     still = 0.0 if size == 1 else (0.0,) * size
-    for column in range(size):
-        q = [Jet(x, float(i == column)) for i, x in enumerate(place.tolist())]
-        try:
-            value = model.acceleration(0.0, q[0] if size == 1 else tuple(q), still, side, load)
-            slopes[:, column] = [
-                float(x.first) if isinstance(x, Jet) else 0.0 for x in each_of(value)
-            ]
-        except Exception:  # a user's own code may raise anything
-            continue
+    # all columns at once, or those of many coordinates would take seconds
+    q = [Jet(x, row) for x, row in zip(place.tolist(), np.eye(size), strict=True)]
+    slopes = np.zeros((size, size))
+    try:
+        value = model.acceleration(0.0, q[0] if size == 1 else tuple(q), still, side, load)
+        for i, x in enumerate(each_of(value)):
+            if isinstance(x, Jet):
+                slopes[i] = x.first
+    except Exception:  # a user's own code may raise anything
+        return np.zeros((size, size))
     return np.where(np.isfinite(slopes), slopes, 0.0)
 
 
