@@ -332,7 +332,7 @@ class _Walk:
         there = float(following.solution.values[0])
         if there == here:
             return row
-        return row * np.sign(there - here)
+        return np.asarray(row * np.sign(there - here))
 
     def _next(
         self, shooting: Shooting, start: Ball, tangent: np.ndarray, half: float
