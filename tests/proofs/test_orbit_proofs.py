@@ -152,7 +152,7 @@ def test_the_readme_s_orbit_is_proved_with_the_multipliers_of_the_flow(
 def test_a_theorem_holds_within_radii_of_the_numbers(
     metainterface: saltus.PeriodicOrbit,
 ) -> None:
-    wide = saltus.prove(metainterface, within={"model.damping": 1e-6})
+    wide = saltus.prove(metainterface, radii={"model.damping": 1e-6})
     assert wide.proved
     moved = saltus.prove(
         saltus.find_orbit(metainterface.system.with_({"model.damping": 0.1 + 9e-7}), theta=0.3)
@@ -236,8 +236,8 @@ def test_what_cannot_be_proved_says_why() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"within": {"model.dampin": 1e-3}}, "no number of the system"),
-        ({"within": {"model.damping": -1.0}}, "0 or more"),
+        ({"radii": {"model.dampin": 1e-3}}, "no number of the system"),
+        ({"radii": {"model.damping": -1.0}}, "0 or more"),
         ({"step": 0.0}, "step must lie in"),
         ({"order": 2}, "order"),
     ],

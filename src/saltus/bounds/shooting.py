@@ -262,7 +262,7 @@ class Shooting:
         The forcing periods after which the last segment ends.
     path
         The parameter to which derivatives are taken.
-    within
+    radii
         How far each number of the system may lie from its double, by its path.
     pins
         Rows c and numbers d; with them the parameter at `path` is unknown.
@@ -272,7 +272,7 @@ class Shooting:
     Raises
     ------
     ParameterError
-        `within` names no number of the system, or has a negative radius.
+        `radii` names no number of the system, or has a negative radius.
     """
 
     def __init__(
@@ -283,7 +283,7 @@ class Shooting:
         span: float,
         *,
         path: str | None = None,
-        within: dict[str, float] | None = None,
+        radii: dict[str, float] | None = None,
         pins: Sequence[tuple[np.ndarray, float]] | None = None,
         free_time: bool = True,
         settings: ShootingSettings | None = None,
@@ -297,7 +297,7 @@ class Shooting:
         self.free_time = free_time
         names = [name for name, _ in numbers(system)]
         middles = np.array([float(value) for _, value in numbers(system)])
-        self.parameters = Ball(middles, _radii(names, within or {}))
+        self.parameters = Ball(middles, _radii(names, radii or {}))
         self.path_place = None if path is None else names.index(path)
         self.frequency_place = names.index(FREQUENCY)
         self.pins = None if pins is None else list(pins)
@@ -706,17 +706,17 @@ def _joined(first: Ball, second: Ball) -> Ball:
     )
 
 
-def _radii(names: list[str], within: dict[str, float]) -> np.ndarray:
+def _radii(names: list[str], radii: dict[str, float]) -> np.ndarray:
     """The radius of each number."""
-    for name, radius in within.items():
+    for name, radius in radii.items():
         if name not in names:
             raise ParameterError(
-                f"within names {name!r}, which is no number of the system; it has "
+                f"radii names {name!r}, which is no number of the system; it has "
                 f"{', '.join(names)}",
-                "within",
+                "radii",
             )
         if not (np.isfinite(radius) and radius >= 0.0):
             raise ParameterError(
-                f"within[{name!r}] must be a radius, 0 or more, got {radius!r}", f"within.{name}"
+                f"radii[{name!r}] must be a radius, 0 or more, got {radius!r}", f"radii.{name}"
             )
-    return np.array([float(within.get(name, 0.0)) for name in names])
+    return np.array([float(radii.get(name, 0.0)) for name in names])

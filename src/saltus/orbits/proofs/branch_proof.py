@@ -180,7 +180,7 @@ def _of_piece(piece: ProvedPiece, path: str) -> str:
 
 def prove_branch(
     branch: Branch,
-    within: dict[str, float] | None = None,
+    radii: dict[str, float] | None = None,
     steps: ShootingSettings | None = None,
     most_boxes: int = 2000,
     progress: Progress = silent,
@@ -197,7 +197,7 @@ def prove_branch(
         if left <= 0:
             reasons.append(f"points {first} to {last}: {most_boxes} boxes were used up")
             continue
-        walked = _Walk(branch, first, last, path, within, steps).walk(left)
+        walked = _Walk(branch, first, last, path, radii, steps).walk(left)
         progress((last + 1) / len(points), "points of the branch proved")
         if isinstance(walked, str):
             reasons.append(f"points {first} to {last}: {walked}")
@@ -243,14 +243,14 @@ class _Walk:
         first: int,
         last: int,
         path: str,
-        within: dict[str, float] | None,
+        radii: dict[str, float] | None,
         steps: ShootingSettings | None,
     ) -> None:
         self.points = branch.points
         self.first = first
         self.last = last
         self.path = path
-        self.within = within
+        self.radii = radii
         self.steps = steps
         self.boxes: list[ProvedBox] = []
 
@@ -311,7 +311,7 @@ class _Walk:
             made.guess,
             orbit.signature.span,
             path=self.path,
-            within=self.within,
+            radii=self.radii,
             pins=[],
             free_time=made.free_time,
             settings=self.steps,

@@ -104,7 +104,7 @@ class OrbitProof(Result):
     steps: int
     seconds: float
     orbit: PeriodicOrbit = field(repr=False)
-    within: dict[str, float] = field(default_factory=dict, repr=False)
+    radii: dict[str, float] = field(default_factory=dict, repr=False)
     shooting: Shooting | None = field(default=None, repr=False)
     zero: ProvedZero | None = field(default=None, repr=False)
 
@@ -142,9 +142,9 @@ class OrbitProof(Result):
             "Its contact is open between the impacts." if impacts else "Its contact stays open.",
             _of_stability(self.stable, self.moduli),
         ]
-        if self.within:
+        if self.radii:
             radii = ", ".join(
-                f"{name} within {rounded_up(radius)}" for name, radius in self.within.items()
+                f"{name} within {rounded_up(radius)}" for name, radius in self.radii.items()
             )
             told.append(f"This holds for every {radii} of its double.")
         return " ".join(part for part in told if part)
@@ -191,7 +191,7 @@ class OrbitProof(Result):
 
 def prove_orbit(
     orbit: PeriodicOrbit,
-    within: dict[str, float] | None = None,
+    radii: dict[str, float] | None = None,
     steps: ShootingSettings | None = None,
 ) -> OrbitProof:
     """The proof of an orbit; `prove` says what it is."""
@@ -199,7 +199,7 @@ def prove_orbit(
     made = orbit.equations.segments_to_prove(orbit.solution)
     if isinstance(made, CannotProve):
         return _without_zero(orbit, made.reason, began)
-    shooting = shooting_of(orbit, made, within=within, settings=steps)
+    shooting = shooting_of(orbit, made, radii=radii, settings=steps)
     zero = prove_zero(shooting)
     if isinstance(zero, NotProved):
         return _without_zero(orbit, zero.reason, began, shooting)
@@ -213,7 +213,7 @@ def prove_orbit(
         opened = False
         reason = "an impact was not shown to have a speed"
     return _proof(
-        orbit, shooting, zero, multipliers, opened, refuted is not None, reason, within, began
+        orbit, shooting, zero, multipliers, opened, refuted is not None, reason, radii, began
     )
 
 
@@ -222,7 +222,7 @@ def shooting_of(
     made: OrbitSegments,
     *,
     path: str | None = None,
-    within: dict[str, float] | None = None,
+    radii: dict[str, float] | None = None,
     guess: np.ndarray | None = None,
     pins: list[tuple[np.ndarray, float]] | None = None,
     settings: ShootingSettings | None = None,
@@ -234,7 +234,7 @@ def shooting_of(
         made.guess if guess is None else guess,
         orbit.signature.span,
         path=path,
-        within=within,
+        radii=radii,
         pins=pins,
         free_time=made.free_time,
         settings=settings,
@@ -270,7 +270,7 @@ def _proof(
     opened: bool,
     refuted: bool,
     reason: str,
-    within: dict[str, float] | None,
+    radii: dict[str, float] | None,
     began: float,
 ) -> OrbitProof:
     events = zero.box[: shooting.event_unknowns].reshape(-1, shooting.event_size)
@@ -290,7 +290,7 @@ def _proof(
         steps=len(shooting.steps),
         seconds=time.process_time() - began,
         orbit=orbit,
-        within=dict(within or {}),
+        radii=dict(radii or {}),
         shooting=shooting,
         zero=zero,
     )

@@ -21,7 +21,7 @@ from saltus.progress import Progress, silent
 def prove(
     result: PeriodicOrbit,
     *,
-    within: Mapping[str, float] | None = None,
+    radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
 ) -> OrbitProof: ...
@@ -31,7 +31,7 @@ def prove(
 def prove(
     result: SpecialPoint,
     *,
-    within: Mapping[str, float] | None = None,
+    radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
 ) -> SpecialProof: ...
@@ -41,7 +41,7 @@ def prove(
 def prove(
     result: Branch,
     *,
-    within: Mapping[str, float] | None = None,
+    radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
     most_boxes: int = 2000,
@@ -52,7 +52,7 @@ def prove(
 def prove(
     result: PeriodicOrbit | SpecialPoint | Branch,
     *,
-    within: Mapping[str, float] | None = None,
+    radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
     most_boxes: int = 2000,
@@ -73,7 +73,7 @@ def prove(
     ----------
     result
         An orbit, as from `find_orbit`, a special point of a branch, or a branch.
-    within
+    radii
         By its path, how far a number of the system may lie from its double: the theorem holds for
         all of these values.
     step
@@ -119,14 +119,14 @@ def prove(
         step=default.step if step is None else float(step),
         order=default.order if order is None else int(order),
     )
-    radii = None if within is None else dict(within)
+    widths = None if radii is None else dict(radii)
     if isinstance(result, PeriodicOrbit):
-        return prove_orbit(result, radii, settings)
+        return prove_orbit(result, widths, settings)
     if isinstance(result, SpecialPoint):
-        return prove_special(result, radii, settings)
+        return prove_special(result, widths, settings)
     if isinstance(result, Branch):
         check_count("most_boxes", most_boxes, at_least=1)
-        return prove_branch(result, radii, settings, int(most_boxes), progress)
+        return prove_branch(result, widths, settings, int(most_boxes), progress)
     raise ParameterError(
         f"prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
         f"{shown(result)}",

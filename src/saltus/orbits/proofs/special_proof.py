@@ -127,7 +127,7 @@ class SpecialProof(Result):
 
 def prove_special(
     point: SpecialPoint,
-    within: dict[str, float] | None = None,
+    radii: dict[str, float] | None = None,
     steps: ShootingSettings | None = None,
 ) -> SpecialProof:
     """The proof of a special point; `prove` says what it is."""
@@ -143,9 +143,9 @@ def prove_special(
         return _unproved(point, path, "a point in two parameters is not proved yet", began)
     grazes = point.kind == SpecialKind.GR
     made = (
-        _touching(point, path, within, steps)
+        _touching(point, path, radii, steps)
         if grazes
-        else _singular(orbit, 1.0 if point.kind == SpecialKind.LP else -1.0, path, within, steps)
+        else _singular(orbit, 1.0 if point.kind == SpecialKind.LP else -1.0, path, radii, steps)
     )
     if isinstance(made, CannotProve):
         return _unproved(point, path, made.reason, began)
@@ -177,7 +177,7 @@ def _singular(
     orbit: PeriodicOrbit,
     theta: float,
     path: str,
-    within: dict[str, float] | None,
+    radii: dict[str, float] | None,
     steps: ShootingSettings | None,
 ) -> Shooting | CannotProve:
     """The equations of an orbit with the multiplier `theta` at an unknown parameter, together with
@@ -193,7 +193,7 @@ def _singular(
     segments = [varied(segment, unknowns, 1.0) for segment in made.segments[:-1]]
     segments.append(varied(made.segments[-1], unknowns, theta))
     larger = replace(made, segments=tuple(segments), guess=guess)
-    probe = shooting_of(orbit, larger, path=path, within=within, pins=[], settings=steps)
+    probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
     row = np.zeros(probe.size)
     for i in range(events):
         row[2 * size * i + size : 2 * size * (i + 1)] = guess[i, size:]
@@ -216,7 +216,7 @@ def _kernel(plain: Shooting, theta: float) -> np.ndarray:
 def _touching(
     point: SpecialPoint,
     path: str,
-    within: dict[str, float] | None,
+    radii: dict[str, float] | None,
     steps: ShootingSettings | None,
 ) -> Shooting | CannotProve:
     """The equations of an orbit that touches its contact at an unknown parameter: one event has no
@@ -227,7 +227,7 @@ def _touching(
     made = equations.touching_segments(point.point)
     if isinstance(made, CannotProve):
         return made
-    probe = shooting_of(orbit, made, path=path, within=within, pins=[], settings=steps)
+    probe = shooting_of(orbit, made, path=path, radii=radii, pins=[], settings=steps)
     assert made.touching is not None
     row = np.zeros(probe.size)
     row[made.guess.shape[1] * made.touching + 1] = 1.0
