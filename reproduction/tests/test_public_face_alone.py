@@ -97,11 +97,3 @@ def test_it_requires_what_it_imports():
     }
     assert found <= allowed, found - allowed
     assert found >= {name for name in allowed if name not in sys.stdlib_module_names} - {"saltus"}
-
-
-def test_the_files_are_as_short_as_those_of_saltus():
-    lengths = {path.name: path.read_text().count("\n") for path in FILES}
-    assert not {name: lines for name, lines in lengths.items() if lines > 400}
-    functions = (node for path in FILES for node in nodes(path, ast.FunctionDef))
-    # sections of docstrings included
-    assert not [node.name for node in functions if node.end_lineno - node.lineno >= 75]

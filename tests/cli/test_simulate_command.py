@@ -197,7 +197,7 @@ def test_an_operation_that_cannot_be_traced_is_refused(refused, study, tmp_path)
     )
     path = study('[model]\ntype = "own.py:Own"\n[simulate]\nduration = 1\n')
     sentence = refused("simulate", path, "-o", tmp_path / "out")
-    assert sentence.startswith(f"saltus: {path}, simulate: ")
+    assert sentence.startswith(f"saltus: {path}, model: ")
     assert "floor" in sentence
 
 

@@ -170,6 +170,7 @@ WITHOUT = {
     **dict.fromkeys(
         ("flow.load_releases", "flow.stroboscopic", "orbits.defects", "orbits.is_symmetric"), NUMBER
     ),
+    "saltus.prove": "gives a theorem in words, and the enclosures in it",
     "studies.wrong_cells": NUMBER,
     "studies.disagreements": "gives a part of what studies.bordered_chart gives",
     "studies.with_borders": "gives a part of what studies.bordered_chart gives",

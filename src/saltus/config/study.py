@@ -329,6 +329,8 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
     ------
     ParameterError
         An error in the file, in one sentence with the file and the dotted key.
+    TraceError
+        A class of one's own that cannot be traced, with the file's name.
 
     Examples
     --------
@@ -356,6 +358,8 @@ def load_study(path: Path | str, *, questions: bool = True) -> Study:
         system = System.from_dict(parts)
     except ParameterError as error:
         source.refuse_error(error)
+    except TraceError as error:
+        raise TraceError(f"{source.path}, model: {error}") from error
     settings = read_settings(source, system, tables["simulate"]) if "simulate" in tables else None
     asks = tuple(
         read_ask(source, system, name, tables[name])
