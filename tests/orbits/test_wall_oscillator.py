@@ -175,9 +175,12 @@ def test_at_a_resonance_without_damping_a_branch_ends_as_its_amplitude_grows():
 @pytest.mark.parametrize(("wall", "frequency"), [(0.0, 3.1), (0.3, 2.3)])
 def test_a_search_beside_a_wall_asks_for_no_state_beyond_it(wall, frequency):
     """Newton's method for near returns stepped beyond it: the search ended with a sentence about a
-    state that nobody gave.
+    state that nobody gave. How many unstable orbits near returns lead to is left to chance: other
+    seeds give from 4 to 9.
     """
     system = walled(A=1.0, W=frequency, wall=wall, e=0.9, c=0.05)
     found = saltus.search_orbits(system, "load.frequency", [frequency], max_period=4, starts=32)
-    assert len(found.orbits) >= 7
+    # the motions settle on the stable one, and Newton's method alone leads to the others
+    assert any(orbit.stable for orbit in found.orbits)
+    assert not all(orbit.stable for orbit in found.orbits)
     assert max(saltus.orbits.defects(list(found.orbits))) < 1e-9
