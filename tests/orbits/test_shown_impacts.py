@@ -127,7 +127,11 @@ def test_beyond_the_end_of_a_rest_a_branch_of_its_own_begins_as_the_motion_goes_
     settled = saltus.simulate(first.system, x=-0.5, periods=400, tol=1e-13, dense=False)
     assert first.stable
     assert first.state == pytest.approx((settled.x, settled.velocity), abs=1e-9)
-    assert max(saltus.orbits.defects(beyond.orbits[::5])) < 1e-9
+    # at a grazing the motion leaves the orbit by the root of rounding
+    assert not beyond.orbits[0].grazes
+    followed = [orbit for orbit in beyond.orbits[::5] if not orbit.grazes]
+    assert len(followed) > 20
+    assert max(saltus.orbits.defects(followed)) < 1e-9
 
 
 def test_at_a_fold_and_at_a_doubling_an_orbit_is_not_stable() -> None:

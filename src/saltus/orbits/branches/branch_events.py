@@ -70,6 +70,8 @@ class BranchLimits:
     # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers
     # are 0
     settling: int = 40
+    # A gap or a speed of the first orbit beyond a rest, in natural units, that rounding leaves at 0.
+    rounding: float = 1e-13
     # Distances in both directions along the parent's branch, tried in turn until they enclose its
     # special point.
     reaches: tuple[float, ...] = tuple(10.0 ** np.arange(-8, -0.9))
@@ -312,7 +314,9 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
             )
         except SaltusError:
             continue
-        if orbit is None or not orbit.admissible:
+        # A gap below 0 by more than rounding, though by less than a touch, is an impact that is
+        # left out: grazings accumulate here, and at none of them does the branch begin.
+        if orbit is None or not orbit.admissible or orbit.room < -SETTINGS.rounding:
             continue
         solution = orbit.solution
         ahead = np.append(np.zeros(orbit.equations.size), values - point.parameters)
