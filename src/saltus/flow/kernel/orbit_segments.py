@@ -51,8 +51,9 @@ class SegmentFollower:
 
     def __init__(self, run: Program, tol: float) -> None:
         self._run = run
-        (self._numbers, _) = motion_record(taylor_order(tol), run.structure.sizes)
+        self._numbers, self._memory = motion_record(taylor_order(tol), run.structure.sizes)
         self._numbers["tolerance"] = tol
+        self._at_start = bytes(self._memory)
         record = self._numbers[0]
         self.own = int(record["own"])  # degrees of freedom
         self._columns = int(record["columns"])
@@ -66,6 +67,7 @@ class SegmentFollower:
 
         `numbers` are those of `CompiledStructure.prepare`.
         """
+        self._forget()
         n = len(request[0])
         own = self.own
         ends = np.zeros((n, SegmentValue.FIRST_STATE + 6 * own))
@@ -82,6 +84,7 @@ class SegmentFollower:
         """The same for a model with several contacts and the segments of a
         `ContactsSegmentRequest`.
         """
+        self._forget()
         held = self._run.trace.contact_coordinates
         n = len(request[0])
         own = self.own
@@ -98,3 +101,7 @@ class SegmentFollower:
             if load_contact_segments()(self._numbers, *numbers, contacts, request, results) < n
             else results
         )
+
+    def _forget(self) -> None:
+        """What earlier motions have left, as the largest press on a contact, changes no digit."""
+        self._memory[:] = self._at_start
