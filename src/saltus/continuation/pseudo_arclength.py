@@ -179,14 +179,14 @@ class EquationCurve(Curve[P]):
         """The units of all components of a place: of a parameter the larger of its size and of the
         range that its weight stands for.
         """
-        units = np.ones(len(place))
-        units[: -self.count] = self.units.unknowns
-        ranges = 3.0 / self.weights[-self.count :]
-        units[-self.count :] = np.maximum(np.abs(place[-self.count :]), ranges)
-        bounded = np.append(
-            np.broadcast_to(self.units.bounded, len(place) - self.count), [True] * self.count
-        )
-        return Units(units, self.units.residuals, bounded)
+        own = self.units
+        inner = len(place) - self.count
+        units = np.empty(len(place))
+        units[:inner] = own.unknowns
+        units[inner:] = np.maximum(np.abs(place[inner:]), 3.0 / self.weights[inner:])
+        bounded = np.ones(len(place), dtype=bool)
+        bounded[:inner] = own.bounded
+        return Units(units, own.residuals, bounded)
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:

@@ -351,7 +351,8 @@ class PeriodicOrbit(Result):
         count = 2 * len(model.coordinates) - len(model.first_order)
         chain = self.solution.evaluation.monodromy()
         following = self.equations.following
-        chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
+        if following.size:
+            chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
         if self._has_touch or not np.isfinite(chain).all():
             return np.full(count, complex(np.inf))
         values = np.zeros(count, dtype=complex)  # 0 for what contacts hold where the state is given
