@@ -235,8 +235,11 @@ def test_every_orbit_of_a_branch_of_both_layers_is_a_motion(mirrored: saltus.Bra
     At the grazing of small loads the motions beside it have such an impact at once, which throws
     the closed layer open.
     """
-    # at a grazing itself rounding decides whether the motion has an impact there
-    for orbit in (orbit for orbit in mirrored.orbits if not orbit.grazes):
+    # At a grazing itself rounding decides whether the motion has an impact there, and at a switching
+    # itself whether a contact opens just before an impact or with it; `defect` may be inf at both.
+    between = [o for o in mirrored.orbits if not o.grazes and abs(o.pressing) > 1e-9]
+    assert len(between) > 0.8 * len(mirrored.orbits)
+    for orbit in between:
         assert orbit.defect < 1e-10 * (1 + np.abs(orbit.multipliers).max())
     assert mirrored.ends[0].reason is OrbitEnd.TWO_AT_ONCE
 
