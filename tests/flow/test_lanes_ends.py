@@ -19,10 +19,16 @@ from saltus.systems import EnergyRestitution, Harmonic, Load, Metainterface, Sys
 def test_an_accumulation_that_ends_beside_a_forcing_period_has_the_scalar_kernels_impacts(
     late, begin
 ):
-    """It is followed to the end only where the motion itself ends first."""
+    """It is followed to the end only where the motion itself ends first.
+
+    How many bounces are followed depends on the natural time of the load, so the reference has a
+    period of nearly the same length, in which the accumulation does not end beside a period's end.
+    """
     system = forced(H=0.0, V=-0.5, e=0.8)
     motion = saltus.simulate(system, theta=0.3, duration=100.0)
     rest = next(event.time for event in motion.events if event.kind == EventKind.REST)
+    elsewhere = system.with_({"load.frequency": 2 * math.pi / (0.9 * rest)})
+    motion = saltus.simulate(elsewhere, theta=0.3, duration=100.0)
     turned = system.with_({"load.frequency": 2 * math.pi / (rest - late)})
     for periods in (1, 2, 3):
         arguments = {"theta": 0.3, "time": begin, "periods": periods}

@@ -186,3 +186,26 @@ def test_no_motion_is_beyond_its_floor() -> None:
     with contextlib.suppress(MotionError):
         motion = saltus.simulate(ball, y=1e15 + 1.0, duration=60.0)
         assert motion.position >= 1e15
+
+
+@pytest.mark.parametrize("frequency", [1e-3, 1e-6])
+@pytest.mark.parametrize("amplitude", [0.0, 1e-12])
+@pytest.mark.parametrize(
+    "model", [saltus.WallOscillator(wall=0.0), saltus.TwoStops(left=-50.0, right=0.0, damping=0.0)]
+)
+def test_a_load_slower_than_the_motion_hides_no_impacts(
+    model: Any, amplitude: float, frequency: float
+) -> None:
+    """x'' = 1/2 - x beside a wall at 0: after an impact with the speed v the next one follows in 2
+    arctan(2 v), with any loss; without loss so many of these fit into the motion.
+    """
+    force = saltus.Harmonic(amplitude=amplitude, mean=0.5)
+    load = saltus.Load(frequency=frequency, force=force)
+    lossless = saltus.System(model=model, load=load, impact=NewtonImpact(1.0))
+    start: dict[str, Any] = {"x": 0.0, "velocity": -1.0, "duration": 60.0}
+    count = int(60.0 / (2.0 * math.atan(2.0)))
+    assert len(saltus.simulate(lossless, **start).impacts) == count
+    assert int(saltus.simulate_many(lossless, **start).impact_count) == count
+    lossy = saltus.System(model=model, load=load, impact=NewtonImpact(0.8))
+    rest = math.fsum(2.0 * math.atan(2.0 * 0.8**n) for n in range(200))
+    assert saltus.simulate(lossy, **start).rest_time == pytest.approx(rest, abs=1e-9)

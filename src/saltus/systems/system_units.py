@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 INSTANTS = 8
 # A load that moves d by a smaller share of it than this has no part in the unit.
 FARTHEST = 1e-7
+TOLD = 2.0**-50  # a smaller share of a distance is its rounding
 TINY = float(np.finfo(float).tiny)
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
 # A distance that is this share of the largest one is rounding.
@@ -41,8 +42,8 @@ class NaturalUnits:
        times s times, `lengths` are L times and `time` is s times as large, up to rounding. They are
        not rounded themselves; `powers_of_two` are, for those who scale numbers by them exactly.
     2. They do not depend on the order of contacts and coordinates, on the origin of a coordinate
-       along which a contact holds, on a shift of the load by a phase, on friction of 0 or on
-       contacts that are farther away than another one.
+       along which a contact holds, on a shift of the load by a phase, on friction of 0, or on
+       contacts that are farther away than another one or than the load moves what it pulls off.
     3. `time` is 1 / Omega of the load, or shorter where an angle moves by 1 rad in less; without a
        load it is sqrt(d / a) of the distance d and the acceleration a below, or that of the
        stiffness alone. `lengths` are the range through which the load moves the equilibrium, or
@@ -131,6 +132,23 @@ def natural_units(system: System) -> NaturalUnits:
     return found
 
 
+def time_without_period(system: System) -> float:
+    """The natural time of a system on which nothing acts with the frequency of its load, or that
+    has none; inf where something does."""
+    load = system.load
+    if load.frequency is None:
+        return natural_units(system).time
+    if any(signal.periodic for signal in load.channels.values()):
+        return math.inf
+    alone = replace(system, load=Load(frequency=None, **load.channels))
+    model = system.model
+    still = [0.0] * len(model.coordinates)
+    declared = DeclaredLoad(alone.load, model)
+    if _acceleration(model, 0.0, still, model.every_side[0], declared) is None:
+        return math.inf  # the model reads the frequency itself
+    return natural_units(alone).time
+
+
 def _power_of_two(value: float) -> float:
     return math.ldexp(1.0, round(math.log2(value)))
 
@@ -145,8 +163,8 @@ def _found(system: System) -> NaturalUnits:
     quickest = 0.0
     push = np.zeros(len(model.coordinates))
     with np.errstate(all="ignore"):
-        for place in _places(model):
-            found = _held_away(model, load, place, rate, instants)
+        for place, outward in _places(model):
+            found = _held_away(model, load, place, outward, rate, instants)
             if found is None:
                 continue
             stiffest = max(stiffest, found.stiffness)
@@ -175,13 +193,16 @@ def _found(system: System) -> NaturalUnits:
     return NaturalUnits(lengths, time, _masses(model), own_time, free_time)
 
 
-def _places(model: Any) -> Iterator[np.ndarray]:
+def _places(model: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """The coordinates (n,) nearest to 0 at which one of its contacts or surfaces is reached; 0
-    without any.
+    without any. And the direction (n,) in which the contact opens, 0 where both sides are free.
     """
     names = model.coordinates
     if model.has_one_contact:
-        yield np.array([float(model.contact)])
+        place = float(model.contact)
+        beside = place + max(1.0, abs(place))
+        opens = [np.sign(float(model.gap(beside, side))) for side in model.every_side]
+        yield np.array([place]), np.array([opens[0] if len(set(opens)) == 1 else 0.0])
         return
     parts = [part for part in (*model.contacts, *model.surfaces) if _is_sum(part, names)]
     for part in parts:
@@ -189,9 +210,9 @@ def _places(model: Any) -> Iterator[np.ndarray]:
             {part.coordinate: 1.0} if isinstance(part.coordinate, str) else dict(part.coordinate)
         )
         row = np.array([float(terms.get(name, 0.0)) for name in names])
-        yield row * (float(part.position) / float(row @ row))
+        yield row * (float(part.position) / float(row @ row)), row * getattr(part, "sign", 0.0)
     if not parts:
-        yield np.zeros(len(names))
+        yield np.zeros(len(names)), np.zeros(len(names))
 
 
 def _is_sum(part: Any, names: tuple[str, ...]) -> bool:
@@ -226,7 +247,12 @@ class Held(NamedTuple):
 
 
 def _held_away(
-    model: Any, load: Any, place: np.ndarray, rate: float, instants: np.ndarray
+    model: Any,
+    load: Any,
+    place: np.ndarray,
+    outward: np.ndarray,
+    rate: float,
+    instants: np.ndarray,
 ) -> Held | None:
     """d and a of the docstring of `NaturalUnits` at a place; None where the model has no
     accelerations.
@@ -248,7 +274,9 @@ def _held_away(
     acceleration = _mean(np.array(pushes))
     squared = float(np.linalg.norm(acceleration)) / max(float(np.linalg.norm(distance)), TINY)
     swing = SWING * _mean(moved - moved.mean(axis=0))
-    if np.linalg.norm(swing) > FARTHEST * np.linalg.norm(distance):
+    # a contact from which all is pulled away may be any distance away
+    away = float(outward @ np.mean(pushes, axis=0)) > 0.0
+    if np.linalg.norm(swing) > (TOLD if away else FARTHEST) * np.linalg.norm(distance):
         distance = swing
     return Held(distance, acceleration, float(sizes.max()), math.sqrt(squared))
 

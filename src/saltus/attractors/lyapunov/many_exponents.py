@@ -38,10 +38,16 @@ from saltus.flow import (
 )
 from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
 from saltus.result import provenance
-from saltus.systems import System
+from saltus.systems import System, natural_units
 
 if TYPE_CHECKING:
     import xarray
+
+
+def _own_time(system: System, parameters: Mapping[str, np.ndarray], row: int) -> float:
+    """The time in which the system of a row moves by itself, as for a single motion."""
+    values = {path: float(numbers[row]) for path, numbers in parameters.items()}
+    return natural_units(system.with_(values)).own_time
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,9 @@ def stretch_many(
     result = Stretched(
         np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan)
     )
-    counts = np.array([span_count(length) for length in lengths])
+    counts = np.array(
+        [span_count(length, _own_time(system, parameters, i)) for i, length in enumerate(lengths)]
+    )
     groups = [
         group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))
     ]

@@ -283,8 +283,8 @@ def rest_columns(motion, near):
 
 @lean_jit
 def free_pulls(motion, t):
-    """Fill the second derivatives of the gaps with all contacts open, and in `falling_pulls` their
-    relative rates of change.
+    """Fill the second derivatives of the gaps with all contacts open, and in `falling_pulls` the
+    relative rates at which they change: with the load, or by a stiffness that is faster than it.
     """
     first = motion.parameters.size - motion.local
     for i in range(motion.local):
@@ -293,9 +293,12 @@ def free_pulls(motion, t):
     for i in range(motion.contacts.shape[0]):
         a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
         motion.pulls[i] = motion.signs[i] * a[0]
-        motion.falling_pulls[i] = 0.0
+        rate = 1.0 / motion.natural_time
         if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
-            motion.falling_pulls[i] = abs(a[1] / a[0]) if a[0] != 0.0 else np.inf
+            rate += abs(a[1] / a[0]) if a[0] != 0.0 else np.inf
+        if a[0] != 0.0:
+            rate = max(rate, math.sqrt(2.0 * abs(a[2] / a[0])))
+        motion.falling_pulls[i] = rate
 
 
 @lean_jit
@@ -303,11 +306,10 @@ def frozen_limit(motion, near):
     """The time for which the accelerations of the contacts in `near` may be taken as constant, from
     what `free_pulls` has filled.
     """
-    span = motion.natural_time
-    change = 1.0 / span
+    change = 1.0 / motion.natural_time
     for i in range(motion.contacts.shape[0]):
         if near >> i & 1:
-            change = max(change, 1.0 / span + motion.falling_pulls[i])
+            change = max(change, motion.falling_pulls[i])
     return np.sqrt(10.0 * motion.tolerance) / change if change > 0.0 else np.inf
 
 

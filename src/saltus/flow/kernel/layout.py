@@ -168,6 +168,7 @@ CHATTER_SPEED = 4e-5
 # A gap below minus this share of the terms of its sum is no rounding, and no error of a step of the
 # tolerance 0; the tolerance comes ten times on top.
 PENETRATED = 2.0**-40
+INSTANT = 2.0**-52  # times that differ by less, in natural times, are one
 # the largest change of the contact accelerations over two impacts for which the averaged law is
 # used
 SLOWLY = 0.02

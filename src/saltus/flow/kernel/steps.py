@@ -13,6 +13,7 @@ from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import (
     DEFECT,
     GAP,
+    INSTANT,
     PENETRATED,
     ROUGHER,
     SAFETY,
@@ -329,8 +330,10 @@ def is_away(motion, gap, place, position, tau):
     series = motion.coordinate_series[place]
     for k in range(motion.order, -1, -1):
         terms = terms * tau + abs(series[k])
-    # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed
-    terms += abs(position) + max(motion.press, motion.pull) * tau * tau
+    # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed, and no
+    # time is told from another one below its rounding
+    span = max(tau, INSTANT * motion.natural_time)
+    terms += abs(position) + max(motion.press, motion.pull) * span * span
     return abs(gap) > (PENETRATED + 10.0 * motion.tolerance) * terms
 
 

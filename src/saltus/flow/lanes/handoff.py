@@ -159,7 +159,8 @@ def scalar_state(lane):
 def natural_time_of(lane):
     """The natural time of a lane's load, or of its system."""
     length = lane.period_length
-    return length / (2.0 * math.pi) if length > 0.0 else lane.settings.natural_time
+    longest = lane.settings.natural_time
+    return min(length / (2.0 * math.pi), longest) if length > 0.0 else longest
 
 
 @jit

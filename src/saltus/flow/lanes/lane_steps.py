@@ -87,7 +87,8 @@ def natural_speeds(lanes):
     """The natural speed of each lane (`steps.natural_speed`)."""
     length = lanes.period_length
     own = splat(lanes.settings.natural_time)
-    time = select(mask(bits(length > 0.0)), length * (0.5 / math.pi), own)
+    of_load = length * (0.5 / math.pi)
+    time = select(mask(bits(length > 0.0) & bits(of_load < own)), of_load, own)
     return select(mask(bits(lanes.pull > 0.0)), lanes.pull * time, lanes.fastest)
 
 

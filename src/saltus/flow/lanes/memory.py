@@ -195,7 +195,7 @@ class LaneSettings(NamedTuple):
     """Tolerances of a call, and what follows from them."""
 
     tolerance: float
-    natural_time: float  # of trajectories without a forcing period
+    natural_time: float  # of what moves without a forcing period, inf where the load has one
     shortest_step: float
     # after an impact with a lower speed of the gap, in natural speeds, the end of an accumulation may
     # be near

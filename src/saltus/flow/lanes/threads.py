@@ -172,7 +172,7 @@ class Lanes:
     from_start: bool
     natural_length: float  # in which states that recur are compared
     settle: bool  # whether a trajectory ends when it repeats itself
-    natural_time: float  # of trajectories without a forcing period
+    natural_time: float  # of what moves without a forcing period, inf where the load has one
 
     def run(
         self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0

@@ -29,7 +29,7 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.systems import natural_units
+from saltus.systems import time_without_period
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -43,12 +43,16 @@ NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
 def natural_time(system: System, length: float) -> float:
-    """The natural time of a motion under a load with a period, 0 for none."""
-    if length > 0.0:
-        return length / (2.0 * math.pi)
+    """The natural time of a motion under a load with a period, 0 for none.
+
+    A frequency that acts on nothing is none.
+    """
+    of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
     # what has no contact has no use for it
     bounces = system.model.has_one_contact or system.model.holds_coordinates
-    return natural_units(system).time if bounces else 1.0
+    if not bounces:
+        return of_load if length > 0.0 else 1.0
+    return min(of_load, time_without_period(system))
 
 
 class KernelState:

@@ -28,6 +28,7 @@ from saltus.flow.kernel.layout import (
 from saltus.flow.kernel.roots import horner, leading
 from saltus.flow.kernel.steps import (
     columns_at_event,
+    expand,
     forget,
     motion_end,
     natural_speed,
@@ -127,6 +128,22 @@ def contact_pull(motion, side, t):
 
 
 @lean_jit
+def flight_change(motion, side, t):
+    """The rate at which the motion itself changes its acceleration after an impact: by its damping,
+    or by its stiffness. A load that is slower than both does not show it.
+    """
+    b = motion.pull_series[0]
+    w = motion.recurrences
+    motion.contact_series(t, motion.origin, side, motion.env, motion.piece, b, w, 2)
+    expand(motion, t, side, 2)
+    rate = rate_of(motion, side)
+    a = motion.acceleration_series[0]
+    damps = abs(rate * a[1] - b[1])
+    bends = 2.0 * abs(rate * a[2] - b[2])
+    return max(damps / abs(b[0]), math.sqrt(bends / abs(b[0])))
+
+
+@lean_jit
 def accumulation(motion, speed, t, tol):
     """The mode that follows a small impact, and, for an accumulation, the time left until its end.
 
@@ -159,7 +176,8 @@ def accumulation(motion, speed, t, tol):
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
     span = motion.natural_time
-    change = 1.0 / span + abs(slope_here / here) + abs(slope_there / there)
+    bends = flight_change(motion, side, t)
+    change = max(1.0 / span, bends) + abs(slope_here / here) + abs(slope_there / there)
     if abs(loss) < LOSSLESS:
         slow = speed < CHATTER_SPEED * natural_speed(motion)
         return Mode.CHATTER if slow and cycle * change < SLOWLY else Mode.ARC, 0.0
