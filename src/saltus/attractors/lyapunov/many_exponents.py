@@ -38,16 +38,16 @@ from saltus.flow import (
 )
 from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
 from saltus.result import provenance
-from saltus.systems import System, natural_units
+from saltus.systems import NaturalUnits, System, natural_units
 
 if TYPE_CHECKING:
     import xarray
 
 
-def _own_time(system: System, parameters: Mapping[str, np.ndarray], row: int) -> float:
-    """The time in which the system of a row moves by itself, as for a single motion."""
+def _units(system: System, parameters: Mapping[str, np.ndarray], row: int) -> NaturalUnits:
+    """The natural units of the system of a row, as for a single motion."""
     values = {path: float(numbers[row]) for path, numbers in parameters.items()}
-    return natural_units(system.with_(values)).own_time
+    return natural_units(system.with_(values))
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,11 @@ def stretch_many(
     result = Stretched(
         np.full((periods, len(states), 2), np.nan), np.full((len(states), 2), np.nan)
     )
+    units = [_units(system, parameters, row) for row in range(len(lengths))]
     counts = np.array(
-        [span_count(length, _own_time(system, parameters, i)) for i, length in enumerate(lengths)]
+        [span_count(length, unit.own_time) for length, unit in zip(lengths, units, strict=True)]
     )
+    times = np.array([unit.free_time for unit in units])
     groups = [
         group for count in np.unique(counts) for group in _groups(np.flatnonzero(counts == count))
     ]
@@ -89,7 +91,7 @@ def stretch_many(
     stopped: list[bool] = []
 
     def work(rows: np.ndarray) -> None:
-        group = _TangentGroup(ensemble, rows, states[rows], lengths[rows])
+        group = _TangentGroup(ensemble, rows, states[rows], lengths[rows], times[rows])
         for p in range(periods):
             if stopped:
                 return
@@ -118,10 +120,16 @@ def _groups(rows: np.ndarray) -> list[np.ndarray]:
 
 class _TangentGroup:
     """A group of motions with frames; the row of each has the coordinate, its two derivatives, the
-    velocity, its two derivatives."""
+    velocity, its two derivatives. The times (n,) are those of their free oscillations, in which
+    frames are orthonormal."""
 
     def __init__(
-        self, ensemble: TangentEnsemble, rows: np.ndarray, states: np.ndarray, lengths: np.ndarray
+        self,
+        ensemble: TangentEnsemble,
+        rows: np.ndarray,
+        states: np.ndarray,
+        lengths: np.ndarray,
+        times: np.ndarray,
     ) -> None:
         self._ensemble = ensemble
         self._rows = rows
@@ -129,6 +137,8 @@ class _TangentGroup:
         self._states = np.zeros((len(states), 6))
         self._states[:, [0, 3]] = states
         self._states[:, [1, 2, 4, 5]] = first_frame(2).ravel()
+        self._times = times[:, None]
+        self._states[:, [4, 5]] /= self._times
         self._alive = np.isfinite(states).all(axis=1)
         self._rounding = LYAPUNOV.rounding if ensemble.holds_coordinates else 0.0
 
@@ -143,7 +153,9 @@ class _TangentGroup:
             ends = self._ensemble.advance(
                 self._rows[here], self._states[here], j * span, (j + 1) * span
             )
+            ends.states[:, [4, 5]] *= self._times[here]
             self._states[here], stretch = _orthonormal(ends.states, self._rounding)
+            self._states[here[:, None], [4, 5]] /= self._times[here]
             self._alive[here[~ends.sound]] = False
             growth[here] += np.where(ends.sound[:, None], stretch, np.nan)
         return growth
