@@ -129,8 +129,9 @@ def contact_pull(motion, side, t):
 
 @lean_jit
 def flight_change(motion, side, t):
-    """The rate at which the motion itself changes its acceleration after an impact: by its damping,
-    or by its stiffness. A load that is slower than both does not show it.
+    """The rates at which the motion itself changes its acceleration after an impact: by its damping,
+    and by its stiffness, where the change over a time t is the square of rate times t. A load that
+    is slower than both does not show it.
     """
     b = motion.pull_series[0]
     w = motion.recurrences
@@ -140,7 +141,7 @@ def flight_change(motion, side, t):
     a = motion.acceleration_series[0]
     damps = abs(rate * a[1] - b[1])
     bends = 2.0 * abs(rate * a[2] - b[2])
-    return max(damps / abs(b[0]), math.sqrt(bends / abs(b[0])))
+    return damps / abs(b[0]), math.sqrt(bends / abs(b[0]))
 
 
 @lean_jit
@@ -176,14 +177,18 @@ def accumulation(motion, speed, t, tol):
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
     span = motion.natural_time
-    bends = flight_change(motion, side, t)
-    change = max(1.0 / span, bends) + abs(slope_here / here) + abs(slope_there / there)
+    damps, bends = flight_change(motion, side, t)
+    slopes = abs(slope_here / here) + abs(slope_there / there)
+    change = max(1.0 / span, damps) + slopes
     if abs(loss) < LOSSLESS:
         slow = speed < CHATTER_SPEED * natural_speed(motion)
-        return Mode.CHATTER if slow and cycle * change < SLOWLY else Mode.ARC, 0.0
+        # at the top of a flight of the time t stiffness has changed it by the share (t bends)^2 / 8
+        slow = slow and cycle * change < SLOWLY and 0.125 * (cycle * bends) ** 2 < SLOWLY
+        return Mode.CHATTER if slow else Mode.ARC, 0.0
     if not loss > 0.0:
         return Mode.ARC, 0.0
     left = cycle / loss
+    change = max(1.0 / span, damps, bends) + slopes
     return Mode.REST if 0.1 * (left * change) ** 2 <= tol else Mode.ARC, left
 
 
