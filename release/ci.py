@@ -163,8 +163,9 @@ def steps(number: int) -> tuple[Step, ...]:
             f". tests/processors/{processor}.sh\n{PYTEST} {NUMERICAL}",
             25,
             may_be_cut=True,
-            known="two branches hang on rounding: tests/orbits/test_begun_anywhere.py (a grazing from "
-            "both sides) and test_special_curves.py (curves of changes) fail on AVX2; mend them",
+            # Until these are mended this step judges nothing: read every failure that it prints.
+            known="on AVX2 two branches hang on rounding, in tests/orbits/test_begun_anywhere.py and "
+            "test_special_curves.py; the rest was not run there, so other failures above are new",
         ),
         Step(
             "thorough",

@@ -29,7 +29,8 @@ ENTRY_BYTES = 16  # the most bytes of a number: a complex one
 STORED = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"
 }  # fmt: skip
-MATRIX, COMPRESSED = 14, 15
+MATRIX = 14
+COMPRESSED = 15
 SPARSE = 5  # the class of sparse arrays
 NUMERIC = range(6, 16)  # the classes of full arrays of numbers
 COMPLEX = 0x0800
@@ -147,7 +148,9 @@ class Bytes:
         """The element at a place."""
         tag = self.whole(at)
         if tag >> 16:  # a short one, whose bytes stand beside its type
-            size, start, end = tag >> 16, at + 4, at + 8
+            size = tag >> 16
+            start = at + 4
+            end = at + 8
             kind = tag & 0xFFFF
             inside = size <= 4
         else:
@@ -195,9 +198,11 @@ def _arrays(content: bytes) -> dict[str, Callable[[], np.ndarray]]:
         at = element.end
         if element.kind == COMPRESSED:
             unpacked = zlib.decompressobj().decompress(element.content, NAME_BYTES)
-            kind, inner = Bytes(unpacked, order).whole(0), unpacked[8:]
+            kind = Bytes(unpacked, order).whole(0)
+            inner = unpacked[8:]
         else:
-            kind, inner = element.kind, element.content
+            kind = element.kind
+            inner = element.content
         if kind != MATRIX:
             raise ValueError(f"data of the type {kind} stand in the place of an array")
         heading = _heading(Bytes(inner, order))
