@@ -81,8 +81,9 @@ if test "$(id -u)" = 0 && command -v apt-get >/dev/null; then
     apt-get install -qq --no-install-recommends python3-siconos gcc >/dev/null || echo "no Siconos here"
 fi
 test -d .venv-peers || .venv/bin/python -m venv .venv-peers --without-pip
-# what .venv has is there too, without being installed again
-.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))' > \
+# What .venv has is there too, without being installed again. addsitedir reads the .pth files as well:
+# saltus itself is installed by one.
+.venv/bin/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' > \
     "$(.venv-peers/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/venv.pth"
 .venv/bin/python -m pip --python .venv-peers/bin/python install --quiet --no-compile --require-hashes -r requirements-bench.lock
 """

@@ -10,8 +10,9 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Mapping
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from saltus.config.readers import (
@@ -113,6 +114,18 @@ def find_class(source: Source, kind: str, name: str) -> type:
     return cls
 
 
+class _FromText(SourceFileLoader):
+    """Compiles a file from its text each time.
+
+    Python's own bytecode cache takes a file of the same length for unchanged within a second, so
+    an edit from 1.0 to 1.7 could go unseen.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
+
+
 def _from_file(source: Source, kind: str, place: str) -> ModuleType:
     """The module in a Python file, relative to the study; run anew each time."""
     path = (source.path.parent / Path(place)).resolve()
@@ -121,13 +134,15 @@ def _from_file(source: Source, kind: str, place: str) -> ModuleType:
             (kind, "type"),
             f"{kind}.type: there is no file {place}; paths are relative to the study file",
         )
-    spec = importlib.util.spec_from_file_location(f"saltus_study_{path.stem}", path)
-    if spec is None or spec.loader is None:
+    name = f"saltus_study_{path.stem}"
+    loader = _FromText(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    if spec is None:
         raise ParameterError(f"{path} cannot be imported")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look it up there
     try:
-        spec.loader.exec_module(module)
+        loader.exec_module(module)
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # the user's own code may raise anything, and may end in an exit
