@@ -365,7 +365,9 @@ def test_the_curve_of_a_grazing_with_several_contacts_is_that_of_the_linear_moti
 
 
 def test_curves_of_changes_of_two_stops_lead_through_those_of_their_branches():
-    """Branches begun at another amplitude have their GR and SW on the curves."""
+    """Branches begun at other amplitudes have their GR and SW on the curves, which reach both bounds:
+    an impact's reaction and the rest after it vanish together all along a curve of SW.
+    """
     model = saltus.TwoStops(left=-0.8, right=0.5, stiffness=1.0, damping=0.1)
     load = saltus.Load(frequency=1.2, force=saltus.Harmonic(0.7))
     system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(0.0))
@@ -376,14 +378,21 @@ def test_curves_of_changes_of_two_stops_lead_through_those_of_their_branches():
         return saltus.continue_orbit(orbit, "load.frequency", (1.1, 1.8))
 
     changes = [point for point in branch_at(0.7).special if point.kind in ("GR", "SW")]
-    expected = [point for point in branch_at(0.68).special if point.kind in ("GR", "SW")]
+    expected = {
+        amplitude: [point for point in branch_at(amplitude).special if point.kind in ("GR", "SW")]
+        for amplitude in (0.68, 0.71)
+    }
     assert {str(point.kind) for point in changes} == {"GR", "SW"}
     for point in changes:
         curve = saltus.continue_special(
             point, "load.force.amplitude", (0.67, 0.72), first_bounds=(1.0, 2.0)
         )
-        (there,) = curve.at("load.force.amplitude", 0.68)
-        nearest = min(
-            abs(other.parameter - there.frequency) for other in expected if other.kind == point.kind
-        )
-        assert nearest < 1e-8
+        assert not curve.special
+        for amplitude, beside in expected.items():
+            (there,) = curve.at("load.force.amplitude", amplitude)
+            nearest = min(
+                abs(other.parameter - there.frequency)
+                for other in beside
+                if other.kind == point.kind
+            )
+            assert nearest < 1e-8

@@ -44,7 +44,24 @@ def _lies_on(points: Sequence[OrbitPoint], index: int, values: Sequence[float]) 
     ]
     point = points[index]
     steps = ((points[i], points[i + 1]) for i in passed)
-    return any(_may_be_on(a, b, point) and _is_on_step(a, b, point) for a, b in steps)
+    return any(
+        _may_be_on(a, b, point) and _has_events_of(a, b, point) and _is_on_step(a, b, point)
+        for a, b in steps
+    )
+
+
+def _has_events_of(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:
+    """Whether a point has the events of one of the ends of a step.
+
+    Beside a change of events orbits with and without it are ever more alike, and equations that do
+    not list events have both as solutions.
+    """
+    equations = point.orbit.equations
+    return any(
+        isinstance(end.orbit.equations, type(equations))
+        and equations.has_events_of(point.solution, end.solution)
+        for end in (a, b)
+    )
 
 
 def _may_be_on(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:

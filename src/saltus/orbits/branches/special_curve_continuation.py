@@ -25,7 +25,12 @@ from saltus.orbits.branches.special_curve import (
 )
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import divide, half, keeps_symmetry
-from saltus.orbits.branches.vanishing import Vanishing, pair_on_circle, witness_vanishes
+from saltus.orbits.branches.vanishing import (
+    Vanishing,
+    other_witnesses,
+    pair_on_circle,
+    witness_vanishes,
+)
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
@@ -267,9 +272,8 @@ def _second_change(point: SpecialCurvePoint) -> SpecialKind:
     vanishes.
     """
     assert isinstance(point.condition, Vanishing)
-    known = point.orbit.equations.witnesses(point.solution)
-    own = known[point.condition.number]
-    others = [witness for witness in known if witness.what != own.what]
+    own = point.orbit.equations.witnesses(point.solution)[point.condition.number]
+    others = other_witnesses(point)
     least = min(others, key=lambda witness: abs(witness.value), default=own)
     kinds = {2: SpecialKind.GR_GR, 1: SpecialKind.SW_GR, 0: SpecialKind.SW_SW}
     return kinds[int(own.grazes) + int(least.grazes)]

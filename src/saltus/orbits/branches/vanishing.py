@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from saltus.orbits.branches.conditions import ConditionValue
-from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, Solution
+from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, Solution, Witness
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.signature import TOLERANCES
 
 # Steps of the central differences, in natural units and as a share of the parameters' scales: their
 # error is its square plus rounding divided by it.
@@ -31,6 +32,9 @@ class Vanishing:
     scales: tuple[float, ...]  # of the parameters
     quantity: Quantity
     number: int = -1  # of the witness, see `OrbitEquations.witnesses`; -1 for no such
+    # The numbers of all witnesses that vanish with it, as the reaction after an impact and the
+    # duration of the rest that follows: rounding decides which of them is the smaller one.
+    together: frozenset[int] = frozenset()
 
     def moved(self, at: ConditionValue) -> Vanishing:
         """The condition does not depend on the point."""
@@ -84,20 +88,27 @@ def pair_on_circle(orbit: PeriodicOrbit, scales: tuple[float, ...]) -> Vanishing
 
 
 def witness_vanishes(orbit: PeriodicOrbit, scales: tuple[float, ...], number: int) -> Vanishing:
-    """The condition that one of the witnesses of a change of an orbit's events is 0."""
+    """The condition that one of the witnesses of a change of an orbit's events, which takes place
+    at this orbit, is 0.
+    """
     equations = orbit.equations
+    known = equations.witnesses(orbit.solution)
+    together = {i for i in range(len(known)) if abs(known[i].value) < TOLERANCES.switching}
 
     def quantity(solution: Solution) -> float | None:
         return equations.witnesses(solution)[number].value
 
-    return Vanishing(equations, scales, quantity, number)
+    return Vanishing(equations, scales, quantity, number, frozenset({number, *together}))
 
 
 def other_room(point: Any) -> float:
     """How far the orbit of a point of a curve of changes is from another one: the least of the
     other witnesses, at most `FARTHEST`.
     """
-    number = point.condition.number
+    return min(FARTHEST, *(witness.value for witness in other_witnesses(point)))
+
+
+def other_witnesses(point: Any) -> list[Witness]:
+    """The witnesses of other changes than the one whose curve a point belongs to."""
     known = point.orbit.equations.witnesses(point.solution)
-    values = [w.value for i, w in enumerate(known) if i != number and w.what != known[number].what]
-    return min(FARTHEST, *values) if values else FARTHEST
+    return [known[i] for i in range(len(known)) if i not in point.condition.together]

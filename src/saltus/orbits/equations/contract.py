@@ -208,7 +208,7 @@ class OrbitEquations(ABC):
        half, by which orbits that are their own images are known), `repeated` and `alternating` (the
        unknowns, and a perturbation, of an orbit that goes round twice);
     6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one;
-       `at_section_of` and
+       `has_events_of`, if the equations do not list events; `at_section_of` and
        `at_another_section`, if the state is given at a section that moves;
     7. **what bounds a step**: `barrier`, a test function that is negative where the equations do
        not hold, and `accepts`;
@@ -404,6 +404,12 @@ class OrbitEquations(ABC):
     def nearest(self, unknowns: np.ndarray, values: np.ndarray, other: Any) -> np.ndarray | None:
         """The unknowns of an orbit, counted such that they are nearest to those of the point
         `other` of a branch; None if the two cannot be compared so."""
+
+    def has_events_of(self, solution: Solution, other: Solution) -> bool:
+        """Whether an orbit has the same events as another one of such equations: always, where the
+        equations list them.
+        """
+        return True
 
     def at_section_of(self, point: Any, other: Any) -> Any:
         """A point with its state given at the section of another point or, if the equations have no

@@ -170,6 +170,9 @@ class WholeMotionEquations(OrbitEquations):
             return None
         return self.state_at(target.section, unknowns, values, other.solution.unknowns)
 
+    def has_events_of(self, solution: Solution, other: Solution) -> bool:
+        return events_of(solution.evaluation).sequence == events_of(other.evaluation).sequence
+
     def at_section_of(self, point: OrbitPoint, other: OrbitPoint) -> OrbitPoint:
         place = None if point.curve.joins(other.curve) else nearest(point, point.place, other)
         found = (
