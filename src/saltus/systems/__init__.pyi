@@ -24,6 +24,7 @@ from .mirror import is_its_image_later as is_its_image_later
 from .mirror import mirror_of as mirror_of
 from .model import MarginKind as MarginKind
 from .model import Model as Model
+from .model import ask as ask
 from .oscillators import RockingBlock as RockingBlock
 from .oscillators import WallOscillator as WallOscillator
 from .parameter_tables import broadcast_arrays as broadcast_arrays

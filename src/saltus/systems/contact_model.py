@@ -18,7 +18,7 @@ import numpy as np
 from saltus.checks import LIMITS, number_problem
 from saltus.errors import ParameterError, shown
 from saltus.systems.load import LoadOnSides, Sides
-from saltus.systems.model import Model, is_zero
+from saltus.systems.model import Model, ask, is_zero
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
 
@@ -688,7 +688,7 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
     ParameterError
         The model does not give as many as it has frictions.
     """
-    given = model.normal_forces(t, q, v, load) if model.frictions else ()
+    given = ask(model, "normal_forces", t, q, v, load) if model.frictions else ()
     if len(given) != len(model.frictions):
         kind = type(model).__name__
         count = len(model.frictions)
@@ -724,7 +724,7 @@ def mass_and_force(
     model: Any, t: Any, q: Any, v: Any, load: Any
 ) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
-    force = model.force(t, q, v, load, *sides_for(model, t, q, load))
+    force = ask(model, "force", t, q, v, load, *sides_for(model, t, q, load))
     return mass_rows(model, q, t, load), [force] if len(model.coordinates) == 1 else list(force)
 
 
@@ -733,9 +733,9 @@ def mass_rows(model: Any, q: Any, t: Any = 0.0, load: Any = None) -> list[list[A
     load as if none moved.
     """
     mass = (
-        model.mass_matrix(q, t, load)
+        ask(model, "mass_matrix", q, t, load)
         if getattr(model, "has_moving_walls", False)
-        else model.mass_matrix(q)
+        else ask(model, "mass_matrix", q)
     )
     if len(model.coordinates) == 1:
         return [[single_mass(mass)]]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, TraceError, near, shown
+from saltus.errors import ParameterError, SaltusError, TraceError, near, shown
 
 if TYPE_CHECKING:
     from saltus.systems.contact_model import Contact, Friction, Surface
@@ -556,6 +556,26 @@ def weighted(factors: Sequence[Any], values: Sequence[Any]) -> Any:
             term = value if isinstance(factor, float) and factor == 1.0 else factor * value
             total = term if is_zero(total) else total + term
     return total
+
+
+def ask(model: Any, method: str, *arguments: Any) -> Any:
+    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
+
+    Raises
+    ------
+    TraceError
+        The method raised an exception that is not saltus's own; the message has its type and text,
+        and it is the cause.
+    """
+    try:
+        return getattr(model, method)(*arguments)
+    except (SaltusError, KeyboardInterrupt):
+        raise
+    except BaseException as error:  # a user's own code may call exit
+        name = f"{type(model).__name__}.{method}"
+        single = len(getattr(model, "coordinates", ())) == 1 and "not subscriptable" in str(error)
+        hint = "; with one coordinate q and its velocity are numbers: write q, not q[0]" * single
+        raise TraceError(f"{name} failed: {type(error).__name__}: {error}{hint}") from error
 
 
 def is_zero(entry: Any) -> bool:

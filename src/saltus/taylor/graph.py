@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import LIMITS
-from saltus.errors import SaltusError, TraceError
+from saltus.errors import TraceError
 from saltus.taylor.rules import FUNCTIONS
 
 # The operations without Taylor recurrence that a reset may use, because it is evaluated at one
@@ -422,28 +422,6 @@ def _chain(node: Expr, d: list[Expr]) -> Expr:
         "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),
     }
     return as_expr(rules[node.op]())
-
-
-def ask(model: Any, method: str, *arguments: Any) -> Any:
-    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
-
-    Raises
-    ------
-    TraceError
-        The method raised an exception that is not saltus's own; the message has its type and text,
-        and it is the cause.
-    """
-    try:
-        return getattr(model, method)(*arguments)
-    except (SaltusError, KeyboardInterrupt):
-        raise
-    except BaseException as error:  # a user's own code may call exit
-        name = f"{type(model).__name__}.{method}"
-        single = len(getattr(model, "coordinates", ())) == 1 and "not subscriptable" in str(error)
-        hint = "; with one coordinate q and its velocity are numbers: write q, not q[0]" * single
-        raise TraceError(
-            f"{name} failed while it was traced: {type(error).__name__}: {error}{hint}"
-        ) from error
 
 
 def is_long(traced: Any) -> bool:
