@@ -226,6 +226,7 @@ def good(made):
         "orbits.is_symmetric": {"system": SYSTEM},
         "orbits.orbits_of": {"dataset": branch.to_xarray()},
         "studies.bordered_chart": {"system": SYSTEM},
+        "studies.prove_orbit_of": {**one},
         "studies.disagreements": {"chart": chart, "borders": studies.Borders()},
         "studies.with_borders": {"system": SYSTEM, "chart": chart},
         "studies.wrong_cells": {"system": SYSTEM, "chart": chart},

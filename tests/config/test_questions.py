@@ -42,7 +42,7 @@ def test_the_keys_of_a_question_are_the_arguments_of_its_functions_of(kind):
     named = {argument.name for argument in arguments if argument.kind is not argument.VAR_KEYWORD}
     assert KEYS[kind] == named - FOR_PYTHON_ALONE
     assert set(keys_of(kind, ("theta",))) - KEYS[kind] == (
-        {"theta"} if kind in ("basins", "frequency_sweep") else set()
+        {"theta"} if kind in ("basins", "frequency_sweep", "prove") else set()
     )
 
 

@@ -170,6 +170,7 @@ WITHOUT = {
     **dict.fromkeys(
         ("flow.load_releases", "flow.stroboscopic", "orbits.defects", "orbits.is_symmetric"), NUMBER
     ),
+    "studies.prove_orbit_of": "is drawn in tests/proofs/test_prove_command.py",
     "saltus.prove": "gives a theorem in words, and the enclosures in it",
     "studies.wrong_cells": NUMBER,
     "studies.disagreements": "gives a part of what studies.bordered_chart gives",

@@ -52,7 +52,8 @@ def test_stable_boxes_lie_on_one_side_of_the_fold(proof: saltus.orbits.BranchPro
 def test_boxes_are_read_back_as_a_table(proof: saltus.orbits.BranchProof) -> None:
     data = proof.to_xarray()
     assert data.sizes["box"] == len(proof.pieces[0].boxes)
-    assert (data.low < data.high).all()
+    assert (data.box_low < data.box_high).all()
+    assert data.proved.all()
     assert data.attrs["proved_share"] == 1.0
 
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.bounds.balls import UP, Ball, product
+from saltus.bounds.balls import UP, Ball, nearly_inverse, product
+from saltus.bounds.krawczyk import natural_weights
 from saltus.bounds.shooting import Enclosure, Shooting
 
 
@@ -27,6 +28,7 @@ class ArcSettings:
     tries: int = 3  # radii, each from the last result
     wide: float = 0.3  # the first radius, as a share of the way along the curve
     least_weight: float = 1e-2  # of a component's radius
+    least_radius: float = 1e-13  # in natural scales
     # A defect |I - A J| beyond which wider radii cannot help.
     hopeless: float = 50.0
 
@@ -88,9 +90,10 @@ def arc_box(shooting: Shooting, x: np.ndarray, row: np.ndarray, half: float) -> 
     unit = np.zeros(len(x))
     unit[-1] = 1.0
     y0 = product(Ball(inverse), residual.column).magnitude[:, 0]
-    rows = np.abs(inverse).sum(axis=1)
-    weights = np.maximum(rows / rows.max(), SETTINGS.least_weight)
-    radius = SETTINGS.wide * np.abs(tangent).max() * half * weights + 1e-13
+    weights = natural_weights(shooting, inverse)
+    weights = shooting.scales * np.maximum(weights / weights.max(), SETTINGS.least_weight)
+    way = float((np.abs(tangent) / shooting.scales).max()) * half
+    radius = SETTINGS.wide * way * weights + SETTINGS.least_radius * shooting.scales
     for _ in range(SETTINGS.tries):
         box = Ball(x, (np.abs(tangent) * half + radius) * UP)
         enclosure = shooting.enclose(box)
@@ -104,7 +107,7 @@ def arc_box(shooting: Shooting, x: np.ndarray, row: np.ndarray, half: float) -> 
         if (reach < radius).all():
             turn = _turn(inverse, jacobian, tangent, unit)
             return ArcBox(x, tangent, radius, row, half, turn, enclosure)
-        if not z.sum(axis=1).max() < SETTINGS.hopeless:
+        if not (z @ shooting.scales / shooting.scales).max() < SETTINGS.hopeless:
             return None
         radius = 1.5 * reach
     return None
@@ -120,10 +123,10 @@ def _zero_on(
         if not enclosure.proved:
             return None
         residual, jacobian = shooting.system_rows(enclosure, Ball(x))
-        try:
-            inverse = np.linalg.inv(jacobian.middle)
-        except np.linalg.LinAlgError:
+        nearly = nearly_inverse(jacobian.middle)
+        if nearly is None:
             return None
+        inverse = nearly
         if step < SETTINGS.newton - 1:
             x = x - inverse @ residual.middle
     return x, inverse, residual

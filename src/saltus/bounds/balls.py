@@ -13,12 +13,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 # Above 2^-53, the relative rounding of one operation, by more than its own products.
 EPS = 2.3e-16
 # Above the rounding of the few operations with which a radius itself is computed.
 UP = 1.0 + 1e-14
 TINY = 1e-290  # above what underflow loses
+# The rows from which on zeros of shooting equations are left out.
+SPARSE_FROM = 120
 # 2 pi less the double nearest to it is 2.449e-16 (Payne and Hanek's digits: 6.283185307179586476...)
 TWO_PI_RADIUS = 2.5e-16
 
@@ -133,6 +137,8 @@ def product(left: Ball, right: Ball) -> Ball:
 
     The rounding of BLAS is within gamma_n, in any order of its sums.
     """
+    if right.middle.ndim == 2 and min(right.middle.shape) >= SPARSE_FROM and left.middle.ndim == 2:
+        return _sparse_product(left, right)
     n = left.middle.shape[-1]
     sizes = np.abs(right.middle)
     rounding = (n + 2) * EPS * sizes
@@ -140,6 +146,38 @@ def product(left: Ball, right: Ball) -> Ball:
     spread = spread + left.radius @ (sizes + right.radius)
     radius = spread * (1.0 + (n + 4) * EPS) * UP + (n + 1) * TINY
     return Ball(left.middle @ right.middle, radius)
+
+
+def _sparse_product(left: Ball, right: Ball) -> Ball:
+    """The same with a sparse right matrix, as that of shooting equations, whose row of blocks is
+    the motion over one step: N^2 operations for N unknowns.
+
+    What is left out are products with exact zeros; n is the number of the others in a sum.
+    """
+    entries = sparse.csc_array((right.middle != 0.0) | (right.radius != 0.0))
+    n = int(np.diff(entries.indptr).max())
+    middle = sparse.csc_array(right.middle)
+    sizes = abs(middle)
+    rounding = (n + 2) * EPS * sizes
+    outer = sparse.csc_array(right.radius) + rounding
+    spread = np.abs(left.middle) @ outer
+    if left.radius.any():
+        spread = spread + left.radius @ (sizes + outer)
+    return Ball(left.middle @ middle, spread * (1.0 + (n + 4) * EPS) * UP + (n + 1) * TINY)
+
+
+def nearly_inverse(matrix: np.ndarray) -> np.ndarray | None:
+    """A matrix near the inverse; by elimination of blocks where it is large, N^2 operations for
+    shooting equations. None where it is singular.
+
+    Nothing is taken for granted of its accuracy.
+    """
+    try:
+        if len(matrix) < SPARSE_FROM:
+            return np.asarray(np.linalg.inv(matrix))
+        return np.asarray(splu(sparse.csc_matrix(matrix)).solve(np.eye(len(matrix))))
+    except (np.linalg.LinAlgError, RuntimeError):
+        return None
 
 
 def solve(matrix: Ball, right: Ball) -> Ball | None:
@@ -154,9 +192,8 @@ def solve(matrix: Ball, right: Ball) -> Ball | None:
         None where |E| < 1 could not be shown, so that a matrix of the ball may be singular.
     """
     size = len(matrix.middle)
-    try:
-        inverse = np.linalg.inv(matrix.middle)
-    except np.linalg.LinAlgError:
+    inverse = nearly_inverse(matrix.middle)
+    if inverse is None:
         return None
     nearly = inverse @ right.middle
     rest = product(Ball(inverse), right - product(matrix, Ball(nearly))).magnitude

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.bounds.balls import EPS, UP, Ball, product, solve
+from saltus.bounds.balls import EPS, UP, Ball, nearly_inverse, product, solve
 from saltus.bounds.shooting import Enclosure, Shooting
 
 
@@ -21,9 +21,9 @@ class KrawczykSettings:
     """How a box is looked for in which the operator proves a zero."""
 
     newton: int = 12  # steps of Newton's method before it, at most
-    rough: float = 1e-3  # a longer step need not be shorter than the last one
+    rough: float = 1e-3  # in natural scales; a longer step need not be shorter than the last one
     boxes: int = 4  # tried, each twice as wide as the last result
-    least_radius: float = 1e-16  # relative to 1 and to the unknowns
+    least_radius: float = 1e-16  # relative to the natural scales and to the unknowns
     wide_boxes: int = 12  # tried for uniqueness
     # A box is wide enough if its result fills this share of it.
     filled: float = 0.6
@@ -49,6 +49,8 @@ class ProvedZero:
         The equations over the box.
     unique
         The radii of a box, as wide as was found, that has no other zero, (unknowns,).
+    condition
+        How far an unknown moves, in natural scales, where the equations are off by one.
     """
 
     middle: np.ndarray
@@ -57,16 +59,12 @@ class ProvedZero:
     residual: Ball
     enclosure: Enclosure
     unique: np.ndarray
+    condition: float
 
     @property
     def box(self) -> Ball:
         """The box in which the zero lies."""
         return Ball(self.middle, self.radius)
-
-    @property
-    def condition(self) -> float:
-        """The largest row sum of A."""
-        return float(np.abs(self.inverse).sum(axis=1).max())
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,8 @@ def prove_zero(
         return near
     x, inverse, residual = near
     y = product(Ball(inverse), residual.column).magnitude[:, 0]
-    floor = settings.least_radius * np.maximum(1.0, np.abs(x))
+    condition = float(natural_weights(shooting, inverse).max())
+    floor = settings.least_radius * np.maximum(shooting.scales, np.abs(x))
     radius = 2.0 * y + floor
     reason = ""
     for _ in range(settings.boxes):
@@ -112,12 +111,11 @@ def prove_zero(
             alone = radius
             if unique:
                 alone = _widest(shooting, x, inverse, residual, radius, settings)
-            return ProvedZero(x, tight, inverse, residual, inner, alone)
+            return ProvedZero(x, tight, inverse, residual, inner, alone, condition)
         share = float((reach / radius).max())
-        size = float(np.abs(inverse).sum(axis=1).max())
         reason = (
             f"Krawczyk's operator does not contract: its image is {share:.3g} times as wide as the "
-            f"box, with an inverse of norm {size:.2g}"
+            f"box, at a condition of {condition:.2g}"
         )
         radius = 2.0 * reach
     return NotProved(reason)
@@ -133,7 +131,8 @@ def _tightened(
         enclosure = shooting.enclose(Ball(x, radius))
         jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
         reach = np.minimum(radius, contraction(inverse, residual, jacobian, radius))
-        if not enclosure.proved or not reach.sum() < 0.5 * radius.sum():
+        shrinks = (reach / shooting.scales).sum() < 0.5 * (radius / shooting.scales).sum()
+        if not enclosure.proved or not shrinks:
             return radius, enclosure
         radius = reach
 
@@ -150,18 +149,30 @@ def _newton(shooting: Shooting, steps: int) -> tuple[np.ndarray, np.ndarray, Bal
         residual, jacobian = shooting.system_rows(enclosure, Ball(x))
         if not enclosure.proved or not np.isfinite(jacobian.middle).all():
             return NotProved("a Taylor step at the orbit has no enclosure")
-        try:
-            inverse = np.linalg.inv(jacobian.middle)
-        except np.linalg.LinAlgError:
+        nearly = nearly_inverse(jacobian.middle)
+        if nearly is None:
             return NotProved("the equations are singular there")
+        inverse = nearly
         change = inverse @ residual.middle
-        length = float((np.abs(change) / np.maximum(1.0, np.abs(x))).max())
+        length = float((np.abs(change) / np.maximum(shooting.scales, np.abs(x))).max())
         shorter = length < 0.5 * last or length > SETTINGS.rough
         if step == steps or not shorter or length < 0.1 * EPS:
             break
         x = x - change
         last = length
     return x, inverse, residual
+
+
+def natural_weights(shooting: Shooting, inverse: np.ndarray) -> np.ndarray:
+    """How far the unknowns move, in natural scales, where every equation is off by its natural
+    scale: row sums of the inverse Jacobian that depend on no units.
+    """
+    nodes = shooting.scales[shooting.event_unknowns :][: 2 * shooting.dof]
+    rows = np.ones(len(inverse))
+    if len(nodes):
+        count = 2 * shooting.dof * len(shooting.steps)
+        rows[:count] = np.tile(nodes, len(shooting.steps))
+    return np.asarray(np.abs(inverse) @ rows / shooting.scales)
 
 
 def _widest(
@@ -173,9 +184,9 @@ def _widest(
     settings: KrawczykSettings,
 ) -> np.ndarray:
     """Radii, nearly the largest ones, in which the operator proves that there is no other zero."""
-    rows = np.abs(inverse).sum(axis=1)
-    weights = np.maximum(rows / rows.max(), 1e-3)
-    scale = min(1e-3, 1e-2 / float(rows.max()))
+    weights = natural_weights(shooting, inverse)
+    scale = min(1e-3, 1e-2 / float(weights.max()))
+    weights = shooting.scales * np.maximum(weights / weights.max(), 1e-3)
     best = proved
     found = False
     for attempt in range(settings.wide_boxes):

@@ -21,8 +21,7 @@ import numpy as np
 
 from saltus.bounds.balls import TWO_PI_RADIUS, Ball, product
 from saltus.bounds.tape import Steps, Tape, load_balls
-from saltus.errors import ParameterError
-from saltus.systems import System, numbers
+from saltus.systems import System, natural_units, numbers
 from saltus.taylor import FREQUENCY, Expr, differentiate, number, substitute
 
 TIME = Expr("time")
@@ -202,7 +201,7 @@ class ShootingSettings:
     Longer steps of higher order have fewer unknowns at the same width of the enclosures.
     """
 
-    step: float = 0.45  # the longest, also times the forcing frequency
+    step: float = 0.35  # the longest, in the time in which the system moves by itself
     order: int = 36
 
 
@@ -258,6 +257,9 @@ class Shooting:
         The segments, one for each event; segment i begins with event i.
     guess
         The unknowns of the events, (events, P).
+    event_names, state_names
+        The names of the kinds of unknowns: of each event, (events, P), and of the states at the
+        nodes, (2 D).
     span
         The forcing periods after which the last segment ends.
     path
@@ -268,11 +270,6 @@ class Shooting:
         Rows c and numbers d; with them the parameter at `path` is unknown.
     free_time
         Whether the time of an event is its first unknown; else it is 0.
-
-    Raises
-    ------
-    ParameterError
-        `radii` names no number of the system, or has a negative radius.
     """
 
     def __init__(
@@ -280,6 +277,8 @@ class Shooting:
         system: System,
         segments: Sequence[Segment],
         guess: np.ndarray,
+        event_names: Sequence[Sequence[str]],
+        state_names: Sequence[str],
         span: float,
         *,
         path: str | None = None,
@@ -297,7 +296,7 @@ class Shooting:
         self.free_time = free_time
         names = [name for name, _ in numbers(system)]
         middles = np.array([float(value) for _, value in numbers(system)])
-        self.parameters = Ball(middles, _radii(names, radii or {}))
+        self.parameters = Ball(middles, [float((radii or {}).get(name, 0.0)) for name in names])
         self.path_place = None if path is None else names.index(path)
         self.frequency_place = names.index(FREQUENCY)
         self.pins = None if pins is None else list(pins)
@@ -315,11 +314,36 @@ class Shooting:
             self._groups.append(made[key])
         self._distinct = list(made.values())
         self._layout(guess)
+        nodes = sum(not step.from_event for step in self.steps)
+        self.names = [name for names in event_names for name in names]
+        self.names += [*state_names] * nodes + [path or ""] * (self.pins is not None)
+        self.scales = self._natural_scales()
 
     @property
     def size(self) -> int:
         """The number of unknowns."""
         return int(self.x0.size)
+
+    def _natural_scales(self) -> np.ndarray:
+        """The unit of each unknown in which the sizes of boxes are measured: 1 / Omega of a time,
+        and of all others the largest modulus of their kind along the orbit.
+        """
+        result = np.ones(self.size)
+        for name in dict.fromkeys(self.names):
+            places = [place for place, other in enumerate(self.names) if other == name]
+            largest = float(np.abs(self.x0[places]).max())
+            result[places] = largest if largest > 0.0 else 1.0
+        if self.free_time:
+            times = range(0, self.event_unknowns, self.event_size)
+            result[times] = 1.0 / self.parameters.middle[self.frequency_place]
+        return result
+
+    def by_name(self, radius: np.ndarray) -> dict[str, float]:
+        """The least of some radii for each kind of unknowns."""
+        result: dict[str, float] = {}
+        for name, value in zip(self.names, radius, strict=True):
+            result[name] = min(result.get(name, np.inf), float(value))
+        return result
 
     @property
     def event_unknowns(self) -> int:
@@ -329,7 +353,7 @@ class Shooting:
     def _layout(self, guess: np.ndarray) -> None:
         """Place nodes along the segments; their states are guessed step after step."""
         frequency = self.parameters.middle[self.frequency_place]
-        longest = self.settings.step * min(1.0, 1.0 / frequency)
+        longest = self.settings.step * natural_units(self.system).own_time
         first = guess[:, 0] if self.free_time else np.zeros(len(guess))
         times = [*first, first[0] + self.span * 2.0 * np.pi / frequency]
         unknowns = [float(value) for event in guess for value in event]
@@ -704,19 +728,3 @@ def _joined(first: Ball, second: Ball) -> Ball:
         np.concatenate([first.middle, second.middle], axis=-1),
         np.concatenate([first.radius, second.radius], axis=-1),
     )
-
-
-def _radii(names: list[str], radii: dict[str, float]) -> np.ndarray:
-    """The radius of each number."""
-    for name, radius in radii.items():
-        if name not in names:
-            raise ParameterError(
-                f"radii names {name!r}, which is no number of the system; it has "
-                f"{', '.join(names)}",
-                "radii",
-            )
-        if not (np.isfinite(radius) and radius >= 0.0):
-            raise ParameterError(
-                f"radii[{name!r}] must be a radius, 0 or more, got {radius!r}", f"radii.{name}"
-            )
-    return np.array([float(radii.get(name, 0.0)) for name in names])

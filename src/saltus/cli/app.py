@@ -193,7 +193,7 @@ def run(
 
     The study's tables say what: \[simulate], \[phase_portrait],
     \[response_spectrum], \[bifurcation_diagram], \[attractors], \[basins],
-    \[stability_chart]. All is checked before anything is computed. Diagrams,
+    \[stability_chart], \[prove]. All is checked before anything is computed. Diagrams,
     charts and basins that were stopped go on where they were. A model of your own is
     Python code, and is run.
 
@@ -203,6 +203,27 @@ def run(
         from saltus.cli.run_command import run_study
 
         run_study(study, output, plot, scheduler, fresh)
+
+
+@app.command()
+def prove(
+    study: Study,
+    output: Output = None,
+    plot: Annotated[bool, typer.Option(help="Draw the orbit or the branch.")] = True,
+) -> None:
+    """Prove that a study's orbit, or its branch, exists: theorems by interval arithmetic.
+
+    The study's \\[prove] says from where a motion settles on the orbit, and, with
+    path and bounds, along which branch. Writes prove.nc and its picture, and
+    prints the theorems, all numbers rounded outward. A model of your own is
+    Python code, and is run.
+
+    Example: [cyan]saltus prove study.toml[/]
+    """
+    with guarded():
+        from saltus.cli.run_command import prove_study
+
+        prove_study(study, output, plot)
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""`saltus simulate`, `run`, `plot`, `page` and `explore`: a study's motion and the answers to its
+"""`saltus simulate`, `run`, `prove`, `plot`, `page` and `explore`: a study's motion and the answers to its
 questions, computed, written and drawn, and its page."""
 
 from __future__ import annotations
@@ -60,6 +60,28 @@ def run_study(
         simulate_study(path, output, plot)
     for ask in study.asks:
         answer(study, ask, output, plot, scheduler)
+
+
+def prove_study(path: Path, output: Path | None, plot: bool) -> None:
+    """Prove what [prove] of the study at `path` asks for, and print the theorems.
+
+    Raises
+    ------
+    SaltusError
+        A bad study or one without [prove], a folder that cannot be written to, all before anything
+        is computed; then what finding the orbit raises.
+    """
+    from saltus.config import load_study
+    from saltus.files import check_writable
+
+    study = load_study(path)
+    asks = [ask for ask in study.asks if ask.kind == "prove"]
+    if not asks:
+        study.source.refuse((), "has no [prove]; add one, such as [prove] theta = 0.3")
+    output = Path("results") / study.name if output is None else output
+    check_writable(output)
+    check(study, asks[0], output)
+    answer(study, asks[0], output, plot, None)
 
 
 def check(study: Study, ask: Ask, output: Path | None) -> None:

@@ -194,6 +194,13 @@ def _attractors(data: Any) -> Iterator[str]:
         yield f"undecided: {100 * left:.3g} % of the {of}"
 
 
+def _theorems(data: Any) -> Iterator[str]:
+    statements = data["special_statement"].values if "special_statement" in data else ()
+    yield from (str(statement) for statement in statements if statement)
+    yield str(data.attrs["statement"])
+    yield f"Assumed: {data.attrs['assumptions']}."
+
+
 SUMMARIES: dict[str, Callable[[Any], Iterator[str]]] = {
     "phase_portrait": _portrait,
     "response_spectrum": _diagram,
@@ -202,6 +209,7 @@ SUMMARIES: dict[str, Callable[[Any], Iterator[str]]] = {
     "attractors": _attractors,
     "basins": _attractors,
     "stability_chart": _chart,
+    "prove": _theorems,
 }
 
 

@@ -280,6 +280,21 @@ def read_paths(value: Any) -> tuple[str, str]:
     return value[0], value[1]
 
 
+def read_numbers_by_name(value: Any) -> dict[str, float]:
+    """Numbers by names, such as dotted paths in quotes."""
+    if not isinstance(value, dict):
+        raise ValueError(
+            f'must be a table of numbers, such as {{ "model.damping" = 1e-6 }}, got {show(value)}'
+        )
+    result: dict[str, float] = {}
+    for name, number in value.items():
+        try:
+            result[name] = read_angle(number)
+        except ValueError as error:
+            raise ValueError(f"has a number {name!r:.60} that {error}") from None
+    return result
+
+
 def read_within(reader: Reader, **bounds: Any) -> Reader:
     """A reader of the same values as `reader`, within the bounds of `check_number`."""
 
@@ -307,6 +322,7 @@ READERS: dict[Any, Reader] = {
     tuple[Pair, ...]: read_pairs,
     tuple[str, str]: read_paths,
     Iterable[Pair]: read_pairs,
+    Mapping[str, float]: read_numbers_by_name,
     Iterable[float]: read_values,
     Iterable[float] | float: read_values_or_number,
 }  # how a file gives an argument of each type

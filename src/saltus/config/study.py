@@ -131,6 +131,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "attractors": ("find_attractors",),
     "basins": ("basins_of_attraction",),
     "stability_chart": ("stability_chart", "studies.bordered_chart"),
+    "prove": ("studies.prove_orbit_of",),
 }  # The first function that takes all the given keys answers; a function with open-ended options passes them to the other.
 # these come from the rest of the file or the command line
 NOT_IN_FILES = ("system", "store", "workers", "scheduler")

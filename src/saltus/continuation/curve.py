@@ -29,6 +29,8 @@ class Evidence:
         The test function at the point itself.
     witness
         At a change of an orbit's events, what vanishes there, such as "gap of stop"; else empty.
+    proof
+        What is proved of it, as `prove(branch).branch` has it; None if nobody has asked.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class Evidence:
     after: float
     value: float
     witness: str = ""
+    proof: Any = None
 
     @property
     def bracket(self) -> float:

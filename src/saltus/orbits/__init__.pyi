@@ -22,6 +22,8 @@ from .orbits_as_json import as_json as as_json
 from .orbits_as_json import from_json as from_json
 from .proofs.branch_proof import BranchProof as BranchProof
 from .proofs.orbit_proof import OrbitProof as OrbitProof
+from .proofs.proving import check_proof as check_proof
+from .proofs.proving import prove as prove
 from .proofs.special_proof import SpecialProof as SpecialProof
 from .signature import Signature as Signature
 from .verify import closing_distances as closing_distances

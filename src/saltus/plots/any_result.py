@@ -47,7 +47,13 @@ from saltus.plots.curves import (
     draw_search,
     draw_special_curve,
 )
-from saltus.plots.motion import draw_ensemble, draw_motion, draw_sensitivities, draw_sweep
+from saltus.plots.motion import (
+    draw_ensemble,
+    draw_motion,
+    draw_proof,
+    draw_sensitivities,
+    draw_sweep,
+)
 from saltus.plots.plane import draw_manifold, draw_plane, draw_separatrix
 from saltus.plots.response import draw_diagram
 from saltus.plots.unit_cell import draw_unit_cell
@@ -227,6 +233,11 @@ def draw_fit(
     return ax
 
 
+def draw_theorems(dataset: Any, **options: Any) -> Any:
+    """Draw the answer of a study's [prove]: a branch, or an orbit; returns the axes."""
+    return (draw_branch if "special_proved" in dataset else draw_proof)(dataset, **options)
+
+
 DRAWINGS: dict[str, Callable[..., Any]] = {
     "attractors": draw_attractors,
     "attractors along a parameter": draw_attractors_along,
@@ -235,6 +246,7 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "basins": draw_basins,
     "bifurcation_diagram": draw_diagram,
     "branch": draw_branch,
+    "branch_proof": draw_branch,
     "cascade": draw_cascade,
     "cell": draw_unit_cell,
     "chaotic_bands": draw_chaotic_bands,
@@ -252,10 +264,13 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
     "orbits": draw_search,
     "overturning_spectrum": draw_overturning,
     "periodic_orbit": draw_motion,
+    "proof": draw_proof,
+    "prove": draw_theorems,
     "phase_portrait": draw_plane,
     "response_spectrum": draw_diagram,
     "sensitivities": draw_sensitivities,
     "separatrix": draw_separatrix,
+    "special_proof": draw_proof,
     "stability_chart": draw_stability_chart,
     "uncertainty_exponent": draw_uncertainty,
     "verdict": draw_verdict,

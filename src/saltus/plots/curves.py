@@ -4,15 +4,18 @@ of a search, and a cascade.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from saltus.plots.basins import attractor_colours
-from saltus.plots.branch_cuts import smooth_lines
+from saltus.plots.branch_cuts import ModelValidity, smooth_lines
 from saltus.plots.conventions import (
     LOOK,
     axes_or_new,
@@ -35,6 +38,33 @@ RESTS: dict[str, dict[str, Any]] = {
 REST_NAMES = {"RL": "lost release (RL)", "CH": "end of a rest (CH)"}
 
 
+PALE_INK: dict[str, Any] = {"alpha": 0.3}  # of what is not proved
+PROVED_MARK: dict[str, Any] = {
+    "marker": ".",
+    "ms": 2.2,
+    "ls": "none",
+    "color": LOOK.ink,
+    "zorder": 6,
+}
+
+
+def _in_ink(dataset: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """The runs of a branch's points that are proved and that are not, with their ink; a step
+    between both is not proved.
+    """
+    if "proved" not in dataset:
+        yield dataset, {}
+        return
+    proved = dataset["proved"].values == 1
+    changes = [0, *(np.flatnonzero(proved[1:] != proved[:-1]) + 1), proved.size]
+    for first, end in itertools.pairwise(changes):
+        if proved[first]:
+            yield dataset.isel(point=slice(first, end)), {}
+        else:
+            part = slice(max(first - 1, 0), min(end + 1, proved.size))
+            yield dataset.isel(point=part), PALE_INK
+
+
 @drawing
 def draw_branch(
     dataset: Any,
@@ -45,10 +75,13 @@ def draw_branch(
 ) -> Axes:
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special
     points; returns `ax`.
+
+    Of the dataset of a proof, what is proved is in full ink, and the rest pale.
     """
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
-    for line in smooth_lines(dataset, quantity):
-        ax.plot(*line.places.T, **line_style(line.stable, line.validity))
+    for part, ink in _in_ink(dataset):
+        for line in smooth_lines(part, quantity):
+            ax.plot(*line.places.T, **line_style(line.stable, line.validity), **ink)
     kinds = dataset["kind"].values
     for kind, mark in (MARKS | RESTS).items():
         if (kinds == kind).any():
@@ -67,6 +100,15 @@ def draw_branch(
             )
     handles, labels, handlers = line_handles([dataset])
     named = dict(zip(labels, handles, strict=True)) | marks_of(ax)
+    if "special_proved" in dataset:
+        proved = dataset["special_proved"].values == 1
+        places = (dataset[f"special_{name}"].values[proved] for name in ("parameter", quantity))
+        ax.plot(*places, label="proved", **PROVED_MARK)
+    if "proved" in dataset:
+        ink_line = {**line_style(True, ModelValidity.ASSUMPTION), "color": LOOK.ink}
+        named["proved"] = (Line2D([], [], **ink_line), Line2D([], [], **PROVED_MARK))
+        if not dataset["proved"].values.all():
+            named["not proved"] = Line2D([], [], **ink_line, **PALE_INK)
     legend = {
         "handles": [*named.values()],
         "labels": [*named],

@@ -89,6 +89,20 @@ def draw_motion(
     return np.array([history, portrait]) if ax is None else ax
 
 
+@drawing
+def draw_proof(
+    dataset: xarray.Dataset, *, ax: Axes | None = None, figure: Figure | None = None
+) -> Any:
+    """The motion of an orbit of which something is proved, with what it is as a title; returns both
+    axes.
+    """
+    axes = draw_motion(dataset, ax=ax, figure=figure)
+    kind = str(dataset.attrs.get("special_kind", "orbit"))
+    told = {"true": "is proved", "false": "is refuted"}.get(dataset.attrs["proved"], "is undecided")
+    np.ravel(axes)[0].set_title(f"This {kind} {told}")
+    return axes
+
+
 def coordinates(dataset: xarray.Dataset) -> list[str]:
     """The names of the coordinates in a motion's dataset; variables of whole numbers are sides and
     states of contacts.

@@ -290,6 +290,11 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "test_value": [s.evidence.value for s in special],
         "special_defect": [s.defect for s in special],
     }
+    proofs = [s.evidence.proof for s in special]
+    if any(proof is not None for proof in proofs):
+        rows["special_proved"] = [int(p is not None and bool(p.proved)) for p in proofs]
+        rows["special_enclosure"] = [np.nan if p is None else p.parameter[0] for p in proofs]
+        rows["special_radius"] = [np.inf if p is None else p.parameter[1] for p in proofs]
     return {
         name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()
     }
@@ -301,7 +306,7 @@ def _dtype(name: str) -> type:
         str
         if name == "kind"
         else int
-        if name in ("special_impact_count", "special_period")
+        if name in ("special_impact_count", "special_period", "special_proved")
         else float
     )
 

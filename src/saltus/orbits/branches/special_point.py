@@ -237,4 +237,8 @@ class SpecialPoints(RowTable, tuple[SpecialPoint, ...]):
             "period": [point.orbit.period for point in self],
         }
         columns |= {"impacts": [point.orbit.impact_count for point in self]}
-        return columns | {"bracket": [point.evidence.bracket for point in self]}
+        columns |= {"bracket": [point.evidence.bracket for point in self]}
+        proofs = [point.evidence.proof for point in self]
+        if any(proof is not None for proof in proofs):
+            columns["proved"] = [proof is not None and bool(proof.proved) for proof in proofs]
+        return columns

@@ -24,10 +24,11 @@ from saltus.bounds import (
 )
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.proofs.orbit_proof import ASSUMPTIONS, MIRROR
+from saltus.orbits.proofs.orbit_proof import ASSUMPTIONS, MIRROR, with_proof
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.proofs.special_proof import MEANINGS, prove_special
 from saltus.progress import Progress, silent
-from saltus.result import Result, result_dataset
+from saltus.result import Result
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 class BranchProofSettings:
     """How boxes follow a branch."""
 
-    first: float = 1e-3  # half of the length of a first box
+    # Half of the length of a first box; lengths are in natural scales.
+    first: float = 1e-3
     least: float = 1e-9  # below which a piece ends
     # Beside a fold boxes are not halved below this for the sign of d parameter / ds alone.
     sign: float = 2e-4
@@ -101,6 +103,8 @@ class BranchProof(Result):
         What is taken for granted.
     seconds
         The processor time.
+    branch
+        The branch; its special points have their proofs in `evidence.proof`.
 
     Examples
     --------
@@ -118,6 +122,12 @@ class BranchProof(Result):
     branch: Branch = field(repr=False)
 
     @property
+    def proved_special(self) -> int:
+        """How many of its special points are proved."""
+        proofs = [point.evidence.proof for point in self.branch.special]
+        return sum(proof is not None and bool(proof.proved) for proof in proofs)
+
+    @property
     def proved_share(self) -> float:
         """The share of the branch's points that lie on proved pieces."""
         return float(self.proved.mean()) if self.proved.size else 0.0
@@ -126,6 +136,7 @@ class BranchProof(Result):
         boxes = sum(len(piece.boxes) for piece in self.pieces)
         facts: dict[str, Any] = {
             "proved_share": rounded_down(self.proved_share, 3),
+            "special": f"{self.proved_special} of {len(self.branch.special)}",
             "pieces": len(self.pieces),
             "boxes": boxes,
         }
@@ -137,30 +148,37 @@ class BranchProof(Result):
     def statement(self) -> str:
         """The theorem, a sentence for each piece."""
         told = [_of_piece(piece, self.path) for piece in self.pieces]
+        if self.branch.special:
+            told.append(
+                f"{self.proved_special} of {len(self.branch.special)} special points are proved."
+            )
         told += [f"Not proved: {reason}." for reason in self.reasons]
         return " ".join(told) or "Nothing is proved."
 
     def to_xarray(self) -> xarray.Dataset:
-        """A Dataset with the boxes of all pieces, and whether each point is proved."""
+        """The branch's dataset with the columns `proved` of its points and `special_proved` of its
+        special points, with the boxes of all pieces, and with the statement as an attribute.
+        """
         boxes = [(number, box) for number, piece in enumerate(self.pieces) for box in piece.boxes]
         stable = [-1 if box.stable is None else int(box.stable) for _, box in boxes]
+        proofs = [point.evidence.proof for point in self.branch.special]
+        statements = ["" if proof is None else proof.statement for proof in proofs]
         columns = {
-            "proved": ("point", self.proved, "1", "lies on a proved piece"),
-            "piece": ("box", [number for number, _ in boxes], "1", "number of the piece"),
-            "low": ("box", [box.low for _, box in boxes], "1", "least parameter"),
-            "high": ("box", [box.high for _, box in boxes], "1", "largest parameter"),
-            "stable": ("box", stable, "1", "1 stable, 0 unstable, -1 undecided"),
-            "turn": ("box", [box.turn for _, box in boxes], "1", "sign of d parameter / ds"),
-            "least_speed": ("box", [box.least_speed for _, box in boxes], "1", "lower bound"),
+            "proved": ("point", self.proved.astype(np.int8), "lies on a proved piece"),
+            "special_statement": ("special", np.array(statements, dtype=str), "theorem"),
+            "box_piece": ("box", [number for number, _ in boxes], "number of the piece"),
+            "box_low": ("box", [box.low for _, box in boxes], "least parameter"),
+            "box_high": ("box", [box.high for _, box in boxes], "largest parameter"),
+            "box_stable": ("box", stable, "1 stable, 0 unstable, -1 undecided"),
+            "box_turn": ("box", [box.turn for _, box in boxes], "sign of d parameter / ds"),
+            "box_speed": ("box", [box.least_speed for _, box in boxes], "least speed, lower bound"),
         }
         facts = {
-            "path": self.path,
             "proved_share": self.proved_share,
             "statement": self.statement,
             "assumptions": "; ".join(self.assumptions),
         }
-        system = self.branch.points[0].orbit.system
-        return result_dataset("branch_proof", columns, system=system, **facts)
+        return with_proof(self.branch.to_xarray(), "branch_proof", columns, facts)
 
 
 def _of_piece(piece: ProvedPiece, path: str) -> str:
@@ -193,7 +211,13 @@ def prove_branch(
     pieces: list[ProvedPiece] = []
     reasons: list[str] = []
     left = most_boxes
-    for first, last in _runs(points):
+    special = tuple(
+        replace(point, evidence=replace(point.evidence, proof=prove_special(point, radii, steps)))
+        if point.kind in MEANINGS
+        else point
+        for point in branch.special
+    )
+    for first, last in _runs(points) if most_boxes else ():
         if left <= 0:
             reasons.append(f"points {first} to {last}: {most_boxes} boxes were used up")
             continue
@@ -215,7 +239,7 @@ def prove_branch(
         reasons=tuple(reasons),
         assumptions=(*ASSUMPTIONS, *((MIRROR,) * symmetric)),
         seconds=time.process_time() - began,
-        branch=branch,
+        branch=replace(branch, special=special),
     )
 
 
@@ -309,6 +333,8 @@ class _Walk:
             system,
             made.segments,
             made.guess,
+            made.event_names,
+            made.state_names,
             orbit.signature.span,
             path=self.path,
             radii=self.radii,
@@ -439,13 +465,14 @@ def _row_along(shooting: Shooting, x: np.ndarray, tangent: np.ndarray) -> np.nda
     """The row of the arclength of events and parameter, in the direction of the last one."""
     enclosure = shooting.enclose(Ball(x))
     jacobian = shooting.system_rows(enclosure, Ball(x))[1].middle[:-1]
-    along = np.linalg.svd(jacobian)[2][-1]
+    along = np.linalg.svd(jacobian * shooting.scales)[2][-1]
     row = np.zeros(len(x))
     count = shooting.event_unknowns
     row[:count] = along[:count]
     row[-1] = along[-1]
     row /= np.linalg.norm(row)
-    return np.asarray(row if float(along @ tangent) > 0.0 else -row)
+    row /= shooting.scales
+    return np.asarray(row if float((along * shooting.scales) @ tangent) > 0.0 else -row)
 
 
 def _tangent(shooting: Shooting, x: np.ndarray, row: np.ndarray) -> np.ndarray | None:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from saltus.bounds import Gap, Segment, Unknowns, coordinate, velocity
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments, names_of_states
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 from saltus.taylor import Expr, Trace, number, substitute, trace
@@ -58,8 +58,10 @@ def contact_segments(
     if reason is not None:
         return CannotProve(reason)
     maker = _Maker(system, traced)
+    names = names_of_states(system.model.coordinates)
     if not signature.events:
-        return OrbitSegments((maker.section(signature),), states[:1], free_time=False)
+        section = maker.section(signature)
+        return OrbitSegments((section,), states[:1], (names,), names, free_time=False)
     events = list(signature.events)
     last = events[0].image(images) if signature.symmetric else events[0]
     segments = []
@@ -75,7 +77,8 @@ def contact_segments(
             for event, phase, state in zip(events, phases, states, strict=True)
         ]
     )
-    return OrbitSegments(tuple(segments), guess, touching=touching)
+    event_names = tuple(maker.names_of(event.contact, names) for event in events)
+    return OrbitSegments(tuple(segments), guess, event_names, names, touching=touching)
 
 
 def _refused(traced: Trace, signature: Signature) -> str | None:
@@ -111,6 +114,12 @@ class _Maker:
         speed = -self.traced.signs[contact] * state[self.dof + held]
         inner = [*state[others], *state[[self.dof + i for i in others]]]
         return [time, float(speed), *map(float, inner)]
+
+    def names_of(self, contact: int, states: Sequence[str]) -> tuple[str, ...]:
+        """The names of an impact's unknowns."""
+        held = self.traced.contact_coordinates[contact]
+        inner = [states[i] for i in self._others(held)]
+        return ("time", "speed", *inner, *(states[self.dof + i] for i in self._others(held)))
 
     def segment(self, begin: int, end: int, mirror: float, touches: tuple[bool, bool]) -> Segment:
         """The segment from an impact at contact `begin` to one at contact `end`; the unknowns of

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.bounds import Gap, Segment, Tape, Unknowns, as_ball, coordinate, velocity
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments, names_of_states
 from saltus.orbits.signature import Signature
 from saltus.systems import System, numbers
 from saltus.taylor import Expr, Trace, number, substitute, trace
@@ -17,6 +17,7 @@ from saltus.taylor import Expr, Trace, number, substitute, trace
 SIDE = Expr("side")
 POSITION = coordinate(0)
 RATE = velocity(0)
+IMPACT = ("time", "speed")  # the unknowns of an impact
 
 
 def one_contact_segments(
@@ -33,20 +34,25 @@ def one_contact_segments(
     if reason is not None:
         return CannotProve(reason)
     maker = _Maker(system)
+    states = names_of_states(system.model.coordinates)
     if not signature.sides:
         if touch is not None:
-            return OrbitSegments((maker.touching(signature),), np.array([[touch, 0.0]]), touching=0)
-        return OrbitSegments((maker.section(signature),), unknowns[None], free_time=False)
+            guess = np.array([[touch, 0.0]])
+            touching = maker.touching(signature)
+            return OrbitSegments((touching,), guess, (IMPACT,), states, touching=0)
+        section = maker.section(signature)
+        return OrbitSegments((section,), unknowns[None], (states,), states, free_time=False)
     guess = unknowns.reshape(-1, 2).copy()
     guess[:, 0] /= frequency
     if touch is None:
-        return OrbitSegments(maker.between_impacts(signature), guess)
+        names = (IMPACT,) * len(guess)
+        return OrbitSegments(maker.between_impacts(signature), guess, names, states)
     closing = 2.0 * np.pi * signature.span / frequency
     time = guess[0, 0] + (touch - guess[0, 0]) % closing
     before = int(np.searchsorted(guess[:, 0], time)) - 1
     guess = np.insert(guess, before + 1, [time, 0.0], axis=0)
     segments = maker.between_impacts(signature, before)
-    return OrbitSegments(segments, guess, touching=before + 1)
+    return OrbitSegments(segments, guess, (IMPACT,) * len(guess), states, touching=before + 1)
 
 
 def refused(traced: Trace) -> str | None:

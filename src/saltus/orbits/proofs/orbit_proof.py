@@ -25,7 +25,7 @@ from saltus.bounds import (
 )
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
-from saltus.result import Result, result_dataset
+from saltus.result import Result
 
 if TYPE_CHECKING:
     import xarray
@@ -69,8 +69,8 @@ class OrbitProof(Result):
         Middles and radii of the times of its impacts and of the speeds at which the gap closes, of
         the time that its equations cover, (impacts, 2).
     unique_within
-        No other orbit of its signature has all unknowns (times, speeds, states at the nodes) within
-        this.
+        Radii by the kind of unknown, in its own unit: no other orbit of its signature has all times
+        and speeds of its impacts, and all coordinates and velocities at the nodes, within them.
     least_speed
         A lower bound of the speeds of its impacts; inf without impacts.
     stable
@@ -96,7 +96,7 @@ class OrbitProof(Result):
     reason: str
     impact_times: np.ndarray
     impact_speeds: np.ndarray
-    unique_within: float
+    unique_within: dict[str, float]
     least_speed: float
     stable: bool | None
     moduli: np.ndarray
@@ -114,7 +114,7 @@ class OrbitProof(Result):
         if self.reason:
             facts["reason"] = self.reason
         if self.zero is not None:
-            facts["unique_within"] = rounded_down(self.unique_within, 2)
+            facts["unique_within"] = within(self.unique_within)
             facts["least_speed"] = rounded_down(self.least_speed)
         return facts
 
@@ -137,8 +137,8 @@ class OrbitProof(Result):
         told = [
             f"{system} has a periodic orbit that closes {closing}"
             + (f", with impacts at {impacts}." if impacts else ", without impacts."),
-            "No other orbit of this signature has all times, speeds and states at the nodes "
-            f"within {rounded_down(self.unique_within, 2)} of it.",
+            "No other orbit of this signature lies, at its impacts and at the nodes between them, "
+            f"within {within(self.unique_within)} of it.",
             "Its contact is open between the impacts." if impacts else "Its contact stays open.",
             _of_stability(self.stable, self.moduli),
         ]
@@ -150,24 +150,24 @@ class OrbitProof(Result):
         return " ".join(part for part in told if part)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The enclosures as a Dataset, with the statement as an attribute."""
+        """The orbit's dataset with the enclosures, and with the statement as an attribute."""
         columns = {
-            "impact_time": ("impact", self.impact_times[:, 0], "1", "time of the impact"),
-            "impact_time_radius": ("impact", self.impact_times[:, 1], "1", "its radius"),
-            "impact_speed": ("impact", self.impact_speeds[:, 0], "1", "closing speed"),
-            "impact_speed_radius": ("impact", self.impact_speeds[:, 1], "1", "its radius"),
-            "modulus": ("multiplier", self.moduli[:, 0], "1", "modulus of the multiplier"),
-            "modulus_radius": ("multiplier", self.moduli[:, 1], "1", "its radius"),
-            "unique_within": ((), self.unique_within, "1", "radius of uniqueness"),
+            "enclosed_time": ("enclosed", self.impact_times[:, 0], "time of an impact"),
+            "enclosed_time_radius": ("enclosed", self.impact_times[:, 1], "its radius"),
+            "enclosed_speed": ("enclosed", self.impact_speeds[:, 0], "closing speed"),
+            "enclosed_speed_radius": ("enclosed", self.impact_speeds[:, 1], "its radius"),
+            "modulus": ("enclosed_multiplier", self.moduli[:, 0], "modulus of a multiplier"),
+            "modulus_radius": ("enclosed_multiplier", self.moduli[:, 1], "its radius"),
+            **radii_columns(self.unique_within),
         }
         facts = {
-            "proved": _in_words(self.proved),
-            "stable": _in_words(self.stable),
+            "proved": in_words(self.proved),
+            "stability": in_words(self.stable),
             "reason": self.reason,
             "statement": self.statement,
             "assumptions": "; ".join(self.assumptions),
         }
-        return result_dataset("proof", columns, system=self.orbit.system, **facts)
+        return with_proof(self.orbit.to_xarray(), "proof", columns, facts)
 
     @cached_property
     def certificate(self) -> dict[str, Any]:
@@ -206,6 +206,8 @@ def prove_orbit(
     multipliers = multipliers_of(return_map(shooting, zero.enclosure))
     refuted = _refutation(shooting, zero, made)
     opened = refuted is None and shooting.is_open(zero.enclosure, zero.box)
+    if refuted is None and not opened:
+        refuted = _penetration(shooting, zero)
     events = zero.box[: shooting.event_unknowns].reshape(-1, shooting.event_size)
     least = float(events[:, 1].low.min()) if made.free_time else np.inf
     reason = refuted or ("" if opened else "the contact was not shown to be open between impacts")
@@ -223,7 +225,6 @@ def shooting_of(
     *,
     path: str | None = None,
     radii: dict[str, float] | None = None,
-    guess: np.ndarray | None = None,
     pins: list[tuple[np.ndarray, float]] | None = None,
     settings: ShootingSettings | None = None,
 ) -> Shooting:
@@ -231,7 +232,9 @@ def shooting_of(
     return Shooting(
         orbit.equations.system_at(orbit.solution.values),
         made.segments,
-        made.guess if guess is None else guess,
+        made.guess,
+        made.event_names,
+        made.state_names,
         orbit.signature.span,
         path=path,
         radii=radii,
@@ -247,19 +250,25 @@ def _refutation(shooting: Shooting, zero: ProvedZero, made: OrbitSegments) -> st
     asked = made.guess.ravel()
     away = np.abs(asked - zero.middle[:count]) - 2.0 * zero.radius[:count]
     limit = np.clip(SETTINGS.solved * zero.condition, SETTINGS.least, SETTINGS.most)
-    far = away / np.maximum(1.0, np.abs(asked))
-    if far.max() > limit:
+    far = away / np.maximum(shooting.scales[:count], np.abs(asked))
+    farthest = int(far.argmax())
+    if far[farthest] > limit:
         return (
-            f"the orbit as given does not solve the equations: the one that does lies more than "
-            f"{rounded_down(float(away.max()), 2)} away"
+            f"the orbit as given does not solve the equations: the {shooting.names[farthest]} of the "
+            f"one that does lies more than {rounded_down(float(away[farthest]), 2)} away"
         )
-    pierced = shooting.pierced(zero.enclosure, zero.box)
-    if pierced is not None:
-        return f"it penetrates its contact: the gap is negative at t = {pierced:.6g}"
     events = zero.box[:count].reshape(-1, shooting.event_size)
     if made.free_time and bool((events[:, 1].high < 0.0).any()):
         return "an impact has a negative speed"
     return None
+
+
+def _penetration(shooting: Shooting, zero: ProvedZero) -> str | None:
+    """Where the orbit certainly penetrates a contact, in words; None if that was not shown."""
+    pierced = shooting.pierced(zero.enclosure, zero.box)
+    if pierced is None:
+        return None
+    return f"it penetrates its contact: the gap is negative at t = {pierced:.6g}"
 
 
 def _proof(
@@ -282,7 +291,7 @@ def _proof(
         reason=reason,
         impact_times=times,
         impact_speeds=speeds,
-        unique_within=float(zero.unique.min()),
+        unique_within=shooting.by_name(zero.unique),
         least_speed=least,
         stable=multipliers.stable,
         moduli=np.array(multipliers.moduli).reshape(-1, 2),
@@ -305,7 +314,7 @@ def _without_zero(
         reason=reason,
         impact_times=none,
         impact_speeds=none,
-        unique_within=0.0,
+        unique_within={},
         least_speed=np.nan,
         stable=None,
         moduli=none,
@@ -315,6 +324,11 @@ def _without_zero(
         orbit=orbit,
         shooting=shooting,
     )
+
+
+def within(radii: dict[str, float]) -> str:
+    """Radii by their names, in words, rounded down."""
+    return ", ".join(f"{rounded_down(radius, 2)} ({name})" for name, radius in radii.items())
 
 
 def pairs(balls: Ball) -> np.ndarray:
@@ -332,5 +346,29 @@ def _of_stability(stable: bool | None, moduli: np.ndarray) -> str:
     return f"{told}: its multipliers have the moduli {sizes} over the time its equations cover."
 
 
-def _in_words(value: bool | None) -> str:
+def in_words(value: bool | None) -> str:
+    """True, false or undecided, as attributes and tables say it."""
     return "undecided" if value is None else str(value).lower()
+
+
+def radii_columns(radii: dict[str, float]) -> dict[str, tuple[str, Any, str]]:
+    """Radii of uniqueness with the names of their unknowns."""
+    return {
+        "unique_within": ("unknown", [*radii.values()], "radius in which it is unique"),
+        "unknown_name": ("unknown", [*radii], "kind of the unknown"),
+    }
+
+
+def with_proof(
+    dataset: xarray.Dataset,
+    kind: str,
+    columns: dict[str, tuple[str, Any, str]],
+    facts: dict[str, Any],
+) -> xarray.Dataset:
+    """A dataset with further columns, each its dimension, values and name in words, and facts."""
+    variables = {
+        name: (dim, np.asarray(values), {"long_name": text})
+        for name, (dim, values, text) in columns.items()
+    }
+    title = f"{kind.replace('_', ' ')} computed by saltus"
+    return dataset.assign(variables).assign_attrs(facts | {"kind": kind, "title": title})

@@ -7,7 +7,7 @@ from typing import overload
 
 from saltus.bounds import ShootingSettings
 from saltus.checks import check_count, check_number
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, near, shown
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.special_point import SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
@@ -15,6 +15,7 @@ from saltus.orbits.proofs.branch_proof import BranchProof, prove_branch
 from saltus.orbits.proofs.orbit_proof import OrbitProof, prove_orbit
 from saltus.orbits.proofs.special_proof import SpecialProof, prove_special
 from saltus.progress import Progress, silent
+from saltus.systems import System, numbers
 
 
 @overload
@@ -24,7 +25,8 @@ def prove(
     radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
-) -> OrbitProof: ...
+) -> OrbitProof:
+    """Prove that an orbit exists, is alone near it, keeps its contacts open, and is stable or not."""
 
 
 @overload
@@ -34,7 +36,8 @@ def prove(
     radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
-) -> SpecialProof: ...
+) -> SpecialProof:
+    """Prove a fold, a period doubling, a symmetry breaking or a grazing, and enclose its parameter."""
 
 
 @overload
@@ -46,7 +49,8 @@ def prove(
     order: int | None = None,
     most_boxes: int = 2000,
     progress: Progress = silent,
-) -> BranchProof: ...
+) -> BranchProof:
+    """Prove pieces of a branch, box by box, and its special points."""
 
 
 def prove(
@@ -64,7 +68,7 @@ def prove(
     impacts, and it is stable or unstable.
     Of a fold, a period doubling, a symmetry breaking or a grazing: an orbit with this property
     exists at a parameter that is enclosed, and it is regular.
-    Of a branch: its points lie on connected curves of orbits, each alone in one of many boxes along
+    Of a branch: each of its special points, and that its points lie on connected curves of orbits, each alone in one of many boxes along
     the arclength, with signs of its turns and with stability; some 20 to 50 boxes take a second.
     The motion is enclosed by Taylor steps with a bound of their remainder, and the zero of the
     shooting equations by Krawczyk's operator.
@@ -81,7 +85,8 @@ def prove(
     order
         The order of the Taylor steps; 36 by default.
     most_boxes
-        After so many boxes the proof of a branch stops, and says so.
+        After so many boxes the proof of a branch stops, and says so; with 0 only its special points
+        are proved.
     progress
         Called with the share of a branch's points that are done.
 
@@ -111,24 +116,51 @@ def prove(
     of gravitational billiards, whose flights are parabolas.
     """
     default = ShootingSettings()
-    if step is not None:
-        check_number("step", step, above=0.0)
-    if order is not None:
-        check_count("order", order, at_least=4)
     settings = ShootingSettings(
         step=default.step if step is None else float(step),
         order=default.order if order is None else int(order),
     )
     widths = None if radii is None else dict(radii)
     if isinstance(result, PeriodicOrbit):
+        check_proof(result.system, radii, step, order)
         return prove_orbit(result, widths, settings)
     if isinstance(result, SpecialPoint):
+        check_proof(result.orbit.system, radii, step, order)
         return prove_special(result, widths, settings)
     if isinstance(result, Branch):
-        check_count("most_boxes", most_boxes, at_least=1)
+        check_proof(result.points[0].orbit.system, radii, step, order, most_boxes)
         return prove_branch(result, widths, settings, int(most_boxes), progress)
     raise ParameterError(
         f"prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
         f"{shown(result)}",
         "result",
     )
+
+
+def check_proof(
+    system: System,
+    radii: Mapping[str, float] | None,
+    step: float | None,
+    order: int | None,
+    most_boxes: int = 0,
+) -> None:
+    """Refuse arguments of `prove` without meaning.
+
+    Raises
+    ------
+    ParameterError
+        The error has the argument and its value.
+    """
+    names = [name for name, _ in numbers(system)]
+    for name, radius in (radii or {}).items():
+        if name not in names:
+            raise ParameterError(
+                f"radii names {name!r}, which is no number of the system; {near(name, names)}",
+                f"radii.{name}",
+            )
+        check_number(f"radii.{name}", radius, at_least=0.0)
+    if step is not None:
+        check_number("step", step, above=0.0)
+    if order is not None:
+        check_count("order", order, at_least=4)
+    check_count("most_boxes", most_boxes, at_least=0)

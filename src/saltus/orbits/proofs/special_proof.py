@@ -18,19 +18,27 @@ from saltus.bounds import (
     Unknowns,
     prove_zero,
     rounded_ball,
-    rounded_down,
     varied,
 )
 from saltus.bounds import only_one as only_one_of
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.proofs.orbit_proof import ASSUMPTIONS, MIRROR, shooting_of
+from saltus.orbits.proofs.orbit_proof import (
+    ASSUMPTIONS,
+    MIRROR,
+    in_words,
+    radii_columns,
+    shooting_of,
+    with_proof,
+    within,
+)
 from saltus.orbits.proofs.segments import CannotProve
-from saltus.result import Result, result_dataset
+from saltus.result import Result
 
 if TYPE_CHECKING:
     import xarray
 
+KERNEL = "kernel of "  # before the name of an unknown: that component of the kernel vector
 MEANINGS = {
     SpecialKind.LP: "a simple quadratic fold",
     SpecialKind.PD: "a multiplier that passes -1 with speed",
@@ -56,10 +64,10 @@ class SpecialProof(Result):
     parameter
         Middle and radius of its value, (2,).
     unique_within
-        No other orbit with this property has its parameter, times, speeds and kernel vector within
-        this.
+        Radii by the kind of unknown, in its own unit: no other orbit with this property has its
+        parameter, all unknowns of its impacts and nodes and its kernel vector within them.
     only_within
-        The same, whatever the kernel vector: (parameter, unknowns); 0 where it was not shown.
+        The same, whatever the kernel vector; empty where it was not shown.
     assumptions
         What is taken for granted.
     seconds
@@ -76,8 +84,8 @@ class SpecialProof(Result):
     kind: str
     path: str
     parameter: np.ndarray
-    unique_within: float
-    only_within: float
+    unique_within: dict[str, float]
+    only_within: dict[str, float]
     assumptions: tuple[str, ...]
     seconds: float
     special: SpecialPoint = field(repr=False)
@@ -100,29 +108,31 @@ class SpecialProof(Result):
         meaning = MEANINGS[SpecialKind[self.kind]]
         model = type(self.special.orbit.system.model).__name__
         orbit = self.special.orbit
+        alone = self.only_within or self.unique_within
+        whatever = " whatever its kernel vector," if self.only_within else ""
         return (
             f"{model} has a periodic orbit of {orbit.period} forcing "
             f"period{'s' * (orbit.period > 1)} with {meaning} ({self.kind}) at {self.path} = "
-            f"{rounded_ball(*self.parameter)}. No other one of this signature has its parameter, "
-            f"times, speeds and kernel vector within {rounded_down(self.unique_within, 2)} of it."
+            f"{rounded_ball(*self.parameter)}. No other one of this signature,{whatever} lies, at "
+            f"its impacts and at the nodes between them, within {within(alone)} of it."
         )
 
     def to_xarray(self) -> xarray.Dataset:
-        """The enclosure as a Dataset, with the statement as an attribute."""
+        """The orbit's dataset with the enclosure, and with the statement as an attribute."""
         columns = {
-            "parameter": ((), self.parameter[0], "1", "parameter"),
-            "parameter_radius": ((), self.parameter[1], "1", "its radius"),
-            "unique_within": ((), self.unique_within, "1", "radius of uniqueness"),
+            "enclosed_parameter": ("enclosed", self.parameter[:1], self.path),
+            "enclosed_parameter_radius": ("enclosed", self.parameter[1:], "its radius"),
+            **radii_columns(self.unique_within),
         }
         facts = {
-            "proved": "undecided" if self.proved is None else "true",
+            "proved": in_words(self.proved),
             "special_kind": self.kind,
             "path": self.path,
             "reason": self.reason,
             "statement": self.statement,
             "assumptions": "; ".join(self.assumptions),
         }
-        return result_dataset("special_proof", columns, system=self.special.orbit.system, **facts)
+        return with_proof(self.special.orbit.to_xarray(), "special_proof", columns, facts)
 
 
 def prove_special(
@@ -153,17 +163,20 @@ def prove_special(
     if isinstance(zero, NotProved):
         return _unproved(point, path, zero.reason, began)
     opened = made.is_open(zero.enclosure, zero.box)
-    only = 0.0
+    only: dict[str, float] = {}
     if opened and not grazes:
         box = only_one_of(made, zero)
-        only = 0.0 if box is None else float(box[: made.event_unknowns : made.event_size].min())
+        radii_by_name = {} if box is None else made.by_name(box)
+        only = {
+            name: radius for name, radius in radii_by_name.items() if not name.startswith(KERNEL)
+        }
     return SpecialProof(
         proved=True if opened else None,
         reason="" if opened else "the contact was not shown to be open between impacts",
         kind=str(point.kind),
         path=path,
         parameter=np.array([zero.middle[-1], zero.radius[-1]]),
-        unique_within=float(zero.unique.min()),
+        unique_within=made.by_name(zero.unique),
         only_within=only,
         assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
         seconds=time.process_time() - began,
@@ -192,7 +205,18 @@ def _singular(
     unknowns = Unknowns(orbit.equations.system_at(orbit.solution.values), made.free_time)
     segments = [varied(segment, unknowns, 1.0) for segment in made.segments[:-1]]
     segments.append(varied(made.segments[-1], unknowns, theta))
-    larger = replace(made, segments=tuple(segments), guess=guess)
+    d = len(made.state_names) // 2
+    states = made.state_names
+    kernel_states = tuple(f"{KERNEL}{name}" for name in states)
+    larger = replace(
+        made,
+        segments=tuple(segments),
+        guess=guess,
+        event_names=tuple(
+            (*names, *(f"{KERNEL}{name}" for name in names)) for names in made.event_names
+        ),
+        state_names=(*states[:d], *kernel_states[:d], *states[d:], *kernel_states[d:]),
+    )
     probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
     row = np.zeros(probe.size)
     for i in range(events):
@@ -242,8 +266,8 @@ def _unproved(point: SpecialPoint, path: str, reason: str, began: float) -> Spec
         kind=str(point.kind),
         path=path,
         parameter=np.array([point.parameter, np.inf]),
-        unique_within=0.0,
-        only_within=0.0,
+        unique_within={},
+        only_within={},
         assumptions=ASSUMPTIONS,
         seconds=time.process_time() - began,
         special=point,
