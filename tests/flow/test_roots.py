@@ -19,6 +19,7 @@ from saltus.taylor.private_numba import OPTIONS
 
 _kernel = {"np": np, "ZERO": ZERO} | dict.fromkeys(("jit", "lean_jit"), numba.njit(**OPTIONS))
 exec(compiled_part(roots), _kernel)
+leading = _kernel["leading"]
 excluded, first_root, horner, value_and_slope, newton, roots_within, to_bernstein, variations = (
     _kernel[name]
     for name in (
@@ -344,3 +345,35 @@ def test_a_root_beside_one_at_the_start_is_found_beside_it(sign):
     p, found = sign * np.array([0.0, -1e-12, 1.0, 0.5]), np.zeros(4)
     assert roots_within(p, 3, found, 1e-18) == 1
     assert found[0] == pytest.approx(1e-12, rel=1e-9)
+
+
+def first_above_rounding(coefficients, start, zero, size, base):
+    """`leading` as it is defined, with all roots."""
+    places = np.arange(len(coefficients))
+    rate = 0.0
+    if size > 0.0:
+        later = places[max(start, base) + 1 :]
+        rate = max((np.abs(coefficients[later]) / size) ** (1.0 / (later - base)), default=0.0)
+    rounding = zero * size * rate ** np.maximum(places - base, 0.0)
+    rounding[:base] = 0.0
+    above = np.flatnonzero((np.abs(coefficients) > rounding) & (places >= start))
+    return int(above[0]) if len(above) else len(coefficients)
+
+
+@pytest.mark.parametrize("base", [0, 1, 2])
+def test_the_leading_coefficient_is_the_first_one_above_the_rounding_of_its_series(base):
+    rng = np.random.default_rng(base)
+    seen = set()
+    for _ in range(3000):
+        order = int(rng.integers(4, 23))
+        growth = 10.0 ** rng.uniform(-3, 3)
+        c = rng.normal(size=order) * growth ** np.arange(order)
+        c[rng.random(order) < 0.2] = 0.0
+        vanishing = int(rng.integers(0, order))
+        c[:vanishing] *= 10.0 ** rng.uniform(-20, -10, vanishing)
+        start = base + int(rng.integers(-min(base, 1), 2))
+        size = 10.0 ** rng.uniform(-2, 2)
+        expected = first_above_rounding(c, start, ZERO, size, base)
+        assert leading(c, start, order, ZERO, size, base) == expected
+        seen.add(expected - start)
+    assert {0, 1, 2} <= seen

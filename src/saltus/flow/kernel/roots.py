@@ -19,6 +19,8 @@ NEVER = 2.0  # stands for no root: later than any u in [0, 1]
 NARROW = 2.0**-26
 # rounding of a Bernstein coefficient, relative to the sum of the polynomial's terms
 NOISE = 4.0 * 2.0**-52
+# more than the rounding of a product of as many factors as a series has terms, as a share
+ROUNDING_OF_POWERS = 1e-12
 # the most boxes on the stack; a bisection down to NARROW leaves one behind at each of 26 levels
 DEPTH = 64
 
@@ -268,12 +270,21 @@ def leading(coefficients, start, order, zero, size, base):
     that at `base`, of which the share `zero` is rounding. With the rate w at which the later ones
     grow from `size` on, the rounding of coefficient k is that times w^(k - base).
     """
+    rounding = zero * size
+    # the rate is needed only where the first coefficient does not decide
+    first = abs(coefficients[start]) if start < order and start <= base else 0.0
+    if first > (rounding if start == base else 0.0):
+        return start
     rate = 0.0
+    grown = 0.0  # the power of the rate that coefficient k is compared with
     if size > 0.0:
         for k in range(max(start, base) + 1, order):
-            if coefficients[k] != 0.0:
-                rate = max(rate, (abs(coefficients[k]) / size) ** (1.0 / (k - base)))
-    rounding = zero * size
+            ratio = abs(coefficients[k]) / size
+            grown *= rate
+            # roots take long, and most coefficients grow no faster than one before
+            if ratio > (1.0 - ROUNDING_OF_POWERS) * grown:
+                rate = max(rate, ratio ** (1.0 / (k - base)))
+                grown = rate ** (k - base)
     rounding *= rate ** max(start - base, 0)
     for k in range(start, order):
         if abs(coefficients[k]) > (rounding if k >= base else 0.0):
