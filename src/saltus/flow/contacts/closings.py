@@ -41,6 +41,8 @@ from saltus.flow.contacts.frictions import (
     ALIKE,
     choose_slides,
     hold_frictions,
+    leans,
+    margin_size,
     rubs_along,
     slides_so,
 )
@@ -151,6 +153,44 @@ def changes_of(motion, candidates, still, held):
     return changes
 
 
+# The order of the series that has the first coefficients of all guards.
+FIRST_TERMS = 2
+
+
+@lean_jit
+def first_decide(motion, candidates, still, zero):
+    """Whether the first coefficients of the guards of the present choice are more than rounding, so
+    that `violated` and `slides_so` read no later ones.
+    """
+    count = motion.contacts.shape[0]
+    for i in range(count):
+        if candidates >> i & 1:
+            first = abs(motion.margin_series[i, 0])
+            size = press_of(motion, i)
+            if motion.contacts[i, ContactColumn.CLOSED] == 0:
+                place = motion.contacts[i, ContactColumn.COORDINATE]
+                first = abs(motion.coordinate_series[place, 2])
+                size = motion.press
+            if motion.contacts[i, ContactColumn.RELEASED] == 1 or not first > zero * size:
+                return False
+    for k in range(motion.frictions.shape[0]):
+        slides = motion.frictions[k, FrictionColumn.SLIDES]
+        if not still >> k & 1 or slides == 2 or leans(motion, k):
+            continue
+        row = count + 2 * k
+        reached = motion.frictions[k, FrictionColumn.REACHED]
+        place = motion.frictions[k, FrictionColumn.COORDINATE]
+        first = abs(motion.velocity_series[place, 1])
+        size = motion.press
+        if slides == 0:
+            first = min(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
+            size = margin_size(motion, k)
+        known = slides == 0 and (reached == 1 or reached == 2)
+        if known or not first > (ALIKE if reached > 0 else ZERO) * size:
+            return False
+    return True
+
+
 @lean_jit
 def is_consistent(motion, candidates, still, held, t, zero):
     """Whether the present choice fulfils the laws of contacts and frictions.
@@ -164,7 +204,9 @@ def is_consistent(motion, candidates, still, held, t, zero):
     for _ in range(count * count if count > MOST_TRIED else 1):
         hold_coordinates(motion)
         hold_frictions(motion)
-        expand(motion, t, 1.0, motion.order)
+        expand(motion, t, 1.0, FIRST_TERMS)
+        if not first_decide(motion, candidates, still, zero):
+            expand(motion, t, 1.0, motion.order)
         wrong = violated(motion, candidates, zero)
         if not wrong:
             return slides_so(motion, count, still, held if motion.leave_by == 0 else 0)
@@ -216,6 +258,18 @@ def count_choices(motion, candidates, still):
 
 
 @lean_jit
+def slides_alone(motion, still, held, t, zero, numbers):
+    """Let the only undecided friction slide, as it cannot stick; False if neither direction is
+    consistent.
+    """
+    for number in range(1, numbers):
+        chosen = set_choice(motion, 0, still, number)
+        if chosen and is_consistent(motion, 0, still, held, t, zero):
+            return True
+    return False
+
+
+@lean_jit
 def choose_closed(motion, candidates, still, held, t, zero):
     """Decide which of the candidates, which are at rest at their positions, stay closed; False if
     no choice is consistent.
@@ -231,9 +285,15 @@ def choose_closed(motion, candidates, still, held, t, zero):
     as in a symmetric system, one that changes more is taken if it is alone. So the order in which
     contacts, frictions and coordinates are declared decides nothing.
     """
+    # all others change more, so that they are looked at only if this one fails
+    unchanged = set_choice(motion, candidates, still, 0)
+    if unchanged and is_consistent(motion, candidates, still, held, t, zero):
+        return True
     numbers = count_choices(motion, candidates, still)
     single = still & (still - 1) == 0  # no two choices of one friction are consistent
-    changes = -1
+    if single and candidates == 0:
+        return slides_alone(motion, still, held, t, zero, numbers)
+    changes = 0
     found = -1
     several = False
     while True:

@@ -192,7 +192,8 @@ def first_friction(motion, count, h, whole):
             if slides == 0:
                 known = skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0
                 guard = motion.margin_series[count + 2 * k + b]
-                if known == 0 and guard[0] < -ZERO * margin_size(motion, k):
+                beyond = known == 0 and guard[0] < 0.0
+                if beyond and guard[0] < -ZERO * margin_size(motion, k):
                     return k, 0.0, b, False
             elif b == 1:
                 continue
@@ -314,7 +315,8 @@ def choose_slides(motion, still, choice):
     for k in range(motion.frictions.shape[0]):
         digit = 0
         if still >> k & 1:
-            digit, choice = choice % 3, choice // 3
+            digit = choice % 3
+            choice //= 3
         if is_lifted(motion, k):
             motion.frictions[k, FrictionColumn.SLIDES] = 2
             if digit > 0:
@@ -348,9 +350,9 @@ def slides_so(motion, count, candidates, held):
         if slides == 2 or leans(motion, k):
             continue
         if slides == 0:
+            size = margin_size(motion, k)
             for b in range(2):
                 row = motion.margin_series[count + 2 * k + b]
-                size = margin_size(motion, k)
                 known = reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE * size)
                 i = leading(row, 1 if known else 0, order, ZERO, size, 0)
                 if reached == 0 and held >> k & 1 and abs(row[0]) <= ZERO * size:

@@ -175,7 +175,8 @@ def first_closing(lanes, h, alive):
         )
         doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
         first = closes & (~hit | bits(when < tau))
-        tau, which = select(mask(first), when, tau), select(mask(first), splat(1.0 * i), which)
+        tau = select(mask(first), when, tau)
+        which = select(mask(first), splat(1.0 * i), which)
         hit |= closes
     return hit, doubtful, tau, which
 
@@ -277,7 +278,8 @@ def one_free_step(lanes, alive):
     for i in range(lanes.sizes.contacts):
         row = lanes.sizes.coordinates[i]
         free = mask(bits(lanes.free[row] > 0.5))
-        x, v = select(free, lanes.position[row], x), select(free, lanes.velocity[row], v)
+        x = select(free, lanes.position[row], x)
+        v = select(free, lanes.velocity[row], v)
         sign = select(free, splat(1.0 * lanes.sizes.signs[i]), sign)
         contact, which = (
             select(free, lanes.contacts[i], contact),
@@ -298,7 +300,8 @@ def one_free_step(lanes, alive):
     hit, doubtful, _, tau, at_root = find_contact(lanes, gap, h, end, alive & sound, 0)
     sound &= ~doubtful & free_guards_certain(lanes, tau)
     closing = mask(hit)
-    x, v = select(closing, contact, fma(mean, h, x)), select(closing, at_root, v)
+    x = select(closing, contact, fma(mean, h, x))
+    v = select(closing, at_root, v)
     for row in range(lanes.sizes.own):
         free = mask(bits(lanes.free[row] > 0.5))
         lanes.new_position[row] = select(free, x, lanes.position[row])

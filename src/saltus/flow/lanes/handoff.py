@@ -33,7 +33,7 @@ from saltus.taylor.load_tables import own_records
 
 MOST_TURNS = 16  # the most turning points that are looked for within one step
 BUFFER_LENGTH = 64  # steps of one call
-EVENT_LENGTH = 320  # events of one call: more than 128 rows may record in one pass
+EVENT_LENGTH = 64  # events of one call, beside those that one pass may record
 
 
 # --- roots and extrema -------------------------------------------------------
@@ -99,9 +99,11 @@ def turning_range(q, order, begin, h, p):
         kind, u, _ = first_root(p, n)
         if kind != SIMPLE or u >= 1.0:
             break
-        start, left = start + u * left, (1.0 - u) * left
+        start += u * left
+        left *= 1.0 - u
         x = horner(q, order, start * h)
-        high, low = max(high, x), min(low, x)
+        high = max(high, x)
+        low = min(low, x)
         shift_start(p, n, u)
         p[0] = 0.0
     return high, low
@@ -123,12 +125,10 @@ def scalar_state(lane):
     length = lane.period_length
     last = lane.last_period
     motion.period = motion.last_period = period
-    motion.mode, motion.rested, motion.side, motion.piece = (
-        lane.mode,
-        lane.held,
-        int(lane.side),
-        lane.piece,
-    )
+    motion.mode = lane.mode
+    motion.rested = lane.held
+    motion.side = int(lane.side)
+    motion.piece = lane.piece
     motion.leave_by = lane.leave_by
     motion.skip = (lane.at_contact >> lane.index) & 1 if lane.mode == Mode.ARC else lane.skip
     motion.order = sizes.scalar_order
@@ -137,18 +137,20 @@ def scalar_state(lane):
     motion.dof = sizes.rows
     motion.margin_count = sizes.margins
     motion.workspace_rows = sizes.workspace
-    motion.sides, motion.checked, motion.own, motion.columns = (
-        sizes.sides,
-        sizes.checked,
-        sizes.own,
-        sizes.columns,
-    )
-    motion.first_order, motion.local = sizes.first_order, sizes.local
-    motion.time, motion.chatter_speed = lane.now, lane.chatter_speed
-    motion.pull, motion.fastest = lane.pull, lane.fastest
+    motion.sides = sizes.sides
+    motion.checked = sizes.checked
+    motion.own = sizes.own
+    motion.columns = sizes.columns
+    motion.first_order = sizes.first_order
+    motion.local = sizes.local
+    motion.time = lane.now
+    motion.chatter_speed = lane.chatter_speed
+    motion.pull = lane.pull
+    motion.fastest = lane.fastest
     for row in range(2 * sizes.rows):  # in both memories velocities follow the positions
         state[row] = lane.position[row]
-    motion.period_length, motion.tolerance = length, lane.settings.tolerance
+    motion.period_length = length
+    motion.tolerance = lane.settings.tolerance
     motion.natural_time = natural_time_of(lane)
     motion.end = lane.end_time if period == last else lane.period_start + length
     motion.horizon = (last - period) * length + lane.end_time
@@ -172,15 +174,18 @@ def own_env(lane):
 
 
 @jit
-def buffers(motion, numbers):
-    """Buffers for steps, and for events of so many numbers before their shifts."""
+def buffers(motion, numbers, rows):
+    """Buffers for steps, and for events of so many numbers before their shifts, of so many contacts
+    and frictions.
+    """
     steps = StepBuffers(
         np.empty((BUFFER_LENGTH, 2), np.int64),
         np.empty((BUFFER_LENGTH, 2)),
         np.empty((BUFFER_LENGTH, motion.own, motion.order + 2)),
     )
+    length = EVENT_LENGTH + 4 + 2 * rows  # `spare_events`
     return steps, EventBuffers(
-        np.empty((EVENT_LENGTH, 4), np.int64), np.empty((EVENT_LENGTH, numbers + motion.columns))
+        np.empty((length, 4), np.int64), np.empty((length, numbers + motion.columns))
     )
 
 
@@ -199,7 +204,8 @@ def record_extrema(lane, motion, steps):
             # else it certainly stays between them
             if series[0] + moved > lane.highest or series[0] - moved < lane.lowest:
                 above, below = turning_range(series, motion.order, 0.0, h, lane.polynomial)
-                lane.highest, lane.lowest = max(lane.highest, above), min(lane.lowest, below)
+                lane.highest = max(lane.highest, above)
+                lane.lowest = min(lane.lowest, below)
     motion.recorded_steps = motion.recorded_events = 0
 
 
@@ -208,14 +214,14 @@ def put_state(lane, motion, state):
     """Put the scalar kernel's state into the lane."""
     rows = lane.sizes.rows
     bit = 1 << lane.index
-    lane.mode, lane.held, lane.skip, lane.piece = (
-        motion.mode,
-        motion.rested,
-        motion.skip,
-        motion.piece,
-    )
-    lane.now, lane.side = motion.time, float(motion.side)
-    lane.pull, lane.fastest = motion.pull, motion.fastest
+    lane.mode = motion.mode
+    lane.held = motion.rested
+    lane.skip = motion.skip
+    lane.piece = motion.piece
+    lane.now = motion.time
+    lane.side = float(motion.side)
+    lane.pull = motion.pull
+    lane.fastest = motion.fastest
     for row in range(2 * rows):
         lane.position[row] = state[row]
     for j in range(motion.columns):  # the shifts of the last event, for `finish`
@@ -240,7 +246,7 @@ def scalar_motion(lane):
     env = own_env(lane)
     functions = functions_of(lane)
     begin_scalar(lane)
-    steps, events = buffers(motion, event_numbers(lane))
+    steps, events = buffers(motion, event_numbers(lane), rows.shape[0])
     while True:
         status = advance(numbers, state, env, functions, rows, (steps, events))
         detail = record_events(lane, motion, events)
