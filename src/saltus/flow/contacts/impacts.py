@@ -14,6 +14,7 @@ from saltus.flow.contacts.complementarity import acting, complementary, invert, 
 from saltus.flow.contacts.layout import (
     EXCESS,
     FINISHED,
+    LEAST_LOSS,
     MOST_EXCESS,
     MOST_FROZEN_IMPACTS,
     VANISHED,
@@ -23,7 +24,7 @@ from saltus.flow.contacts.layout import (
     jumping,
     restitution,
 )
-from saltus.flow.kernel.layout import CHATTER_SPEED, EXACT, SLOW, Mode
+from saltus.flow.kernel.layout import EXACT, SLOW, Mode
 from saltus.flow.kernel.steps import column_step, leaps, natural_speed, step_size
 from saltus.taylor import lean_jit
 
@@ -473,10 +474,25 @@ def bring_to_rest(motion, near):
 
 @lean_jit
 def slow_impacts(motion):
-    """The speed of an impact below which the end of an accumulation may be near, as with one
-    contact (`slow_speed`).
+    """The speed of an impact below which the end of an accumulation may be near.
+
+    Faster impacts take longer than the time for which the accelerations count as constant
+    (`frozen_limit`).
     """
-    return max(SLOW * math.sqrt(motion.tolerance), CHATTER_SPEED) * natural_speed(motion)
+    return SLOW * math.sqrt(motion.tolerance) * natural_speed(motion)
+
+
+@lean_jit
+def largest_loss(motion):
+    """The largest share of its speed that a contact loses at an impact without friction.
+
+    Impacts of a speed u accumulate no sooner than after 2 u / b divided by it, with the acceleration
+    b: the end of faster ones need not be looked for.
+    """
+    loss = LEAST_LOSS
+    for i in range(motion.contacts.shape[0]):
+        loss = max(loss, 1.0 - restitution(motion, i, i))
+    return loss
 
 
 @lean_jit

@@ -52,6 +52,7 @@ from saltus.flow.contacts.impacts import (
     frozen_accumulation,
     hold_coordinates,
     keep_gap,
+    largest_loss,
     measure_gap,
     near_contacts,
     note_press,
@@ -140,7 +141,7 @@ def end_accumulation_of(motion, t):
     if motion.pull == 0.0:  # the motion begins at a contact
         motion.pull = motion.press
     slow = slow_impacts(motion)
-    slowest = slow
+    slowest = slow * largest_loss(motion) if motion.frictions.shape[0] == 0 else slow
     last = -1
     for i in range(count):
         if 0.0 < motion.rates[i] <= slowest and motion.gaps[i] == 0.0:
@@ -401,6 +402,8 @@ def short_order(motion, t):
     accumulations are so close.
     """
     order = motion.order
+    if motion.contacts.shape[0] == 0:
+        return order
     flight = np.inf
     fast = FAST_IMPACT * natural_speed(motion)
     radius = RADIUS * motion.natural_time

@@ -12,11 +12,11 @@ closed contacts. Lanes in which neither is a solution are solved one at a time (
 
 from __future__ import annotations
 
-from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.contacts.layout import LEAST_LOSS, ContactColumn
 from saltus.flow.lanes.lane_steps import natural_speeds
 from saltus.flow.lanes.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
-from saltus.taylor.lane_vectors import absolute, bits, fma, mask, select, splat
+from saltus.taylor.lane_vectors import absolute, bits, fma, mask, maximum, select, splat
 
 # --- compiled from here on ---------------------------------------------------
 
@@ -165,8 +165,12 @@ def impulses_hold(lanes, closing):
     """
     local = lanes.sizes.local
     jump = lanes.jump
-    slowest = lanes.settings.slowest_impact * natural_speeds(lanes)
     good = closing.hit
+    count = lanes.sizes.contacts
+    loss = splat(LEAST_LOSS)  # `impacts.largest_loss`
+    for i in range(count):
+        loss = maximum(loss, 1.0 - lanes.restitution[count * i + i])
+    slowest = lanes.settings.slowest_impact * natural_speeds(lanes) * loss
     freed = splat(1.0 * lanes.sizes.own)
     for i in range(lanes.sizes.contacts):
         row = lanes.sizes.coordinates[i]

@@ -15,6 +15,7 @@ from saltus.flow.contacts.impacts import (
     fill_contact_matrices,
     impact_impulses,
     jump_first_order,
+    largest_loss,
     settle_contact,
 )
 from saltus.flow.contacts.lane_handoff import functions_of
@@ -49,7 +50,6 @@ def contacts_impact(lane, hit):
     numbers = array[0]
     rates = solver.rates
     speed = np.inf
-    slowest = lane.settings.slowest_impact * lane_speed(lane)
     numbers.dof, numbers.own, numbers.local, numbers.piece = own, own, lane.sizes.local, lane.piece
     numbers.first_order = lane.sizes.first_order
     numbers.time, numbers.origin = lane.new_time, lane.origin
@@ -61,6 +61,7 @@ def contacts_impact(lane, hit):
         state[row] = lane.new_position[row]
     read_contacts(lane, contacts)
     regular = fill_contact_matrices(motion)
+    slowest = lane.settings.slowest_impact * lane_speed(lane) * largest_loss(motion)
     chosen = hit | closed_bits(motion)
     for i in range(contacts.shape[0]):
         if hit >> i & 1:

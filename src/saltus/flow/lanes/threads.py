@@ -370,7 +370,9 @@ class Lanes:
 
     def _settings(self) -> LaneSettings:
         order = lane_order(self.tol)
-        slowest = max(SLOW * math.sqrt(self.tol), CHATTER_SPEED)
+        slowest = SLOW * math.sqrt(self.tol)
+        if not self.program.structure.several:  # impacts of one contact may lose nothing
+            slowest = max(slowest, CHATTER_SPEED)
         limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
         scales = self.natural_time, SHORTEST, slowest
         return LaneSettings(self.tol, *scales, *limits, self.natural_length)
