@@ -75,17 +75,17 @@ class NaturalUnits:
     own_time: float
     free_time: float
 
-    @property
+    @cached_property
     def length(self) -> float:
         """The largest unit of a coordinate."""
         return float(self.lengths.max())
 
-    @property
+    @cached_property
     def speed(self) -> float:
         """The unit of speed."""
         return self.length / self.time
 
-    @property
+    @cached_property
     def acceleration(self) -> float:
         """The unit of acceleration, and of a force on the mass 1."""
         return self.length / self.time**2

@@ -48,11 +48,17 @@ def natural_time(system: System, length: float) -> float:
     A frequency that acts on nothing is none.
     """
     of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
-    # what has no contact has no use for it
-    bounces = system.model.has_one_contact or system.model.holds_coordinates
-    if not bounces:
+    own: float | None = system._remembered(natural_time, lambda: _own_time(system))
+    if own is None:
         return of_load if length > 0.0 else 1.0
-    return min(of_load, time_without_period(system))
+    return min(of_load, own)
+
+
+def _own_time(system: System) -> float | None:
+    """The natural time without the load's period; None for what has no contact, which has no use
+    for it."""
+    bounces = system.model.has_one_contact or system.model.holds_coordinates
+    return time_without_period(system) if bounces else None
 
 
 class KernelState:
