@@ -115,3 +115,14 @@ def test_the_order_of_multipliers_depends_on_no_rounding_and_on_no_processor() -
         turned = pairs * (1.0 + 1e-14 * rng.normal(size=20))  # both of a pair alike, as of eigvals
         values = rng.permutation(np.concatenate([moved, turned, turned.conj()]))
         np.testing.assert_allclose(by_falling_modulus(values), expected, rtol=0, atol=1e-13)
+
+
+def test_two_multipliers_are_ordered_as_of_many():
+    rng = np.random.default_rng(3)
+    for _ in range(500):
+        a = complex(*rng.normal(size=2))
+        # a number of another modulus, of the same one, and the same up to rounding
+        for b in (complex(*rng.normal(size=2)), a.conjugate(), -a, a * (1.0 + 1e-15)):
+            several = by_falling_modulus(np.array([a, b, 0.0]))
+            np.testing.assert_array_equal(by_falling_modulus(np.array([a, b])), several[:2])
+            np.testing.assert_array_equal(by_falling_modulus(np.array([b, a])), several[:2])

@@ -19,6 +19,7 @@ from .pseudo_arclength import Corrected as Corrected
 from .pseudo_arclength import EquationCurve as EquationCurve
 from .pseudo_arclength import Units as Units
 from .pseudo_arclength import between as between
+from .pseudo_arclength import bordered as bordered
 from .pseudo_arclength import newton as newton
 from .test_functions import Cut as Cut
 from .test_functions import Events as Events

@@ -10,6 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -55,8 +56,8 @@ class Units:
 
     unknowns: Any = 1.0  # of the unknowns, an array or a number
     residuals: Any = 1.0  # of the residuals, an array (m,) or a number
-    # Which unknowns may move by no more than their unit in a step of Newton's method, an array or
-    # one for all; others, such as the coordinates of a large orbit, by as much as the largest of
+    # Which unknowns may move by no more than their unit in a step of Newton's method, an array, or
+    # True for all; others, such as the coordinates of a large orbit, by as much as the largest of
     # them is.
     bounded: Any = True
 
@@ -66,8 +67,16 @@ class Units:
 
     def length(self, step: np.ndarray, place: np.ndarray) -> float:
         """The largest component of a step from a place, in units of what it may be."""
-        size = np.abs(place / self.unknowns).max(where=~np.asarray(self.bounded), initial=1.0)
-        return float(np.abs(step / self.unknowns / np.where(self.bounded, 1.0, size)).max())
+        moved = np.abs(step / self.unknowns)
+        if self._unbounded.size:
+            size = np.abs(place / self.unknowns)[self._unbounded].max()
+            moved[self._unbounded] /= max(1.0, size)
+        return float(moved.max())
+
+    @cached_property
+    def _unbounded(self) -> np.ndarray:
+        """The places of the unknowns that are not `bounded`."""
+        return np.flatnonzero(~np.atleast_1d(self.bounded))
 
 
 ONES = Units()
@@ -184,9 +193,14 @@ class EquationCurve(Curve[P]):
         units = np.empty(len(place))
         units[:inner] = own.unknowns
         units[inner:] = np.maximum(np.abs(place[inner:]), 3.0 / self.weights[inner:])
-        bounded = np.ones(len(place), dtype=bool)
-        bounded[:inner] = own.bounded
-        return Units(units, own.residuals, bounded)
+        return Units(units, own.residuals, self._bounded)
+
+    @cached_property
+    def _bounded(self) -> np.ndarray:
+        """`Units.bounded` of all components of a place."""
+        bounded = np.ones(len(self.weights), dtype=bool)
+        bounded[: len(self.weights) - self.count] = self.units.bounded
+        return bounded
 
     @abstractmethod
     def evaluate(self, place: np.ndarray, thorough: bool) -> Evaluation | None:

@@ -300,7 +300,8 @@ class PeriodicOrbit(Result):
         """The least speed of an impact, inf without impacts; if it is negative this is no real
         motion.
         """
-        return float(self.speeds.min(initial=math.inf))
+        speeds = self.equations.impacts(self.solution)[1]
+        return float(speeds.min(initial=math.inf))
 
     @cached_property
     def pressing(self) -> float:
@@ -575,6 +576,8 @@ def by_falling_modulus(values: np.ndarray) -> np.ndarray:
 
     Moduli are equal up to `TOLERANCES.same_modulus` of the larger one.
     """
+    if len(values) == 2:  # of most orbits; sorting would take longer than their eigenvalues
+        return _two_by_falling_modulus(*values.tolist())
     moduli = np.abs(values)
     order = np.argsort(-moduli, kind="stable")
     falling = moduli[order]
@@ -583,6 +586,14 @@ def by_falling_modulus(values: np.ndarray) -> np.ndarray:
     group[order] = np.append(0, np.cumsum(smaller))[: len(values)]
     # + 0.0 takes the sign of zeros away
     return np.asarray(values[np.lexsort((-values.imag, -values.real, group))] + 0.0)
+
+
+def _two_by_falling_modulus(a: complex, b: complex) -> np.ndarray:
+    larger = max(abs(a), abs(b))
+    turned = abs(a) < abs(b)
+    if not min(abs(a), abs(b)) < (1.0 - TOLERANCES.same_modulus) * larger:
+        turned = (a.real, a.imag) < (b.real, b.imag)
+    return np.array([b, a] if turned else [a, b], dtype=complex) + 0.0
 
 
 def solve(

@@ -111,7 +111,9 @@ class CompiledStructure:
     ) -> tuple[tuple[Any, ...], Any]:
         """The arguments `env` and `model` of the kernel for given numbers (see
         `one_contact/kernel.py`). Those of modes, `data`, follow the constants."""
-        constants = np.append(np.zeros(self.constant_count), data)
+        constants = np.zeros(self.constant_count)
+        if len(data):
+            constants = np.append(constants, data)
         geometry = np.zeros(3)
         fill_constants, fill_geometry = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)

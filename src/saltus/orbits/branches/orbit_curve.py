@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 
 from saltus.bounds import area_contraction
-from saltus.continuation import STEPS, Corrected, EquationCurve, Point, TestFunction, Units, Zero
+from saltus.continuation import (
+    STEPS,
+    Corrected,
+    EquationCurve,
+    Point,
+    TestFunction,
+    Units,
+    Zero,
+    bordered,
+)
 from saltus.flow import SegmentColumn, SegmentValue
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.equations.contract import FARTHEST, OrbitEquations, OrbitEvaluation, Solution
@@ -199,18 +208,17 @@ def crossing(point: OrbitPoint) -> float:
     """The determinant of the equations with the tangent below them: it changes its sign where two
     branches cross.
     """
-    return scaled_determinant(
-        np.vstack([point.evaluation.derivatives(), point.tangent * point.curve.weights**2])
-        / point.curve.weights
-    )
+    weights = point.curve.weights
+    matrix = bordered(point.evaluation.derivatives(), point.tangent * weights**2)
+    return scaled_determinant(matrix / weights)
 
 
 def scaled_determinant(matrix: np.ndarray) -> float:
     """The determinant of the matrix with its rows scaled to length 1: the same sign, with rounding
     errors of one size.
     """
-    lengths = np.linalg.norm(matrix, axis=1)
-    return float(np.linalg.det(matrix / lengths[:, None])) if (lengths > 0).all() else 0.0
+    lengths = np.sqrt(np.add.reduce(matrix * matrix, axis=1))
+    return float(np.linalg.det(matrix / lengths[:, None])) if lengths.min() > 0.0 else 0.0
 
 
 def torus(point: OrbitPoint) -> float:

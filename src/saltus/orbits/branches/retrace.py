@@ -37,10 +37,11 @@ def _lies_on(points: Sequence[OrbitPoint], index: int, values: Sequence[float]) 
     do not count."""
     value = values[index]
     last = max(0, index - 2)
+    earlier = values[: last + 1]
+    if not min(earlier) <= value <= max(earlier):
+        return False
     passed = [
-        i
-        for i, (a, b) in enumerate(pairwise(values[: last + 1]))
-        if (a <= value <= b) or (b <= value <= a)
+        i for i, (a, b) in enumerate(pairwise(earlier)) if (a <= value <= b) or (b <= value <= a)
     ]
     point = points[index]
     steps = ((points[i], points[i + 1]) for i in passed)

@@ -64,10 +64,17 @@ class OrbitEvaluation:
         return matrix
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
-        """Write the derivatives to the unknowns, block by block, into the first columns of a matrix
-        of zeros.
+        """Write the derivatives to the unknowns into the first columns of a matrix of zeros: block
+        by block or, of many segments, entry by entry of all blocks.
         """
         n, d, _ = self.here.shape
+        if n <= d * d:
+            for i in range(n):
+                matrix[d * i : d * i + d, d * i : d * i + d] = self.here[i]
+            for i in range(n - 1):
+                matrix[d * i : d * i + d, d * i + d : d * i + 2 * d] = self.there[i]
+            matrix[-d:, :d] += closing * self.there[-1]
+            return
         width = matrix.shape[1]
         flat = matrix.reshape(-1)
         step = d * (width + 1)
@@ -110,7 +117,7 @@ class OrbitEvaluation:
         if self.here.shape[-1] != 2:
             return None
         with np.errstate(all="ignore"):
-            return float(np.prod(_areas(self.here) / _areas(self.there)))
+            return float(np.multiply.reduce(_areas(self.here) / _areas(self.there)))
 
 
 def _areas(maps: np.ndarray) -> np.ndarray:
