@@ -368,6 +368,33 @@ def test_a_drawing_of_the_models_own_is_traced_with_all_of_its_numbers(tmp_path)
         assert drawing[1]["radius"] == known[1].radius == 0.1 * 1.7
 
 
+def test_a_ramp_far_from_0_and_short_pushes_with_its_amplitude(tmp_path):
+    """A free mass has the speed amplitude (t - start - duration / 2). The difference of end and
+    start has an error of 1e-4 in the second case.
+    """
+    cases = [(1.0, 1e-3), (1.0, 1e-12), (1000.0, 1e-9)]
+    system = System(
+        model=saltus.WallOscillator(stiffness=0.0, wall=1e9),
+        load=Load(force=saltus.Ramp(amplitude=1.0, duration=1.0, start=1.0)),
+        impact=saltus.VelocityReduction(1.0),
+    )
+    wasm, description = page_parts(system)
+    motions = [
+        {
+            "values": {"load.force.start": start, "load.force.duration": duration},
+            "start": {"x": 0.0, "x_velocity": 0.0},
+            "duration": start + 10.0,
+            "at": [],
+        }
+        for start, duration in cases
+    ]
+    task = {"wasm": wasm, "description": description, "motions": motions}
+    (found,) = in_node([task], tmp_path)
+    speeds = [motion["end"][1] for motion in found]
+    expected = [10.0 - duration / 2.0 for _, duration in cases]
+    np.testing.assert_allclose(speeds, expected, rtol=1e-12)
+
+
 def test_motions_of_the_page_are_those_of_python(tmp_path):
     """Both kernels, and two systems of each kind."""
     counts, whole = check(1, 2, KINDS, tmp_path)

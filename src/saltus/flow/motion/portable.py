@@ -115,10 +115,12 @@ class PortableMotion:
 
     def functions(self) -> list[WrittenFunction]:
         """The functions of the structure, which the kernel calls, and `edges`, when each pulse of
-        the load begins and ends.
+        the load begins and ends, and its length.
+
+        The length is no rounded difference of both: a short pulse would lose digits.
         """
         pulses = [part_at(self._twin, path) for path in self._pulses]
-        edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length)])
+        edges = edges_function([t for p in pulses for t in (p.start, p.start + p.length, p.length)])
         drawn = [values_function("drawing", self._drawn[1])] if self._drawn[1] else []
         return [
             *structure_functions(self.run.trace),

@@ -176,7 +176,7 @@ export class Engine {
     this.placed = null;
     this.put("parameters", parameters);
     this.exports.edges(this.address("parameters"), this.results);
-    return loadTable(records, this.doubles(this.results, 2 * records.pulses).slice());
+    return loadTable(records, this.doubles(this.results, 3 * records.pulses).slice());
   }
 
   /** The numbers that Python's traced functions make of the parameters: the constants, and the geometry of the contacts. @param {PageSystem} system @returns {[Float64Array, Float64Array]} */

@@ -9,34 +9,36 @@
 
 /**
  * The breakpoints of a load, and the polynomials of each row between them.
- * @param {Records} layout @param {Float64Array} edges when each pulse begins and ends
+ * @param {Records} layout @param {Float64Array} edges when each pulse begins and ends, and its length
  * @returns {[Float64Array, Float64Array]}
  */
 export function loadTable(layout, edges) {
   const { rows, width } = layout;
-  const breaks = Float64Array.from(new Set([...edges, ...rows.flatMap((row) => ("breaks" in row ? row.breaks : []))])).sort();
+  const times = edges.filter((_, i) => i % 3 < 2);
+  const breaks = Float64Array.from(new Set([...times, ...rows.flatMap((row) => ("breaks" in row ? row.breaks : []))])).sort();
   const size = (breaks.length + 1) * width;
   const table = new Float64Array(rows.length * size);
   rows.forEach((row, i) => {
     const own = table.subarray(i * size, (i + 1) * size);
     if ("breaks" in row) fillRecord(own, breaks, row, width);
-    else fillClock(own, breaks, edges[2 * row.pulse] ?? 0, edges[2 * row.pulse + 1] ?? 0, row.order, layout);
+    else fillClock(own, breaks, edges.subarray(3 * row.pulse, 3 * row.pulse + 3), row.order, layout);
   });
   return [breaks, table];
 }
 
 /**
  * A row of a pulse: its time since the start, whether it acts, or the time since its end, in each piece.
- * @param {Float64Array} row @param {Float64Array} breaks @param {number} start @param {number} end @param {number} order
+ * @param {Float64Array} row @param {Float64Array} breaks @param {Float64Array} times its start, its end and its length @param {number} order
  * @param {Records} layout
  */
-function fillClock(row, breaks, start, end, order, layout) {
+function fillClock(row, breaks, times, order, layout) {
+  const [start = 0, end = 0, length = 0] = times;
   const { width, since, within, after } = layout;
   breaks.forEach((at, i) => {
     const piece = (i + 1) * width;
     const acts = at >= start && at < end ? 1 : 0;
     const past = at >= end ? 1 : 0;
-    if (order === since) row[piece] = past ? end - start : acts ? at - start : 0;
+    if (order === since) row[piece] = past ? length : acts ? at - start : 0;
     if (order === after) row[piece] = past ? at - end : 0;
     if (order === since) row[piece + 1] = acts;
     else if (order === after) row[piece + 1] = past;
