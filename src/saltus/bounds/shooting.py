@@ -346,6 +346,11 @@ class Shooting:
         return result
 
     @property
+    def period(self) -> Ball:
+        """The time over which the equations reach."""
+        return TWO_PI * self.span / self.parameters[self.frequency_place]
+
+    @property
     def event_unknowns(self) -> int:
         """How many of the unknowns, the first ones, belong to events."""
         return int(self.event_count * self.event_size)

@@ -531,8 +531,8 @@ class OrbitEquations(ABC):
         cannot be proved yet.
         """
         return CannotProve(
-            "orbits with rests, sticking, dependent gaps or coordinates that follow their events "
-            "are not proved yet"
+            "orbits with sticking, with rests among several contacts or two sides, with dependent "
+            "gaps, or with coordinates that follow their events are not proved yet"
         )
 
     def touching_segments(self, point: Any) -> OrbitSegments | CannotProve:

@@ -55,6 +55,8 @@ from saltus.orbits.equations.contract import (
 from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
 from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.proofs.resting_segments import resting_segments
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, substitute
@@ -142,6 +144,14 @@ class WholeMotionEquations(OrbitEquations):
 
     def counted_impacts(self, solution: Solution) -> int:
         return events_of(solution.evaluation).impact_count // (2 if self.signature.symmetric else 1)
+
+    def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
+        excursions = self.rests(solution)
+        if not len(excursions) or self.signature.symmetric:
+            return super().segments_to_prove(solution)
+        ends = solution.evaluation.ends
+        system = self.system_at(solution.values)
+        return resting_segments(system, excursions, ends[:, 0], ends[:, 1], self.signature.period)
 
     def touching_speed(self, solution: Solution) -> float:
         return math.inf

@@ -17,6 +17,8 @@ import numpy as np
 
 from saltus.bounds import Ball, Segment, contraction
 from saltus.errors import ParameterError
+from saltus.orbits.proofs.resting_segments import rest_by
+from saltus.orbits.proofs.segments import least_speed
 from saltus.systems import numbers
 from saltus.taylor import Expr, ordered
 
@@ -39,6 +41,10 @@ def certificate_of(proof: OrbitProof) -> dict[str, Any]:
     zero = proof.zero
     if not proof.proved or shooting is None or zero is None:
         raise ParameterError(f"there is no certificate, as nothing is proved: {proof.reason}")
+    if proof.made is not None and proof.made.rests:
+        raise ParameterError(
+            "there is no certificate of an orbit with rests yet; proof.check() repeats its inclusions"
+        )
     return {
         "format": FORMAT,
         "statement": proof.statement,
@@ -140,4 +146,7 @@ def holds(proof: OrbitProof) -> bool:
         and inner.proved
         and (reach < radius).all()
         and shooting.is_open(inner, zero.box)
+        and proof.made is not None
+        and least_speed(shooting, zero.box, proof.made) > 0.0
+        and all(rest_by(shooting, zero.box, rest) is not None for rest in proof.made.rests)
     )

@@ -24,7 +24,14 @@ from saltus.bounds import (
     rounded_up,
 )
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.proofs.resting_segments import rest_by
+from saltus.orbits.proofs.segments import (
+    CannotProve,
+    OrbitSegments,
+    Rest,
+    events_of,
+    least_speed,
+)
 from saltus.result import Result
 
 if TYPE_CHECKING:
@@ -84,6 +91,10 @@ class OrbitProof(Result):
         The number of validated Taylor steps.
     seconds
         The processor time.
+    rests_by
+        At each rest, by when infinitely many further impacts are over at the latest, (rests,).
+    releases
+        Middles and radii of the times at which the contact opens after each rest, (rests, 2).
 
     Examples
     --------
@@ -103,8 +114,11 @@ class OrbitProof(Result):
     assumptions: tuple[str, ...]
     steps: int
     seconds: float
+    rests_by: np.ndarray
+    releases: np.ndarray
     orbit: PeriodicOrbit = field(repr=False)
     radii: dict[str, float] = field(default_factory=dict, repr=False)
+    made: OrbitSegments | None = field(default=None, repr=False)
     shooting: Shooting | None = field(default=None, repr=False)
     zero: ProvedZero | None = field(default=None, repr=False)
 
@@ -140,6 +154,7 @@ class OrbitProof(Result):
             "No other orbit of this signature lies, at its impacts and at the nodes between them, "
             f"within {within(self.unique_within)} of it.",
             "Its contact is open between the impacts." if impacts else "Its contact stays open.",
+            *self._rests_in_words(),
             _of_stability(self.stable, self.moduli),
         ]
         if self.radii:
@@ -148,6 +163,14 @@ class OrbitProof(Result):
             )
             told.append(f"This holds for every {radii} of its double.")
         return " ".join(part for part in told if part)
+
+    def _rests_in_words(self) -> list[str]:
+        """A sentence for each rest."""
+        return [
+            f"Infinitely many further impacts are over by t = {rounded_up(float(end), 9)}; then its "
+            f"contact is closed until t = {rounded_ball(*map(float, release))}."
+            for end, release in zip(self.rests_by, self.releases, strict=True)
+        ]
 
     def to_xarray(self) -> xarray.Dataset:
         """The orbit's dataset with the enclosures, and with the statement as an attribute."""
@@ -203,19 +226,48 @@ def prove_orbit(
     zero = prove_zero(shooting)
     if isinstance(zero, NotProved):
         return _without_zero(orbit, zero.reason, began, shooting)
-    multipliers = multipliers_of(return_map(shooting, zero.enclosure))
+    rested = [rest_by(shooting, zero.box, rest) for rest in made.rests]
+    multipliers = (
+        Multipliers(True, ((0.0, 0.0),) * (2 * shooting.dof))  # a rest forgets everything
+        if made.rests
+        else multipliers_of(return_map(shooting, zero.enclosure))
+    )
     refuted = _refutation(shooting, zero, made)
     opened = refuted is None and shooting.is_open(zero.enclosure, zero.box)
     if refuted is None and not opened:
         refuted = _penetration(shooting, zero)
-    events = zero.box[: shooting.event_unknowns].reshape(-1, shooting.event_size)
-    least = float(events[:, 1].low.min()) if made.free_time else np.inf
+    least = least_speed(shooting, zero.box, made)
     reason = refuted or ("" if opened else "the contact was not shown to be open between impacts")
     if not reason and not least > 0.0:
         opened = False
         reason = "an impact was not shown to have a speed"
-    return _proof(
-        orbit, shooting, zero, multipliers, opened, refuted is not None, reason, radii, began
+    if not reason and None in rested:
+        opened = False
+        reason = "an accumulation of impacts, or the rest after it, has no bound"
+    if not opened and made.rests:
+        multipliers = Multipliers(None, ())
+    impacts = events_of(shooting, zero.box, made)
+    return OrbitProof(
+        proved=False if refuted else (True if opened else None),
+        reason=reason,
+        impact_times=pairs(impacts[:, 0]) if made.free_time else np.empty((0, 2)),
+        impact_speeds=pairs(impacts[:, 1]) if made.free_time else np.empty((0, 2)),
+        unique_within=shooting.by_name(zero.unique),
+        least_speed=least,
+        stable=multipliers.stable,
+        moduli=np.array(multipliers.moduli).reshape(-1, 2),
+        assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
+        steps=len(shooting.steps),
+        seconds=time.process_time() - began,
+        rests_by=np.array([end for end in rested if end is not None]),
+        releases=np.array(
+            [pairs(_release_after(shooting, zero.box, rest)) for rest in made.rests]
+        ).reshape(-1, 2),
+        orbit=orbit,
+        radii=dict(radii or {}),
+        made=made,
+        shooting=shooting,
+        zero=zero,
     )
 
 
@@ -271,38 +323,10 @@ def _penetration(shooting: Shooting, zero: ProvedZero) -> str | None:
     return f"it penetrates its contact: the gap is negative at t = {pierced:.6g}"
 
 
-def _proof(
-    orbit: PeriodicOrbit,
-    shooting: Shooting,
-    zero: ProvedZero,
-    multipliers: Multipliers,
-    opened: bool,
-    refuted: bool,
-    reason: str,
-    radii: dict[str, float] | None,
-    began: float,
-) -> OrbitProof:
-    events = zero.box[: shooting.event_unknowns].reshape(-1, shooting.event_size)
-    times = pairs(events[:, 0]) if shooting.free_time else np.empty((0, 2))
-    speeds = pairs(events[:, 1]) if shooting.free_time else np.empty((0, 2))
-    least = float(events[:, 1].low.min()) if shooting.free_time else np.inf
-    return OrbitProof(
-        proved=False if refuted else (True if opened else None),
-        reason=reason,
-        impact_times=times,
-        impact_speeds=speeds,
-        unique_within=shooting.by_name(zero.unique),
-        least_speed=least,
-        stable=multipliers.stable,
-        moduli=np.array(multipliers.moduli).reshape(-1, 2),
-        assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
-        steps=len(shooting.steps),
-        seconds=time.process_time() - began,
-        orbit=orbit,
-        radii=dict(radii or {}),
-        shooting=shooting,
-        zero=zero,
-    )
+def _release_after(shooting: Shooting, box: Ball, rest: Rest) -> Ball:
+    """The ball of the time of the release after a rest."""
+    release = box[shooting.event_size * rest.release]
+    return release + shooting.period if rest.release == 0 else release
 
 
 def _without_zero(
@@ -321,6 +345,8 @@ def _without_zero(
         assumptions=ASSUMPTIONS,
         steps=0 if shooting is None else len(shooting.steps),
         seconds=time.process_time() - began,
+        rests_by=np.empty(0),
+        releases=np.empty((0, 2)),
         orbit=orbit,
         shooting=shooting,
     )
