@@ -1,7 +1,7 @@
-"""Run the README's blocks and make one page in an environment that has nothing but the wheel:
+"""Run the blocks of the README and of the tour, and make one page, with nothing but the wheel:
 `python try_readme.py CHECKOUT FOLDER`, from another folder than the checkout.
 
-Of the checkout only the README and what runs its blocks are read; saltus is the installed one.
+Of the checkout only these two pages and what runs their blocks are read; saltus is the installed one.
 """
 
 import os
@@ -41,15 +41,16 @@ patches = SimpleNamespace(
     syspath_prepend=lambda folder: sys.path.insert(0, str(folder)),
 )
 FOLDER.mkdir(parents=True, exist_ok=True)
-readme = CHECKOUT / "README.md"
-Page(readme, FOLDER, command, patches).run()
+pages = [CHECKOUT / "README.md", CHECKOUT / "docs" / "tour.md"]
+for page in pages:
+    Page(page, FOLDER, command, patches).run()
 system = saltus.System(
     model=saltus.TwoStops(left=-0.5, right=0.5),
     load=saltus.Load(frequency=1.2, force=saltus.Harmonic(0.5)),
     impact=saltus.NewtonImpact(e=0.7),
 )
-page = saltus.page(system, path=FOLDER / "page.html")
-if page.stat().st_size < 50_000:
+made = saltus.page(system, path=FOLDER / "page.html")
+if made.stat().st_size < 50_000:
     sys.exit("the page has no code")
-kinds = [kind for kind, *_ in blocks(readme.read_text(encoding="utf-8"))]
-print(f"{kinds.count('python') + kinds.count('console')} blocks of the README and a page")
+kinds = [kind for page in pages for kind, *_ in blocks(page.read_text(encoding="utf-8"))]
+print(f"{kinds.count('python') + kinds.count('console')} blocks of the README and the tour, and a page")

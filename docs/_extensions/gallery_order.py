@@ -4,60 +4,29 @@ import matplotlib.pyplot as plt
 
 from saltus.plots.conventions import LOOK, RC
 
-TASKS = (  # what people do after their first motion, named in the gallery's first paragraph
-    *(
-        "preloaded_stop",
-        "at2_record",
-        "overturning_spectrum",
-        "harvester",
-        "identification",
-        "basins",
+GROUPS = {  # by subject, as the first paragraph of the gallery lists them
+    "Impacts and stops": (
+        "wall_orbits grazing two_stops preloaded_stop impact_pair shaken_table up_and_down"
     ),
-    *(
-        "design_grid",
-        "animation",
-        "notebook",
-        "mass_chain",
-        "elastic_bar",
-        "beam_on_stop",
-        "beam_on_hard_stop",
-        "ten_masses",
+    "Rocking blocks and records": (
+        "rocking_block housner overturning overturning_spectrum at2_record record falling_block"
     ),
-)
-ORDER = (
-    *(
-        "quickstart",
-        *TASKS,
-        "potential_wells",
-        "coming_to_rest",
-        "rocking_block",
-        "housner",
-        "overturning",
-        "bilinear",
+    "Friction, backlash, soft stops": (
+        "belt stribeck rubbing_absorber backlash bilinear soft_stop"
     ),
-    *(
-        "duffing",
-        "two_stops",
-        "piezo_harvester",
-        "belt",
-        "wall_orbits",
-        "up_and_down",
-        "grazing",
-        "orbits",
-        "period_doubling",
+    "Structures": ("mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop"),
+    "Harvesters and coordinates of first order": ("harvester piezo_harvester"),
+    "Orbits, branches, spectra": (
+        "orbits period_doubling resting_orbit response_spectrum duffing smoothing"
     ),
-    *(
-        "resting_orbit",
-        "response_spectrum",
-        "chaos",
-        "capture",
-        "erosion",
-        "ensemble",
-        "stability_chart",
-        "sensitivities",
+    "Attractors and chaos": (
+        "basins erosion capture chaos coming_to_rest potential_wells ensemble stability_chart"
     ),
-    *("smoothing", "two_layers", "cell_chain", "impact_pair", "record", "physical_units"),
-)
+    "The metainterface": ("quickstart two_layers cell_chain physical_units"),
+    "Fits, design, other programs": ("identification sensitivities design_grid from_sympy in_jax"),
+    "To show": ("animation notebook"),
+}
+ORDER = tuple(name for names in GROUPS.values() for name in names.split())
 
 
 def place(name):

@@ -12,11 +12,20 @@ import saltus
 
 
 @cache
-def tristable():
-    """The metainterface of Fig.
+def wall():
+    """An impact oscillator: a mass on a spring hits a wall, with the branch of its orbits."""
+    system = saltus.System(
+        model=saltus.WallOscillator(damping=0.1, wall=1.0),
+        load=saltus.Load(frequency=1.2, force=saltus.Harmonic(amplitude=0.5)),
+        impact=saltus.VelocityReduction(0.8),
+    )
+    branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0), "load.frequency", (0.6, 2.0))
+    return system, [branch], {"x": 0.0, "periods": 20, "title": "An impact oscillator"}
 
-    4c: three stable states under a constant load, and the curves between their basins.
-    """
+
+@cache
+def tristable():
+    """The metainterface of Fig. 4c: three stable states under a constant load, and the curves between their basins."""
     beta0 = np.deg2rad(80)
     system = saltus.System(
         model=saltus.Metainterface(beta0=beta0, damping=0.1),
@@ -37,10 +46,7 @@ def tristable():
 
 @cache
 def spectrum():
-    """The response spectrum of Fig.
-
-    9b: its resonance, and the loops of the branch at low frequencies.
-    """
+    """The response spectrum of Fig. 9b: its resonance, and the loops at low frequencies."""
     system = saltus.System(
         model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
         load=saltus.Load(frequency=0.85, horizontal=saltus.Harmonic(amplitude=0.5), vertical=-0.5),
@@ -95,7 +101,13 @@ def bilinear():
     return system, [branch], {"x": 0.4, "periods": 30, "title": "An oscillator of one's own"}
 
 
-PAGES = {"tristable": tristable, "spectrum": spectrum, "block": block, "bilinear": bilinear}
+PAGES = {
+    "wall": wall,
+    "tristable": tristable,
+    "spectrum": spectrum,
+    "block": block,
+    "bilinear": bilinear,
+}
 
 
 def write(name, folder):

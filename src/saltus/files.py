@@ -127,9 +127,11 @@ def write_figure(stem: Path | str, figure: Any, title: str | None = None) -> lis
         figure.set_layout_engine(layout)
 
 
-def write_picture(path: Path, figure: Any, title: str | None = None) -> Path:
+def write_picture(
+    path: Path, figure: Any, title: str | None = None, *, dpi: float | str | None = None
+) -> Path:
     """Write a matplotlib Figure in the format that the suffix of `path` names; `title` is that of a
-    PDF.
+    PDF, `dpi` the dots in an inch, by default those of Matplotlib's settings.
 
     Raises
     ------
@@ -147,7 +149,8 @@ def write_picture(path: Path, figure: Any, title: str | None = None) -> Path:
         "pdf": {"CreationDate": None, "Title": title},
         "svg": {"Date": None, "Title": title},
     }
-    figure.savefig(buffer, format=kind, metadata=metadata.get(kind, {}))
+    dots = {} if dpi is None else {"dpi": dpi}
+    figure.savefig(buffer, format=kind, metadata=metadata.get(kind, {}), **dots)
     return write_bytes(path, buffer.getvalue())
 
 

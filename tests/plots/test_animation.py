@@ -84,3 +84,29 @@ def test_a_picture_is_that_of_a_whole_drawing(motion):
         for picture in pictures
     )
     np.testing.assert_array_equal(quick, whole)
+
+
+def test_an_arrow_is_as_long_as_the_load_and_points_where_it_does():
+    """Sine and cosine of one frequency: the tips follow them, the upright arrow upwards."""
+    load = saltus.Load(
+        frequency=2.0,
+        ground_horizontal=saltus.Harmonic(0.1),
+        ground_vertical=saltus.Harmonic(0.02, phase=0.5),
+    )
+    system = saltus.System(model=saltus.RockingBlock(alpha=0.4), load=load)
+    film = saltus.animate(saltus.simulate(system, theta=0.0, periods=1), fps=5, title="A block")
+    film._draw_was_started = True  # it is not shown here
+    arrows = [artist for artist in film._fig.moving if artist.get_zorder() == 5]
+    assert film._fig.get_suptitle() == "A block"
+    tips = []
+    for number in range(40):
+        film._func(number)
+        tips.append([arrow.get_xy()[3] - arrow.get_xy()[[0, 6]].mean(axis=0) for arrow in arrows])
+    times = np.linspace(0.0, np.pi, 40)
+    across, upright = np.moveaxis(np.array(tips), 1, 0)
+    for tip, axis, channel in ((across, 0, "ground_horizontal"), (upright, 1, "ground_vertical")):
+        values = np.array([getattr(load, channel)(time) for time in times])
+        size = np.abs(tip[:, axis]).max()
+        assert size > 0.1
+        np.testing.assert_allclose(tip[:, axis] / size, values / np.abs(values).max(), atol=1e-12)
+        np.testing.assert_allclose(tip[:, 1 - axis], 0.0, atol=1e-12)

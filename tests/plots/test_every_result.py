@@ -167,6 +167,32 @@ def test_a_picture_of_its_own_names_every_axis_with_its_unit_and_cuts_no_text(na
                 assert box.y1 < height + 1.0, text
 
 
+def covered(figure, ax):
+    """The legends of a figure that lie on drawn points of axes, or on the axes of another one."""
+    inside = [] if ax.get_legend() is None else [ax.get_legend()]
+    points = [
+        ax.transData.transform(line.get_xydata())
+        for line in ax.lines
+        if line.get_visible() and line.get_transform() == ax.transData and len(line.get_xydata())
+    ]
+    points = np.concatenate(points) if points else np.empty((0, 2))
+    points = points[np.isfinite(points).all(axis=1)]
+    panel = ax.get_window_extent()
+    for legend in inside + list(figure.legends):
+        box = legend.get_window_extent()
+        within = (points > [box.x0, box.y0]).all(axis=1) & (points < [box.x1, box.y1]).all(axis=1)
+        if (legend in inside and within.any()) or (legend not in inside and box.overlaps(panel)):
+            yield legend
+
+
+@every_result
+def test_no_legend_of_a_picture_of_its_own_covers_a_curve(name, pictures):
+    axes = pictures(name)
+    figure = plots.figure_of(axes)
+    for ax in np.ravel(axes).tolist():
+        assert not list(covered(figure, ax)), name
+
+
 @every_result
 def test_numbers_on_an_axis_do_not_overlap(name, pictures):
     for ax in np.ravel(pictures(name)).tolist():

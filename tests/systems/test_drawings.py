@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+import saltus
 from saltus import (
     BeltOscillator,
     CellChain,
@@ -118,3 +119,31 @@ def test_a_model_of_ones_own_is_drawn_by_itself_or_as_masses_on_lines():
     assert bar.points[1] == pytest.approx([0.1, 0.2])
     with pytest.raises(ParameterError, match="position must be"):
         drawing_of(System(model=Free()), [np.nan, 0.0])
+
+
+def test_a_point_of_a_structure_meets_its_stop_with_its_face():
+    """Rigid or soft, on either side, in any unit of length."""
+    for unit in (1.0, 1e-3):
+        stop = saltus.Contact(name="stop", coordinate=1, position=0.5 * unit, sign=-1)
+        soft = saltus.Surface(
+            name="soft", coordinate=0, position=-0.2 * unit, sign=-1, stiffness=2.0
+        )
+        structure = saltus.Structure(
+            mass=np.eye(3), stiffness=np.eye(3), contacts=[stop], surfaces=[soft], forces={"f": 1}
+        )
+        at_both = [0.5 * unit if name == "x1" else -0.2 * unit for name in structure.coordinates]
+        masses = shapes(structure, at_both, "mass")
+        assert len(masses) == 2  # modes are not drawn
+        walls = [wall.points for wall in shapes(structure, at_both, "wall")]
+        right = max(points[:, 0].max() for points in walls)
+        assert masses[0].points[:, 0].max() == pytest.approx(right)
+        (spring,) = shapes(structure, at_both, "spring")
+        assert masses[1].points[:, 0].min() == pytest.approx(spring.points[-1, 0])
+        pressed = [place - 0.1 * unit for place in at_both]
+        (shorter,) = shapes(structure, pressed, "spring")
+        assert np.ptp(spring.points[:, 0]) - np.ptp(shorter.points[:, 0]) == pytest.approx(
+            0.1 * unit
+        )
+        freed = [place + 0.1 * unit for place in at_both]
+        (longest,) = shapes(structure, freed, "spring")
+        np.testing.assert_allclose(longest.points, spring.points)

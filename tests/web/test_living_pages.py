@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(
     BROWSER is None, reason="no Chromium, Chrome or Edge is installed here"
 )
 CHANGED = {
+    "wall": ("load.frequency", 1.4),
     "tristable": ("model.damping", 0.2),
     "block": ("load.ground_horizontal.frequency", 6.0),
     "bilinear": ("model.stop_stiffness", 4.0),

@@ -1,4 +1,4 @@
-"""What docs/models.md calls out of scope is refused in one sentence, or ends in one."""
+"""What docs/not_possible.md lists is refused in one sentence, or ends in one."""
 
 from dataclasses import dataclass, replace
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import answered
+from saltus.checks import answered, check_number
 from saltus.errors import ParameterError, shown
 from saltus.result import Result
 from saltus.systems import System
+
+PRINT_DPI = 300.0  # what journals ask of pictures with shades
 
 if TYPE_CHECKING:
     import xarray
@@ -122,7 +124,9 @@ def kind_of(data: Any) -> str:
 
 
 @answered
-def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
+def save(
+    path: str | Path, result: Any, *, title: str | None = None, dpi: float | None = None
+) -> Path:
     """Write a result, a picture or a text to a file that is complete or not there, also after a
     kill; returns its path.
 
@@ -140,6 +144,8 @@ def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
         figure, or axes, such as `plot` returns; a text, or bytes.
     title
         The title of a picture in the description of a PDF.
+    dpi
+        The dots in an inch of a picture; without it those of its figure, and at least 300.
 
     Raises
     ------
@@ -181,7 +187,11 @@ def save(path: str | Path, result: Any, *, title: str | None = None) -> Path:
                 ),
                 "result",
             )
-        return files.write_picture(path if path.suffix else path.with_suffix(".png"), figure, title)
+        if dpi is not None:
+            check_number("dpi", dpi, at_least=10.0, at_most=2400.0)
+        dots = max(PRINT_DPI, figure.dpi) if dpi is None else dpi
+        path = path if path.suffix else path.with_suffix(".png")
+        return files.write_picture(path, figure, title, dpi=dots)
     except OSError as error:
         raise ParameterError(
             f"{path} cannot be written ({(error.strerror or str(error)).lower()})", "path"

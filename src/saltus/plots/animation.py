@@ -40,14 +40,16 @@ def animate(
     path: Path | str | None = None,
     *,
     seconds: float = 8.0,
-    fps: float = 25.0,
+    fps: float = 30.0,
     width: float = LOOK.double_column,
+    title: str | None = None,
     progress: Progress = silent,
 ) -> Any:
-    """A film of a motion, or of one period of an orbit: the mechanism as it moves, beside its phase
-    portrait.
+    """A film of a motion, or of one period of an orbit: the mechanism as it moves under its loads,
+    beside its phase portrait.
 
-    The mechanism is that of `saltus.systems.drawing_of`; a model of your own may say how it is
+    An arrow above the mechanism shows each load that varies, as long as its value. The mechanism is
+    that of `saltus.systems.drawing_of`; a model of your own may say how it is
     drawn.
 
     Parameters
@@ -63,6 +65,8 @@ def animate(
         The pictures in a second.
     width
         The width of the picture, mm.
+    title
+        A title above the film.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -95,7 +99,7 @@ def animate(
         )
     count = max(2, round(seconds * fps))
     with style():
-        film = _Film(motion, np.linspace(motion.start, motion.time, count), width)
+        film = _Film(motion, np.linspace(motion.start, motion.time, count), width, title)
         made = animation.FuncAnimation(
             film.page, film.show, frames=count, interval=1000.0 / fps, blit=False
         )
@@ -173,11 +177,15 @@ class _Page(Figure):
 class _Film:
     """The figure of a film, and how it shows one of its times."""
 
-    def __init__(self, motion: Any, times: np.ndarray, width: float) -> None:
+    def __init__(
+        self, motion: Any, times: np.ndarray, width: float, title: str | None = None
+    ) -> None:
         self.motion = motion
         self.times = times
         self.places = np.atleast_2d(motion.at(times)[0])  # (degrees of freedom, n)
         self.page = _Page(figsize=(width / 25.4, 0.4 * width / 25.4), layout="constrained")
+        if title is not None:
+            self.page.suptitle(str(title))
         mechanism, portrait = self.page.subplots(1, 2, width_ratios=(1.2, 1))
         shapes = [drawing_of(motion.system, place) for place in self.places.T]
         self.shapes = shapes
@@ -192,12 +200,20 @@ class _Film:
         )
         (x0, y0) = corners.min(axis=0)
         (x1, y1) = corners.max(axis=0)
+        self.loads = _Loads(motion.system.load, times, mechanism, (x0, x1, y1))
+        y1 = self.loads.top
         room = 0.04 * max(x1 - x0, y1 - y0)
         mechanism.set(xlim=(x0 - room, x1 + room), ylim=(y0 - room, y1 + room), aspect="equal")
         mechanism.axis("off")
         self.title = mechanism.set_title("", loc="left")
         self._portrait(portrait)
-        moving = [*self.artists, self.title, *(line for line, *_ in self.lines), *self.dots]
+        moving = [
+            *self.artists,
+            *self.loads.arrows,
+            self.title,
+            *(line for line, *_ in self.lines),
+            *self.dots,
+        ]
         self.page.moving = sorted(moving, key=lambda artist: artist.get_zorder())
         for artist in self.page.moving:
             artist.set_animated(True)
@@ -244,6 +260,7 @@ class _Film:
                 artist.set_xy(shape.points)
             elif isinstance(artist, Circle):
                 artist.center = tuple(shape.points[0])
+        self.loads.show(frame)
         place, velocity = (np.atleast_1d(values) for values in self.motion.at(time))
         for i, (line, times, places, velocities) in enumerate(self.lines):
             seen = int(np.searchsorted(times, time, side="right"))
@@ -251,7 +268,74 @@ class _Film:
                 np.append(places[:seen], place[i]), np.append(velocities[:seen], velocity[i])
             )
             self.dots[i].set_data([place[i]], [velocity[i]])
-        return [*self.artists, *self.dots]
+        return [*self.artists, *self.loads.arrows, *self.dots]
+
+
+MOST_ARROWS = 3  # loads that are drawn, the first of those that vary
+
+
+class _Loads:
+    """An arrow for each load that varies, above a mechanism: its length is the value beside the
+    largest one of the film. Loads called vertical point up and down.
+    """
+
+    def __init__(
+        self, load: Any, times: np.ndarray, ax: Axes, box: tuple[float, float, float]
+    ) -> None:
+        left, right, self.top = box
+        values = {
+            name: np.array([float(getattr(load, name)(time)) for time in times])
+            for name in load.channels
+        }
+        varying = [name for name in values if np.ptp(values[name]) > 0.0][:MOST_ARROWS]
+        reach = 0.25 * (right - left)
+        middle = 0.5 * (left + right)
+        self.arrows: list[Polygon] = []
+        self.corners: list[np.ndarray] = []  # of each arrow at each time, (times, 7, 2)
+        for name in varying:
+            upright = "vertical" in name
+            height = self.top + (1.3 if upright else 0.4) * reach
+            share = reach * values[name] / np.abs(values[name]).max()
+            outline = _arrow(share, 0.1 * reach)
+            outline = outline[..., ::-1] if upright else outline
+            self.corners.append(outline + np.array([middle, height]))
+            arrow = Polygon(self.corners[-1][0], closed=True, color=LOOK.unstable, lw=0.0, zorder=5)
+            ax.add_patch(arrow)
+            self.arrows.append(arrow)
+            ax.plot(middle, height, marker="o", ms=2.5, color=LOOK.ink, zorder=1)
+            words = name.replace("_", " ")
+            aside = (0.3 * reach, 0.0) if upright else (0.0, 0.22 * reach)
+            place = {"ha": "left", "va": "center"} if upright else {"ha": "center", "va": "bottom"}
+            ax.text(
+                middle + aside[0],
+                height + aside[1],
+                words,
+                color=LOOK.unstable,
+                fontsize=8,
+                zorder=1,
+                **place,
+            )
+            self.top = height + (1.1 if upright else 0.6) * reach
+
+    def show(self, frame: int) -> None:
+        """The arrows of the picture with this number."""
+        for arrow, corners in zip(self.arrows, self.corners, strict=True):
+            arrow.set_xy(corners[frame])
+
+
+def _arrow(lengths: np.ndarray, half: float) -> np.ndarray:
+    """The outlines of arrows along x from 0 to each length, (n, 7, 2); short ones have a short
+    head.
+    """
+    head = np.minimum(np.abs(lengths), 2.0 * half) * np.sign(lengths)
+    neck = lengths - head
+    width = np.minimum(1.0, np.abs(lengths) / (2.0 * half)) * half
+    zero = np.zeros_like(lengths)
+    x = np.stack([zero, neck, neck, lengths, neck, neck, zero], axis=1)
+    y = np.stack(
+        [0.4 * width, 0.4 * width, width, zero, -width, -0.4 * width, -0.4 * width], axis=1
+    )
+    return np.stack([x, y], axis=2)
 
 
 def _artist(ax: Axes, shape: Any) -> Artist:

@@ -4,16 +4,20 @@ balance, the fit of a system to a measurement, and which loads overturn a block.
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Callable
 from contextlib import nullcontext
+from inspect import signature
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from saltus.checks import check_number
 from saltus.errors import ParameterError, shown
 from saltus.plots.basins import (
     draw_attractors,
@@ -30,15 +34,22 @@ from saltus.plots.chaos import (
 )
 from saltus.plots.chart import draw_stability_chart
 from saltus.plots.conventions import (
+    LEGENDS,
     LOOK,
+    NARROWEST,
+    WIDEST,
+    asked_legend,
     axes_or_new,
     cell_edges,
     drawing,
     figure_of,
+    legend_at,
     legend_of,
+    new_figure,
     shades,
-    style,
+    style_on_top,
 )
+from saltus.plots.conventions import style as look
 from saltus.plots.curves import (
     draw_attractors_along,
     draw_backbone,
@@ -139,6 +150,7 @@ def draw_fragility(
     """Draw the share of the loads that overturn, with its interval, over the scale of `fragility`;
     returns the axes.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.7 * width)
     scale = dataset["scale"].values
     ax.fill_between(
@@ -163,7 +175,7 @@ def draw_fragility(
         ylim=(-0.02, 1.02),
         xlim=(scale[0], scale[-1]),
     )
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -175,6 +187,7 @@ def draw_energies(
     the axes.
     """
     parts = [str(name) for name in dataset["part"].values]
+    own = ax is None
     ax = axes_or_new(ax, width, 14.0 + 6.0 * len(parts))
     roles = dataset["role"].values
     for role, colour in zip(("supplied", "dissipated", "stored"), shades(3), strict=True):
@@ -185,7 +198,7 @@ def draw_energies(
     ax.invert_yaxis()
     ax.set_xlabel("mean power")
     ax.set_ylabel("part")
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -195,6 +208,7 @@ def draw_fit(
 ) -> Axes:
     """Draw the dataset of a `fit`: what was measured as dots, the motion as lines; of impact times
     alone by how much the motion misses them; returns the axes."""
+    own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     kinds = list(
         dict.fromkeys(
@@ -229,7 +243,7 @@ def draw_fit(
     ax.set_ylabel(
         "measured (dots), motion (lines)" if sampled else "time of the motion less that measured"
     )
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -278,7 +292,19 @@ DRAWINGS: dict[str, Callable[..., Any]] = {
 }  # by the attribute `kind`
 
 
-def plot(result: Any, **options: Any) -> Any:
+SIZES = {"column": LOOK.single_column, "page": LOOK.double_column}  # of a journal, mm
+
+
+def plot(
+    result: Any,
+    *,
+    legend: bool | str | None = None,
+    title: str | None = None,
+    size: str | tuple[float, float] | None = None,
+    dpi: float | None = None,
+    style: Any = None,
+    **options: Any,
+) -> Any:
     """Draw any result; returns the axes, or an array of them for several panels. In a notebook the
     picture is below the cell.
 
@@ -288,6 +314,18 @@ def plot(result: Any, **options: Any) -> Any:
         A Dataset or a DataTree that saltus has made, a result with `to_xarray`, such as a motion or
         a branch, or a tuple of such results, as `switch_branch` and `separatrices` return them,
         which are drawn into the same axes.
+    legend
+        Where the legend is: "inside" the axes, "below" or to the "right" of them, or False for
+        none. A new figure has it below, where it covers nothing; given axes have it inside.
+    title
+        A title above the picture.
+    size
+        The size of a new figure: "column" or "page", one or both columns of a journal (90 and 190
+        mm), or its width and height in mm.
+    dpi
+        The dots in an inch of a new figure; `saltus.save` writes at least 300.
+    style
+        A style of Matplotlib on top of the conventions: a name, a file or a dictionary.
     options
         Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and
         `width=`, in mm.
@@ -295,24 +333,103 @@ def plot(result: Any, **options: Any) -> Any:
     Raises
     ------
     ParameterError
-        A result that has no picture.
+        A result that has no picture, or an argument that the picture does not take.
 
     Examples
     --------
-    >>> axes = saltus.plot(branch)
-    >>> type(axes).__name__
-    'Axes'
+    >>> axes = saltus.plot(branch, legend="right", title="A resonance", size=(120, 60))
+    >>> type(axes).__name__, (axes.figure.get_size_inches() * 25.4).round().tolist()
+    ('Axes', [120.0, 60.0])
     """
+    into_given = options.get("ax") is not None or options.get("figure") is not None
+    _check_size(size, dpi, into_given, "width" in options)
+    place = _place_of_legend(legend)
+    if title is not None and not into_given:
+        place = place or "below"  # above is the title
+    with legend_at(place), style_on_top(_checked_style(style)):
+        axes = _draw(result, options, size)
+        if title is not None:
+            _entitle(axes, str(title), into_given)
+    figure = figure_of(axes)
+    if isinstance(size, tuple):
+        figure.set_size_inches(size[0] / 25.4, size[1] / 25.4)
+    if dpi is not None:
+        figure.set_dpi(dpi)
+    if not into_given:
+        show_below_cell(figure)
+    return axes
+
+
+def _entitle(axes: Any, title: str, into_given: bool) -> None:
+    """A title above given axes, or above a new figure, broken to its width."""
+    if into_given:
+        np.ravel(axes)[0].set_title(title)
+        return
+    figure = figure_of(axes)
+    letters = max(12, round(25.4 * figure.get_figwidth() / LETTER))
+    with look():
+        figure.suptitle("\n".join(textwrap.wrap(title, letters)), fontsize=TITLE_SIZE)
+
+
+TITLE_SIZE = 10.0  # points
+LETTER = 1.75  # mm, the mean width of a letter of that size
+
+
+def _place_of_legend(legend: Any) -> str | None:
+    """The place of a legend by its name."""
+    named = {None: None, True: None, False: "none"} | {place: place for place in LEGENDS}
+    if not isinstance(legend, (bool, str, type(None))) or legend not in named:
+        raise ParameterError(
+            f'legend must be "inside", "below", "right" or False, got {shown(legend)}', "legend"
+        )
+    return named[legend]
+
+
+def _check_size(size: Any, dpi: Any, into_given: bool, has_width: bool) -> None:
+    """Refuse a size or a density of a figure that is not new, or that no figure has."""
+    for name, value in (("size", size), ("dpi", dpi)):
+        if value is not None and into_given:
+            raise ParameterError(
+                f"{name} is that of a new figure; set it on the figure of the given axes", name
+            )
+    if size is not None and has_width:
+        raise ParameterError("size and width exclude each other; give one of them", "size")
+    if isinstance(size, tuple) and len(size) == 2:
+        for number in size:
+            check_number("size", number, at_least=NARROWEST, at_most=WIDEST, unit="mm")
+    elif size is not None and not (isinstance(size, str) and size in SIZES):
+        raise ParameterError(
+            f'size must be "column", "page" or (width, height) in mm, got {shown(size)}', "size"
+        )
+    if dpi is not None:
+        check_number("dpi", dpi, at_least=10.0, at_most=2400.0)
+
+
+def _checked_style(own: Any) -> Any:
+    """A style that Matplotlib knows."""
+    if own is None:
+        return None
+    try:
+        with mpl.style.context(own):
+            return own
+    except Exception as error:
+        raise ParameterError(
+            f"style must be a style of Matplotlib, by name, file or dictionary, got {shown(own)}",
+            "style",
+        ) from error
+
+
+def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
+    """Draw a result, or several into the same axes, in a new figure of this size."""
+    width = SIZES[size] if isinstance(size, str) else size[0] if size else None
     if isinstance(result, (tuple, list)) and result:
         given = options.pop("ax", None)
-        with style() if given is None else nullcontext():
-            ax = axes_or_new(
-                given, options.pop("width", LOOK.single_column), 0.8 * LOOK.single_column
-            )
-            for each in result:
-                plot(each, ax=ax, **options)
-        if given is None:
-            show_below_cell(figure_of(ax))
+        place = asked_legend() or ("below" if given is None else None)
+        with look() if given is None else nullcontext(), legend_at(place):
+            wide = options.pop("width", width or LOOK.single_column)
+            ax = axes_or_new(given, wide, 0.85 * LOOK.single_column)
+            for part in result:
+                _draw(part, {**options, "ax": ax}, None)
         return ax
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
@@ -325,10 +442,13 @@ def plot(result: Any, **options: Any) -> Any:
         raise ParameterError(
             f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result"
         )
-    axes = draw(data, **options)
-    if not options.keys() & {"ax", "figure"}:
-        show_below_cell(figure_of(axes))
-    return axes
+    if width is None:
+        return draw(data, **options)
+    if "width" in signature(draw).parameters:
+        return draw(data, width=width, **options)
+    height = max(0.75 * LOOK.single_column, 0.63 * width)
+    with look():
+        return draw(data, figure=new_figure(width, height), **options)
 
 
 def _by_content(data: Any) -> Callable[..., Any] | None:

@@ -296,6 +296,7 @@ def draw_uncertainty(
     """Draw the share of uncertain states over the distance, on logarithmic axes, with the power law
     that was fitted.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
     distance = dataset["distance"].values
     share = dataset["share"].values
@@ -322,7 +323,7 @@ def draw_uncertainty(
         axis.set_minor_formatter(NullFormatter())
     ax.set_xlabel(r"distance $\varepsilon$ (cells)")
     ax.set_ylabel(r"share $f(\varepsilon)$ of uncertain states")
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -331,6 +332,7 @@ def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.singl
     """Draw the share of the boundary cells that have all basins within a radius, and the shares
     from which a verdict follows.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
     ax.plot(
         dataset["radius"].values,
@@ -353,5 +355,5 @@ def draw_wada(dataset: Any, *, ax: Axes | None = None, width: float = LOOK.singl
         loc="left",
         pad=4,
     )
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax

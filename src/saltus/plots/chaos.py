@@ -117,6 +117,7 @@ def draw_exponents_along(
         raise ParameterError(
             f"exponents over {len(dims)} dimensions have no picture; select two of {dims}", "result"
         )
+    own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     if len(dims) == 2:
         return _draw_map(ax, dataset, dims)
@@ -137,7 +138,7 @@ def draw_exponents_along(
         ax.plot(x, values[:, i], label=rf"$\lambda_{i + 1}$", marker=marker, ms=4.0, **line)
     ax.set_xlabel(label)
     ax.set_ylabel(NAME)
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -193,7 +194,7 @@ def draw_verdict(
     )
     ax.set_xlabel(state_label(dataset, f"section_{plane[0]}", plane))
     ax.set_ylabel(state_label(dataset, f"section_{plane[1]}", plane))
-    ax.legend(loc="best", markerscale=4.0 if many else 1.0)
+    legend_of(ax, own, markerscale=4.0 if many else 1.0)
     if own:
         sentence = f"{dataset['kind'].values}: {dataset['reason'].values}".replace("+-", "\u00b1")
         ax.set_title("\n".join(textwrap.wrap(sentence, 62)), loc="left", fontsize=8)

@@ -10,14 +10,18 @@ and pale beyond a limit of the mechanism.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
+import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -114,10 +118,42 @@ RC: Any = {
 }
 
 
+# what `plot` was asked for, while it draws
+_ASKED_LEGEND: ContextVar[str | None] = ContextVar("legend", default=None)
+_ASKED_STYLE: ContextVar[Any] = ContextVar("style", default=None)
+LEGENDS = ("inside", "below", "right", "none")  # the places of a legend that a user may ask for
+
+
+def asked_legend() -> str | None:
+    """The place that `plot(legend=)` asks for; None leaves it to the picture."""
+    return _ASKED_LEGEND.get()
+
+
+@contextmanager
+def legend_at(place: str | None) -> Iterator[None]:
+    """Draw with this place of the legend."""
+    before = _ASKED_LEGEND.set(place)
+    try:
+        yield
+    finally:
+        _ASKED_LEGEND.reset(before)
+
+
+@contextmanager
+def style_on_top(own_style: Any) -> Iterator[None]:
+    """Draw with a style of Matplotlib on top of the conventions."""
+    before = _ASKED_STYLE.set(own_style)
+    try:
+        yield
+    finally:
+        _ASKED_STYLE.reset(before)
+
+
 @contextmanager
 def style() -> Iterator[None]:
     """The conventions, for the time of a `with` block: drawing and saving both belong inside."""
-    with mpl.rc_context(RC):
+    own = _ASKED_STYLE.get()
+    with mpl.rc_context(RC), nullcontext() if own is None else mpl.style.context(own):
         yield
 
 
@@ -166,20 +202,69 @@ def figure_of(axes: Any) -> Figure:
 
 
 def outside_legend(figure: Any, **options: Any) -> None:
-    """A legend below all panels of a figure; the figure is laid out so that the legend covers
-    nothing.
+    """A legend of all panels of a figure, below them unless `plot` was asked for another place; the
+    figure is laid out so that the legend covers nothing.
     """
+    place = asked_legend() or "below"
+    if place == "none":
+        return
+    if place == "inside":
+        beside = {"title", "title_fontsize", "ncols"}
+        inside = {key: value for key, value in options.items() if key not in beside}
+        figure.axes[0].legend(loc="best", **inside)
+        return
     if figure.get_layout_engine() is None:
         figure.set_layout_engine("constrained")
-    figure.legend(loc="outside lower center", **options)
+    if place == "right":
+        options["ncols"] = 1
+    figure.legend(
+        loc="outside right upper" if place == "right" else "outside lower center", **options
+    )
 
 
-def legend_of(ax: Any, own: bool, handles: Iterable[Any], **options: Any) -> None:
-    """A legend below a new figure (`own`), or within given axes."""
-    if own:
-        outside_legend(ax.figure, handles=list(handles), **options)
-    else:
-        ax.legend(handles=list(handles), loc="best")
+def legend_of(
+    ax: Any,
+    own: bool,
+    handles: Iterable[Any] | None = None,
+    labels: Iterable[str] | None = None,
+    **options: Any,
+) -> None:
+    """A legend below a new figure (`own`), or within given axes, unless `plot` was asked for
+    another place.
+
+    Without `handles` it names what the axes hold, each label once. A legend below makes its figure
+    higher, so that the axes stay as large as they are.
+    """
+    if handles is None:
+        marks = marks_of(ax)
+        handles, labels = marks.values(), marks.keys()
+    shown_handles = list(handles)
+    texts = list(labels) if labels is not None else [str(h.get_label()) for h in shown_handles]
+    if not texts:
+        return
+    if asked_legend() == "inside" or (asked_legend() is None and not own):
+        options.pop("ncols", None)
+        ax.legend(handles=shown_handles, labels=texts, loc="best", **options)
+        return
+    figure = figure_of(ax)
+    options["ncols"] = min(options.get("ncols", 4), _columns(texts, figure.get_figwidth()))
+    if asked_legend() in (None, "below") and own:
+        rows = math.ceil(len(texts) / options["ncols"])
+        figure.set_figheight(figure.get_figheight() + rows * LEGEND_ROW / 25.4)
+    for earlier in [legend for legend in figure.legends if legend.get_gid() == f"of {id(ax)}"]:
+        earlier.remove()
+    outside_legend(figure, handles=shown_handles, labels=texts, **options)
+    if figure.legends:
+        figure.legends[-1].set_gid(f"of {id(ax)}")
+
+
+LEGEND_ROW = 3.6  # mm, the height of a line of a legend
+
+
+def _columns(texts: list[str], width: float) -> int:
+    """How many columns of these labels fit side by side into a figure, whose width is in inches."""
+    letters = max(len(re.sub(r"\\\w+|[${}^_\\]", "", text)) for text in texts)
+    return max(1, int(25.4 * width / (1.35 * letters + 12.0)))
 
 
 def marks_of(ax: Axes) -> dict[str, Any]:

@@ -20,9 +20,9 @@ from saltus.plots.conventions import (
     LOOK,
     axes_or_new,
     drawing,
+    legend_of,
     marks_of,
     new_figure,
-    outside_legend,
     parameter_name,
     peak,
     quantity_name,
@@ -109,19 +109,29 @@ def draw_branch(
         named["proved"] = (Line2D([], [], **ink_line), Line2D([], [], **PROVED_MARK))
         if not dataset["proved"].values.all():
             named["not proved"] = Line2D([], [], **ink_line, **PALE_INK)
-    legend = {
-        "handles": [*named.values()],
-        "labels": [*named],
-        "handler_map": handlers,
-        "handlelength": 3.6,
-    }
-    if own:
-        outside_legend(ax.figure, ncols=2, **legend)
-    else:
-        ax.legend(loc="best", **legend)
+    legend_of(
+        ax,
+        own,
+        [*named.values()],
+        labels=[*named],
+        handler_map=handlers,
+        handlelength=3.6,
+        ncols=2,
+    )
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"{quantity_name(dataset, quantity)}{unit_in_brackets(dataset[quantity])}")
     return ax
+
+
+# of special points in two parameters, told apart in grey too
+CURVES: dict[str, dict[str, Any]] = {
+    "LP": {"color": LOOK.ink, "linestyle": LOOK.dashes[0]},
+    "PD": {"color": LOOK.stable, "linestyle": LOOK.dashes[1]},
+    "BPC": {"color": LOOK.limit, "linestyle": LOOK.dashes[3]},
+    "NS": {"color": LOOK.separatrix, "linestyle": LOOK.dashes[2]},
+    "GR": {"color": LOOK.unstable, "linestyle": LOOK.dashes[2]},
+    "SW": {"color": LOOK.limit, "linestyle": LOOK.dashes[4]},
+}
 
 
 @drawing
@@ -131,16 +141,18 @@ def draw_special_curve(
     """Draw a curve of special points in the plane of its two parameters, as
     `SpecialCurve.to_xarray` gives it; returns `ax`.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
+    kind = str(dataset.attrs["kind"])
     ax.plot(
         *dataset["parameter"].values.T,
-        color=LOOK.ink,
-        label=MARK_NAMES.get(str(dataset.attrs["kind"]), str(dataset.attrs["kind"])),
+        label=MARK_NAMES.get(kind, kind),
+        **CURVES.get(kind, {"color": LOOK.ink}),
     )
     first, second = (str(path) for path in dataset["path"].values)
     ax.set_xlabel(parameter_name(first))
     ax.set_ylabel(parameter_name(second))
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -151,6 +163,7 @@ def draw_attractors_along(
     """Draw the amplitudes of `attractors_along`, each attractor in a colour of its own; returns
     `ax`.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     numbers = [int(number) for number in dataset["attractor"].values]
     for number, colour in attractor_colours(numbers).items():
@@ -170,7 +183,7 @@ def draw_attractors_along(
     ax.set_xlim(*np.sort(dataset["value"].values[[0, -1]]))
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"{quantity_name(dataset, 'amplitude')}{unit_in_brackets(dataset['amplitude'])}")
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -197,6 +210,7 @@ def draw_search(
     Beside a mark is the period, if it is not 1; crosses are the orbits on which simulated motions
     have settled.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     x = dataset["parameter"].values
     y = dataset["amplitude"].values
@@ -227,7 +241,7 @@ def draw_search(
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(f"${peak(dataset.attrs['coordinate'])}${unit_in_brackets(dataset['amplitude'])}")
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="best")
+        legend_of(ax, own)
     return ax
 
 
@@ -249,7 +263,7 @@ def draw_cascade(dataset: Any, *, ax: Axes | None = None, figure: Figure | None 
     right.axhline(4.669201609102990, label="limit 4.6692", **LOOK.limit_line)
     right.plot(periods[: len(ratios)], ratios, marker="s", ms=4.0, mfc="white", **LOOK.stable_line)
     right.set_ylabel("ratio of successive distances")
-    right.legend(loc="best")
+    legend_of(right, False)
     _name_periods(right, periods)
     return np.array([left, right])
 

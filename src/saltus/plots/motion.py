@@ -16,10 +16,12 @@ from matplotlib.patches import Patch
 from saltus.errors import ParameterError, shown
 from saltus.plots.conventions import (
     LOOK,
+    asked_legend,
     axes_or_new,
     cell_edges,
     drawing,
     is_flat,
+    legend_of,
     new_figure,
     parameter_name,
     parameter_symbol,
@@ -194,20 +196,23 @@ def _labels(history: Any, portrait: Any, dataset: xarray.Dataset, names: list[st
     history.axhline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
     if portrait is None:
         if len(names) > 1:
-            history.legend(loc="best")
+            legend_of(history, False)
         return
     portrait.set(xlabel=f"{places}{unit}", ylabel=f"{speeds}{unit}")
     portrait.axhline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
     portrait.axvline(0.0, color=LOOK.faint, lw=0.5, zorder=0)
     if len(names) > 1:
-        above = (
-            "outside upper center"
-            if history.figure.get_layout_engine() is not None
-            else "upper center"
-        )
-        history.figure.legend(
-            *history.get_legend_handles_labels(), loc=above, ncols=min(len(names), 4)
-        )
+        if asked_legend() is None:
+            above = (
+                "outside upper center"
+                if history.figure.get_layout_engine() is not None
+                else "upper center"
+            )
+            history.figure.legend(
+                *history.get_legend_handles_labels(), loc=above, ncols=min(len(names), 4)
+            )
+        else:
+            legend_of(history, True)
 
 
 def _end(dataset: xarray.Dataset) -> float:
@@ -382,13 +387,16 @@ def _draw_stops(ax: Axes, values: Any, axes: dict[str, np.ndarray]) -> Axes:
         Patch(facecolor=fill, label=words[number].replace("_", " "))
         for fill, number in zip(fills, numbers, strict=True)
     ]
-    ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=min(len(handles), 4),
-        borderaxespad=0.2,
-    )
+    if asked_legend() is None:
+        ax.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=min(len(handles), 4),
+            borderaxespad=0.2,
+        )
+    else:
+        legend_of(ax, True, handles)
     return ax
 
 
@@ -448,6 +456,7 @@ def draw_sweep(
         # as functions have
         own = [name for name in known if dataset[name].attrs.get("long_name") == name]
         quantity = own[0] if own and is_flat(dataset["amplitude"].values.ravel()) else "amplitude"
+    own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
     edges = cell_edges(values)
@@ -486,7 +495,7 @@ def draw_sweep(
         if quantity == "amplitude"
         else dataset[quantity].attrs["long_name"]
     )
-    ax.legend(loc="best")
+    legend_of(ax, own)
     return ax
 
 

@@ -16,7 +16,6 @@ from saltus.plots.conventions import (
     axes_or_new,
     drawing,
     legend_of,
-    marks_of,
     plane_of,
     state_label,
     symbol,
@@ -176,6 +175,7 @@ def draw_manifold(
     """Draw the manifold of a saddle orbit at phase 0 of the load, the stable one solid, the
     unstable one dashed; returns `ax`.
     """
+    own = ax is None
     ax = axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
     stable = bool(dataset.attrs["stable"])
@@ -193,8 +193,7 @@ def draw_manifold(
     )
     ax.set_xlabel(state_label(dataset, plane[0], plane, " at phase 0"))
     ax.set_ylabel(state_label(dataset, plane[1], plane, " at phase 0"))
-    marks = marks_of(ax)
-    ax.legend(marks.values(), marks.keys(), loc="best")
+    legend_of(ax, own)
     return ax
 
 
@@ -203,6 +202,7 @@ def draw_separatrix(
     dataset: Any, *, ax: Axes | None = None, width: float = LOOK.single_column
 ) -> Axes:
     """Draw a separatrix in the phase plane and its saddle, an open mark; returns `ax`."""
+    own = ax is None
     ax = axes_or_new(ax, width, 0.85 * width)
     plane = plane_of(dataset)
     ax.plot(*(dataset[name].values for name in plane), label="separatrix", **LOOK.separatrix_line)
@@ -211,8 +211,7 @@ def draw_separatrix(
     )
     ax.set_xlabel(state_label(dataset, plane[0], plane))
     ax.set_ylabel(state_label(dataset, plane[1], plane))
-    marks = marks_of(ax)
-    ax.legend(marks.values(), marks.keys(), loc="best")
+    legend_of(ax, own)
     return ax
 
 

@@ -24,6 +24,7 @@ from saltus.plots.conventions import (
     LOOK,
     drawing,
     is_flat,
+    legend_of,
     new_figure,
     outside_legend,
     parameter_name,
@@ -253,7 +254,7 @@ def response_legend(
         "labels": [*labels, *(handle.get_label() for handle in more)],
     }
     if isinstance(where, Axes):
-        where.legend(**entries, handler_map=handlers, loc="best", handlelength=3.6)
+        legend_of(where, False, **entries, handler_map=handlers, handlelength=3.6)
         return
     width = where.get_figwidth() * 25.4 / LOOK.double_column
     # so many of size one point fit into a double column

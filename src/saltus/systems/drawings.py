@@ -23,6 +23,7 @@ from saltus.systems.oscillators import (
     TwoStops,
     WallOscillator,
 )
+from saltus.systems.structure import Structure
 from saltus.systems.system import System
 from saltus.systems.two_layer import CellChain, TwoLayer
 from saltus.systems.unit_cell import CellLayout, UnitCell
@@ -63,7 +64,8 @@ def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
     wherever they are.
 
     A model of your own may have a method `drawing(position)` that returns a list of `Shape`;
-    without one, each of its coordinates is drawn as a mass on a line. Angles are drawn as they are,
+    without one, each of its coordinates is drawn as a mass on a line, with the stops that its
+    contacts and surfaces make. Angles are drawn as they are,
     lengths in the unit of the coordinate. The frame is that of the ground.
 
     Parameters
@@ -269,19 +271,69 @@ def _chain(model: CellChain, place: np.ndarray) -> list[Shape]:
     return [shape for cell in cells for shape in cell] + springs
 
 
+HALF = 0.2  # of a mass's width, in the unit of a drawing
+FEW = 6  # coordinates without a stop that are drawn beside those with one
+
+
 def _masses(model: Model, place: np.ndarray) -> list[Shape]:
     """A mass on a line of its own for each coordinate that is not of first order, above a mark at
-    0.
+    0, with the stops that its contacts and surfaces make.
+
+    Of a `Structure` only the points with contacts and surfaces are drawn, as its other coordinates
+    are modes.
     """
+    stops = stops_of(model)
+    rows = list(range(len(model.moving)))
+    if stops and (isinstance(model, Structure) or len(rows) > FEW):
+        rows = sorted({stop.coordinate for stop in stops})
+    unit = max((abs(stop.position) for stop in stops), default=0.0) or 1.0
     shapes: list[Shape] = []
-    for i, x in enumerate(place[: len(model.moving)].tolist()):
-        y = -0.8 * i
+    for line, i in enumerate(rows):
+        y = -0.8 * line
+        x = float(place[i]) / unit
         shapes += [
             _line("ground", (-2.0, y), (2.0, y)),
             _line("wall", (0.0, y - 0.1), (0.0, y)),
-            _box("mass", x, y + 0.2, 0.4, 0.4),
+            *(_stop(stop, x, y, unit) for stop in stops if stop.coordinate == i),
+            _box("mass", x, y + 0.2, 2 * HALF, 0.4),
         ]
-    return shapes
+    return [Shape(s.kind, s.points * unit, s.role, s.radius * unit) for s in shapes]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """What a contact or a surface does in a drawing: a wall, or the spring of a soft stop, at a
+    place of one coordinate. `side` is +1 where it stands to the right of the mass.
+    """
+
+    coordinate: int
+    position: float
+    side: int
+    soft: bool
+
+
+def stops_of(model: Model) -> list[Stop]:
+    """The stops of a model's contacts and surfaces that are at a number of a single coordinate."""
+    names = list(model.coordinates[: len(model.moving)])
+    parts = [(part, -part.sign, False) for part in getattr(model, "contacts", ())]
+    parts += [(part, part.sign, True) for part in getattr(model, "surfaces", ())]
+    found = []
+    for part, side, soft in parts:
+        name = part.coordinate if isinstance(part.coordinate, str) else part.name
+        if name in names and isinstance(part.position, (int, float)):
+            found.append(Stop(names.index(name), float(part.position), side, soft))
+    return found
+
+
+def _stop(stop: Stop, x: float, y: float, unit: float) -> Shape:
+    """A wall that the mass at x meets with its face, or a spring that it presses; in units of the
+    drawing.
+    """
+    face = stop.position / unit + stop.side * HALF
+    if not stop.soft:
+        return _line("wall", (face, y), (face, y + 0.55))
+    pressed = stop.side * max(stop.side * (x + stop.side * HALF), stop.side * face)
+    return _spring(face + stop.side * 0.7, y + 0.2, pressed)
 
 
 DRAWN: dict[type[Model], Callable[[Any, np.ndarray], list[Shape]]] = {
