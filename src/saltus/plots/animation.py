@@ -305,7 +305,9 @@ class _Loads:
             ax.plot(middle, height, marker="o", ms=2.5, color=LOOK.ink, zorder=1)
             words = name.replace("_", " ")
             aside = (0.3 * reach, 0.0) if upright else (0.0, 0.22 * reach)
-            place = {"ha": "left", "va": "center"} if upright else {"ha": "center", "va": "bottom"}
+            place: dict[str, Any] = (
+                {"ha": "left", "va": "center"} if upright else {"ha": "center", "va": "bottom"}
+            )
             ax.text(
                 middle + aside[0],
                 height + aside[1],

@@ -454,8 +454,9 @@ def draw_sweep(
         )
     if quantity is None:
         # as functions have
-        own = [name for name in known if dataset[name].attrs.get("long_name") == name]
-        quantity = own[0] if own and is_flat(dataset["amplitude"].values.ravel()) else "amplitude"
+        functions = [name for name in known if dataset[name].attrs.get("long_name") == name]
+        flat = is_flat(dataset["amplitude"].values.ravel())
+        quantity = functions[0] if functions and flat else "amplitude"
     own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
