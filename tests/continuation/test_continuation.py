@@ -258,6 +258,16 @@ def test_a_zero_is_located_from_the_side_on_which_the_function_is_a_power(power)
     assert len(asked) < 26  # bisection to this width takes 40
 
 
+def test_a_zero_that_is_met_exactly_has_a_bracket_without_width():
+    """The other places are far from it: rounding decides whether a value is 0 or next to it."""
+    line = Explicit(lambda place: place[1], lambda place: np.array([0.0, 1.0]))
+    begin, end = (line.solve(np.array([x, 0.0]), np.array([1.0, 0.0])) for x in (-1.0, 3.0))
+    found = located(Function("line", lambda point: float(point.place[0])), begin, end)
+    assert found.evidence.value == 0.0
+    assert found.evidence.brackets == (0.0,)
+    assert found.evidence.before * found.evidence.after < 0.0
+
+
 def test_a_zero_is_located_to_rounding_where_rounding_moves_the_points_beside_it():
     """The last brackets are narrower than what rounding leaves of the unknowns: a point that lies
     off by this is on the curve.

@@ -153,6 +153,27 @@ def test_two_branches_that_nearly_meet_are_kept_apart(gap, longest):
     assert found.solved_at(0.0)[0].place[0] == pytest.approx(gap, abs=1e-12)
 
 
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4])
+def test_no_long_step_jumps_between_two_branches_that_nearly_meet(gap):
+    """The same curves with steps of any length, from five starts: where a step changes the sign of
+    the determinant and no crossing is located, it has jumped, and is taken again.
+    """
+    curve = Explicit(
+        lambda z: z[0] ** 2 - z[1] ** 2 - gap**2, lambda z: 2.0 * np.array([z[0], -z[1]])
+    )
+    for first in (-0.71, -0.777, -0.8, -0.83, -0.9):
+        for longest in (0.05, 0.1, 0.3):
+            found = both_ways(
+                curve.start(math.hypot(first, gap), first),
+                FoldsAndCrossings,
+                {"p": (-1.0, 1.0)},
+                replace(STEPS, longest=longest),
+            )
+            assert min(point.place[0] for point in found.points) >= gap * (1.0 - 1e-12)
+            assert not found.special
+            assert not found.missed
+
+
 class Limited(Folds):
     """Equations that hold up to y = 0.5 only."""
 

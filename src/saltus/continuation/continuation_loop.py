@@ -125,11 +125,23 @@ class Continuation:
             if ahead is not None and self.events.accepts(point, ahead):
                 turn = curve.turn(point, ahead)
                 if turn < self.steps.most and (
-                    length < self.steps.restart or self.trail.explains(ahead)
+                    length < self.steps.restart
+                    or (self.trail.explains(ahead) and self._crosses(point, ahead))
                 ):
                     return ahead, self.steps.following(step, turn, ahead.iterations)
             step = self.steps.shrink * length
         return self.events.stalled(self, point, length), step
+
+    def _crosses(self, point: Any, ahead: Any) -> bool:
+        """Whether each crossing of curves that a step shows is located. If one is not, the step may
+        have jumped onto another curve that passes nearby, between two of its sharp corners.
+        """
+        signs = self.trail.values_at(ahead) * self.trail.values_at(point)
+        return all(
+            located(test, point, ahead, singular=True) is not None
+            for test, sign in zip(self.trail.tests, signs, strict=True)
+            if test.singular and sign < 0.0
+        )
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
         """Accept a step up to its first event; returns whether the curve goes on with other

@@ -294,13 +294,14 @@ def _interpolated(test: TestFunction, known: list[KnownPlace]) -> Callable[[floa
 
 def _brackets(point: Any, before: float, known: list[KnownPlace]) -> tuple[float, ...]:
     """The width, in each parameter, of the interval at whose ends the test function is known to
-    have different signs.
+    have different signs; a place at which it is exactly 0, as rounding may have it, is both ends.
     """
     sides: dict[bool, list[np.ndarray]] = {True: [], False: []}
     for place in known:
-        sides[(place.value > 0) == (before > 0)].append(
-            np.abs(place.point.parameters - point.parameters)
-        )
+        apart = np.abs(place.point.parameters - point.parameters)
+        for is_before in (True, False):
+            if place.value == 0.0 or is_before == ((place.value > 0) == (before > 0)):
+                sides[is_before].append(apart)
     widths = np.max([np.min(side, axis=0) for side in sides.values() if side], axis=0)
     return tuple(map(float, widths))
 

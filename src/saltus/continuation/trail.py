@@ -91,6 +91,10 @@ class Trail:
         size = np.maximum(np.abs(values).max(axis=0), np.abs(found))
         return bool((np.abs(found - expected) <= SETTINGS.unexpected * size).all())
 
+    def values_at(self, point: Any) -> np.ndarray:
+        """The values of all test functions at the last point or at one ahead of it."""
+        return self.last[-1].values if point is self.last[-1].point else self._sample(point).values
+
     def go_on(self, samples: list[TrailPoint]) -> None:
         """Take the points of a step, which begins with the last one."""
         self.last = [*self.last[:-1], *samples][-3:]
