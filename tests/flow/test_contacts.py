@@ -190,7 +190,8 @@ def check_case(i):
         )
         assert (reaction[place][held] * (1, -1)[place]).min(initial=0.0) >= -1e-12
     for event in motion.events.of(EventKind.IMPACT)[:60]:
-        place = motion.at(event.time)[0]
+        # just before it: an accumulation may follow at once, in which all of its gaps count as 0
+        place = motion.at(np.nextafter(event.time, -math.inf))[0]
         mass = system.model.mass_matrix((place[0], place[1]))
         before, after = np.array(event.velocity_before), np.array(event.velocity_after)
         impulse, signs = np.array(event.impulse), np.array([1.0, -1.0])
@@ -215,7 +216,11 @@ def accelerations(motion, times):
 
 
 def test_random_motions_are_complementary_and_keep_the_balances():
+    """In case 1943 an accumulation on both contacts follows on an impact while the other gap is
+    1e-8.
+    """
     assert sum(check_case(i) > 0 for i in range(60)) > 40
+    assert check_case(1943) > 5
 
 
 @pytest.mark.thorough

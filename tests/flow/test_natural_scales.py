@@ -209,3 +209,38 @@ def test_a_load_slower_than_the_motion_hides_no_impacts(
     lossy = saltus.System(model=model, load=load, impact=NewtonImpact(0.8))
     rest = math.fsum(2.0 * math.atan(2.0 * 0.8**n) for n in range(200))
     assert saltus.simulate(lossy, **start).rest_time == pytest.approx(rest, abs=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [1e-8, 1e-12, 1e-20, 1e-60, 1e-99])
+@pytest.mark.parametrize("many", [False, True])
+def test_a_load_slower_than_the_motion_without_end_acts_as_one_that_stands_still(frequency, many):
+    """Two layers, one of which stays pressed; the constant load is the slow one's value at 0. The
+    derivatives of the motion in the load's time were scales in which the reaction was lost.
+    """
+    model = saltus.TwoLayer(beta0=1.31, damping=0.146, mass_ratio=0.204)
+    impact = saltus.NewtonImpact(e=0.0226, transfer=0.329)
+    slow = saltus.Load(
+        frequency=frequency, vertical=-0.358, horizontal=saltus.Harmonic(0.564, phase=1.71)
+    )
+    still = saltus.Load(vertical=-0.358, horizontal=0.564 * math.sin(1.71))
+    ends = []
+    for load in (slow, still):
+        system = saltus.System(model=model, load=load, impact=impact)
+        start = {"theta": (0.2, 0.0), "velocity": (0.0, 0.0), "duration": 5.0}
+        if many:
+            found = saltus.simulate_many(system, **start)
+            names = ("theta_1", "theta_2", "theta_1_velocity", "theta_2_velocity", "impact_count")
+            ends.append([float(found[name]) for name in names])
+        else:
+            motion = saltus.simulate(system, **start)
+            ends.append([*motion.position, *motion.velocity, len(motion.impacts)])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-7 if frequency > 1e-9 else 1e-11)
+
+
+def test_a_load_whose_period_is_no_size_of_a_time_is_refused():
+    system = saltus.System(
+        model=saltus.TwoLayer(beta0=1.31),
+        load=saltus.Load(frequency=1e-120, horizontal=saltus.Harmonic(0.5)),
+    )
+    with pytest.raises(saltus.ParameterError, match="the period of the load must be at most 1e"):
+        saltus.simulate(system, theta=(0.2, 0.0), duration=1.0)

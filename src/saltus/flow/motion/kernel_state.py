@@ -29,7 +29,7 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.systems import time_without_period
+from saltus.systems import natural_units, time_without_period
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -39,13 +39,18 @@ if TYPE_CHECKING:
 # For tests alone: 1 plus the row of a contact or friction, and by how many units in the last place
 # of the time its events are moved, as by rounding. None moves none.
 NUDGE: tuple[int, float] | None = None
+# A load whose period is more times the time in which a system moves by itself acts as if it stood
+# still: the derivatives of the motion, in the load's time, would be scales without meaning, of which
+# rounding is a part (beyond some 1e10 times, reactions were lost in it).
+SLOW_LOAD = 1e4
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
 def natural_time(system: System, length: float) -> float:
     """The natural time of a motion under a load with a period, 0 for none.
 
-    A frequency that acts on nothing is none.
+    A frequency that acts on nothing is none, and one that is much slower than what moves by itself
+    gives no scale.
     """
     of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
     own: float | None = system._remembered(natural_time, lambda: _own_time(system))
@@ -54,11 +59,35 @@ def natural_time(system: System, length: float) -> float:
     return min(of_load, own)
 
 
+def natural_times(system: System) -> dict[str, float | None]:
+    """What `natural_time` does, as numbers, so that a page does it for other periods of the load."""
+    without = time_without_period(system) if _bounces(system) else 1.0
+    return {
+        "without_period": without if math.isfinite(without) else None,
+        "slow_load": SLOW_LOAD if _bounces(system) else None,
+        "slow_time": _slow_time(system) if _bounces(system) else None,
+    }
+
+
 def _own_time(system: System) -> float | None:
     """The natural time without the load's period; None for what has no contact, which has no use
     for it."""
-    bounces = system.model.has_one_contact or system.model.holds_coordinates
-    return time_without_period(system) if bounces else None
+    if not _bounces(system):
+        return None
+    period = system.load.period
+    # in usual units no own time is far below 1: under shorter periods it need not be found, which
+    # takes ten times as long as a short motion
+    slow = _slow_time(system) if period is not None and period > SLOW_LOAD else math.inf
+    return min(time_without_period(system), slow)
+
+
+def _slow_time(system: System) -> float:
+    """The natural time under a load that is slow without end."""
+    return SLOW_LOAD * natural_units(system).own_time
+
+
+def _bounces(system: System) -> bool:
+    return system.model.has_one_contact or system.model.holds_coordinates
 
 
 class KernelState:

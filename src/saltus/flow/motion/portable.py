@@ -31,6 +31,7 @@ from saltus.flow.kernel.compiled import (
 from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
 from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, behind_parameters
 from saltus.flow.motion.events import EventKind, Stop
+from saltus.flow.motion.kernel_state import natural_times
 from saltus.flow.motion.simulate import refusal
 from saltus.systems import Pulse, System, children, substitute
 from saltus.taylor import (
@@ -196,6 +197,7 @@ class PortableMotion:
             "record": places,
             "record_size": MOTION.itemsize,
             "most_size": LIMITS.value,
+            "natural": natural_times(self.system),
             "most_order": MOST_COEFFICIENTS - 2,
             "arguments": self.kernel.arguments,
             "several": trace.several,

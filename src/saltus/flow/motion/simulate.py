@@ -90,6 +90,12 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
             )
         return Clock(0, time, 0, time + span, 0.0)
     one = isinstance(time, float) and isinstance(length, float)  # without arrays, which take longer
+    longest = length if one else float(np.max(length, initial=0.0))
+    if longest > LIMITS.value:
+        raise ParameterError(
+            f"the period of the load must be at most {LIMITS.value:g}, got {longest:g}",
+            "load.frequency",
+        )
     divided = divmod if one else np.divmod
     reach = abs(time) / length + (span / length if periods is None else span)
     reach = reach if one else np.max(reach, initial=0.0)

@@ -53,8 +53,16 @@ export class Run {
     const given = { time: this.first, ...zipped(names, this.position), ...zipped(rates, this.speeds) };
     const bad = Object.entries(given).find(([, value]) => !(Math.abs(value) <= layout.most_size));
     if (bad) throw new Refusal(bad[0], `${bad[0]} must be at most ${general(layout.most_size)} in size, got ${general(bad[1])}`);
+    if (!(this.length <= layout.most_size)) throw new Refusal("load.frequency", `the period of the load must be at most ${general(layout.most_size)}, got ${general(this.length)}`);
     const reach = this.length ? (Math.abs(this.first) + Math.abs(duration)) / this.length : 0;
     if (!(reach < MOST_PERIODS)) throw new Refusal("time", `the motion must start and end within 2^53 forcing periods, got ${general(reach)} of them`);
+  }
+
+  /** The natural time of the motion: Python's `natural_time`. */
+  naturalTime() {
+    const { without_period: own, slow_load: slow, slow_time: longest } = this.engine.layout.natural;
+    const ofLoad = this.length > 0 ? this.length / (2 * Math.PI) : Infinity;
+    return Math.min(ofLoad, slow === null && this.length > 0 ? Infinity : own ?? Infinity, slow !== null && this.length > slow ? longest : Infinity);
   }
 
   /** When the motion starts and ends: forcing periods, and times within them. @param {number} duration @param {number} [periods] */
@@ -79,7 +87,7 @@ export class Run {
     new Uint8Array(engine.exports.memory.buffer, engine.address("numbers"), layout.record_size).fill(0);
     const record = engine.record();
     const numbers = {
-      ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length, natural_time: this.length > 0 ? this.length / (2 * Math.PI) : 1,
+      ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length, natural_time: this.naturalTime(),
       order: this.order, tolerance: this.tolerance, piece: placeAbove(system.breaks, this.first), leave_by: side, dense: 1,
     };
     for (const [name, value] of Object.entries(numbers)) record.set(name, value);
