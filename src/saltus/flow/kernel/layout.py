@@ -162,8 +162,9 @@ TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a
 # is not looked for.
 SLOW = 3.0
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
-# In natural speeds. Here the averaged law has an error of 5e-5 of the speed, and a unit of time would
-# have 1e5 impacts.
+# In natural speeds. Here the averaged law has an error of 2e-5 of the speed if the pulls of both sides
+# change by half within a unit of time, and of 1e-11 at one wall, beside impacts that were followed one
+# by one; a unit of time would have 1e4 of them.
 CHATTER_SPEED = 4e-5
 # A gap below minus this share of the terms of its sum is no rounding, and no error of a step of the
 # tolerance 0; the tolerance comes ten times on top.
