@@ -1,9 +1,12 @@
 """Whoever watches the progress of a function is told what is compiled within it, by name."""
 
+import io
+import sys
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+import pytest
 
 import saltus
 from saltus.checks import LIMITS
@@ -49,6 +52,24 @@ def test_compiling_is_said_by_name_in_any_function_and_the_fraction_never_falls(
     )
     assert again == sorted(again)
     assert len(again) == 2
+
+
+class Terminal(io.StringIO):
+    """A stream that a person sees."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "written"),
+    [(Terminal(), "saltus: compiling a kernel\n"), (io.StringIO(), "")],
+    ids=["terminal", "file"],
+)
+def test_a_terminal_shows_what_nobody_watches_and_a_file_does_not(monkeypatch, stream, written):
+    monkeypatch.setattr(sys, "stderr", stream)
+    say("compiling a kernel")
+    assert stream.getvalue() == written
 
 
 def test_nobody_is_told_what_nobody_watches():

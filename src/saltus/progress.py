@@ -127,10 +127,14 @@ def watched(progress: Progress) -> Iterator[FractionMemory]:
 def say(what: str) -> None:
     """Tell whoever watches the work of this thread what takes a while now, such as compiling,
     whichever function asked for it.
+
+    Where nobody watches, a terminal shows it as a line; a file is not written to.
     """
     watch = _watch.get()
     if watch is not None:
         watch.progress(watch.fraction, what)
+    elif sys.stderr is not None and sys.stderr.isatty():
+        print(f"saltus: {what}", file=sys.stderr, flush=True)
 
 
 def part_of(progress: Progress, begin: float, end: float, what: str | None = None) -> Progress:
