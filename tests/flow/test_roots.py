@@ -377,3 +377,37 @@ def test_the_leading_coefficient_is_the_first_one_above_the_rounding_of_its_seri
         assert leading(c, start, order, ZERO, size, base) == expected
         seen.add(expected - start)
     assert {0, 1, 2} <= seen
+
+
+def long_newton(p, n, low, high):
+    """`newton` as it is defined: up to 200 steps, all of them taken."""
+    at_low, at_high = horner(p, n, low), horner(p, n, high)
+    share = at_low / (at_low - at_high) if at_low > 0.0 > at_high else 0.5
+    if not 0.01 < share < 0.99:
+        share = 0.5
+    u = low + share * (high - low)
+    for step in range(200):
+        value, slope = value_and_slope(p, n, u)
+        low, high = (u, high) if value > 0.0 else (low, u)
+        following = u - value / slope if slope != 0.0 else 0.5 * (low + high)
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
+            return following, step
+        u = following
+    return u, 200
+
+
+def test_newton_between_two_neighbouring_numbers_gives_what_all_steps_would():
+    rng = np.random.default_rng(11)
+    longest = 0
+    for _ in range(1500):
+        degree = int(rng.integers(2, 20))
+        p = rng.normal(size=degree + 1) * 0.5 ** np.arange(degree + 1)
+        p[0] = abs(p[0])
+        if horner(p, degree, 1.0) >= 0.0:
+            continue
+        expected, steps = long_newton(p, degree, 0.0, 1.0)
+        assert newton(p, degree, 0.0, 1.0) == expected
+        longest += steps == 200
+    assert longest > 10

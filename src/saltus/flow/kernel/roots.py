@@ -130,8 +130,10 @@ def newton(p, n, low, high):
     if not 0.01 < share < 0.99:
         share = 0.5
     u = low + share * (high - low)
-    for _ in range(200):
+    before = u
+    for left in range(199, -1, -1):
         value, slope = value_and_slope(p, n, u)
+        narrower = u != (low if value > 0.0 else high)
         if value > 0.0:
             low = u
         else:
@@ -142,6 +144,10 @@ def newton(p, n, low, high):
             following = 0.5 * (low + high)
         if abs(following - u) <= 2.0**-53 * following or high - low <= 2.0**-53 * high:
             return following
+        # often the last steps lead from one of two neighbouring numbers to the other and back
+        if following == before and not narrower:
+            return u if left % 2 else following
+        before = u
         u = following
     return u
 
