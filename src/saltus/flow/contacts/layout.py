@@ -189,22 +189,24 @@ def solver_arrays(local, count, columns, frictions, first_order):
         rubs = 1 + frictions.shape[0] if frictions[k, FrictionColumn.PRESSED] > 0 else rubs
     most = max(2 * local, rows + 1)
     numbers = local * local + count * count + count * (1 + first_order) + rubs + frictions.shape[0]
+    # one piece of memory, as lanes ask for it at every slow impact
+    of_contacts = rows_of_zeros(2 * count + 10, count)
     return SolverArrays(
         zeros(numbers),
         rows_of_zeros(local, local),
-        rows_of_zeros(count, count),
+        of_contacts[:count],
         rows_of_zeros(max(local, rows), most),
-        rows_of_zeros(count, count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
-        zeros(count),
+        of_contacts[count : 2 * count],
+        of_contacts[2 * count],
+        of_contacts[2 * count + 1],
+        of_contacts[2 * count + 2],
+        of_contacts[2 * count + 3],
+        of_contacts[2 * count + 4],
+        of_contacts[2 * count + 5],
+        of_contacts[2 * count + 6],
+        of_contacts[2 * count + 7],
+        of_contacts[2 * count + 8],
+        of_contacts[2 * count + 9],
         zeros(columns * numbers),
         zeros(local),
         zeros(columns),
