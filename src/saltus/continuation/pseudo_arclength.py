@@ -161,7 +161,7 @@ def _step(
     longest = units.length(step, place)
     if not np.isfinite(longest):
         return None
-    return np.asarray(step * min(1.0, NEWTON.longest / longest if longest > 0 else 1.0))
+    return np.asarray(step * (NEWTON.longest / longest) if longest > NEWTON.longest else step)
 
 
 class EquationCurve(Curve[P]):

@@ -270,6 +270,8 @@ def _images_of_parts(system: System, places: tuple[int, ...]) -> tuple[int, ...]
     """The number of the mirror image of each contact, friction and surface; None if one has no
     image or the laws differ."""
     model: Any = system.model
+    if not (model.contacts or model.frictions or model.surfaces):
+        return ()
     lengths = natural_units(system).lengths
     names = model.coordinates
 

@@ -100,15 +100,14 @@ class OrbitEvaluation:
         """The product of the segments' maps: from the first unknowns to those a (half) period
         later; inf at a grazing.
         """
-        chain = np.eye(self.here.shape[1])
         with np.errstate(all="ignore"):
             try:
-                maps = -np.linalg.solve(self.there, self.here)
+                chain, *later = -np.linalg.solve(self.there, self.here)
             except np.linalg.LinAlgError:
-                return np.full_like(chain, np.inf)
-            for segment in maps:
+                return np.full(self.here.shape[1:], np.inf)
+            for segment in later:
                 chain = segment @ chain
-        return chain
+        return np.asarray(chain)
 
     def area_factor(self) -> float | None:
         """The determinant of the monodromy matrix, as the product of those of the segments' maps,
