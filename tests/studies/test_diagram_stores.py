@@ -196,19 +196,20 @@ def test_a_motion_that_has_settled_is_the_same_however_long_it_is_given():
         diagram_work.DiagramWork(system, FREQUENCY, made) for made in (Memo(common), None)
     )
     work.simulate(values, states, 200)
-    rows = [
-        (given[3], one["outcome"])
-        for given, one in work.memo.remembered(diagram_work.kinds()["motions"])
-    ]
-    moving = sum(outcome == Ending.UNDECIDED for time, outcome in rows if time == 200)
-    assert 0 < moving < len(values)
+
+    def asked(periods):
+        known = work.memo.remembered(diagram_work.kinds()["motions"])
+        return {tuple(given[:3]): one["outcome"] for given, one in known if given[3] == periods}
+
+    outcomes = asked(200)
+    moving = {start for start, outcome in outcomes.items() if outcome == Ending.UNDECIDED}
+    assert 0 < len(moving) < len(outcomes)
     longer, fresh = work.simulate(values, states, 400), direct.simulate(values, states, 400)
     for field in fields(fresh):
         np.testing.assert_array_equal(getattr(longer, field.name), getattr(fresh, field.name))
-    assert (
-        sum(given[3] == 400 for given, _ in work.memo.remembered(diagram_work.kinds()["motions"]))
-        == moving
-    )
+    # others than these begin where a chaotic motion is after 200 periods, which rounding decides
+    assert moving <= set(asked(400))
+    assert not (set(outcomes) - moving) & set(asked(400))
 
 
 @pytest.mark.parametrize(
