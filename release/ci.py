@@ -58,7 +58,6 @@ class Step:
     counted: str = PASSED  # in each line of the output; the numbers are added up
     may_be_cut: bool = False  # at its own limit; at the end of the clock any step may
     may_fail: bool = False  # what is installed from elsewhere may be missing
-    known: str = ""  # why it is known to fail: it is named at the end, and does not fail the whole
 
 
 # It ends with IMPOSSIBLE where something cannot be had.
@@ -164,9 +163,6 @@ def steps(number: int) -> tuple[Step, ...]:
             f". tests/processors/{processor}.sh\n{PYTEST} {NUMERICAL}",
             25,
             may_be_cut=True,
-            # Until these are mended this step judges nothing: read every failure that it prints.
-            known="on AVX2 two branches hang on rounding, in tests/orbits/test_begun_anywhere.py and "
-            "test_special_curves.py; the rest was not run there, so other failures above are new",
         ),
         Step(
             "thorough",
@@ -207,7 +203,7 @@ class Outcome:
     """What became of a step."""
 
     step: Step
-    said: str  # passed, FAILED, known, cut, not run, impossible
+    said: str  # passed, FAILED, cut, not run, impossible
     minutes: float = 0.0
     count: int = 0
 
@@ -263,8 +259,6 @@ def run_all(chosen: Iterable[Step], begin_before: float = BEGIN_BEFORE, end: flo
             outcome.said = f"FAILED (not done after {limit:.0f} min)"
         elif outcome.said == "FAILED" and step.may_fail:
             outcome.said = "impossible"
-        elif outcome.said == "FAILED" and step.known:
-            outcome.said = "known"
         outcomes.append(outcome)
     print(f"\n{'step':12} {'outcome':12} {'min':>6} {'tests':>6}  what")
     for outcome in outcomes:
@@ -281,9 +275,6 @@ def run_all(chosen: Iterable[Step], begin_before: float = BEGIN_BEFORE, end: flo
         names = [outcome.step.name for outcome in outcomes if outcome.said == said]
         if names:
             print(f"{words}: {', '.join(names)}")
-    for outcome in outcomes:
-        if outcome.said == "known":
-            print(f"Known to fail: {outcome.step.name}, as {outcome.step.known}")
     failed = [outcome.step.name for outcome in outcomes if outcome.said.startswith("FAILED")]
     print(f"FAILED: {', '.join(failed)}" if failed else "Nothing failed.", flush=True)
     return int(bool(failed))
