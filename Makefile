@@ -44,6 +44,7 @@ ci:
 
 release-check: $(TEST_READY)
 	$(BIN)/python -m saltus_paper.release_check
+	$(BIN)/python release/publication.py
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .

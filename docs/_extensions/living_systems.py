@@ -20,7 +20,14 @@ def wall():
         impact=saltus.VelocityReduction(0.8),
     )
     branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0), "load.frequency", (0.6, 2.0))
-    return system, [branch], {"x": 0.0, "periods": 20, "title": "An impact oscillator"}
+    presets = {
+        "two motions at one frequency": {"load.frequency": 1.4, "x": -2.0},
+        "the quiet one of both": {"load.frequency": 1.4, "x": 0.0},
+        "chaos": {"load.frequency": 0.715},
+        "a wall without restitution": {"impact.e": 0.0},
+    }
+    settings = {"x": 0.0, "periods": 20, "title": "An impact oscillator", "presets": presets}
+    return system, [branch], settings
 
 
 @cache

@@ -80,7 +80,7 @@ def _add_refusal(app: typer.Typer, name: str, sentence: str) -> None:
 app = typer.Typer(
     rich_markup_mode="rich",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -6,6 +6,7 @@ from .contact_model import solved_motion as solved_motion
 from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape
 from .drawings import drawing_of as drawing_of
+from .drawings import stops_of as stops_of
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw
 from .impact_laws import VelocityReduction as VelocityReduction

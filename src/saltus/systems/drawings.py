@@ -15,7 +15,7 @@ import numpy as np
 from saltus.checks import check_states
 from saltus.errors import ParameterError
 from saltus.systems.metainterface import Metainterface
-from saltus.systems.model import Model
+from saltus.systems.model import Model, OneContactModel
 from saltus.systems.oscillators import (
     BeltOscillator,
     ImpactPair,
@@ -313,7 +313,24 @@ class Stop:
 
 
 def stops_of(model: Model) -> list[Stop]:
-    """The stops of a model's contacts and surfaces that are at a number of a single coordinate."""
+    """The stops of a model's contacts and surfaces that are at a number of a single coordinate, as a
+    drawing shows them.
+
+    Parameters
+    ----------
+    model
+        The model.
+
+    Examples
+    --------
+    >>> [(stop.position, stop.side) for stop in saltus.systems.stops_of(saltus.TwoStops(left=-1.0, right=2.0))]
+    [(-1.0, -1), (2.0, 1)]
+    """
+    if isinstance(model, OneContactModel):
+        if model.sides != (1,):
+            return []
+        place = float(model.contact)
+        return [Stop(0, place, -1 if model.gap(place + 1.0, 1) > 0.0 else 1, False)]
     names = list(model.coordinates[: len(model.moving)])
     parts = [(part, -part.sign, False) for part in getattr(model, "contacts", ())]
     parts += [(part, part.sign, True) for part in getattr(model, "surfaces", ())]

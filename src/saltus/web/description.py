@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import saltus
+from saltus.errors import SaltusError
 from saltus.flow import PortableMotion, state_names
-from saltus.systems import System, children, numbers
+from saltus.systems import System, children, numbers, stops_of
 from saltus.web.linker import link
 from saltus.web.objects import kernel_object, structure_object
 
@@ -75,6 +76,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
             ],
             "parameters": below(model, "model"),
             **motion.parts(),
+            "stops": list(_stops(system)),
             "channels": list(model.channels),
             "margins": [
                 {"name": name, "kind": str(model.margin_kind(name)), "stops": name in model.stops}
@@ -97,6 +99,28 @@ def description(motion: PortableMotion) -> dict[str, Any]:
         "numbers": list(entries.values()),
         "study": {"system": system.to_dict()},
     }
+
+
+def _stops(system: System) -> Iterator[dict[str, Any]]:
+    """The stops of a model's drawing, with the slopes of their positions to its numbers, and the
+    numbers from which these count: a slider moves the wall that is where its number says.
+    """
+    model = system.model
+    first = stops_of(model)
+    slopes: list[dict[str, float]] = [{} for _ in first]
+    base = dict(numbers(model, "model", given=True))
+    for path, value in base.items() if first else ():
+        step = 1e-3 * abs(value) or 1e-3
+        try:
+            moved = stops_of(system.with_({path: value + step}).model)
+        except SaltusError:
+            continue  # at the end of what it may be
+        for own, one, other in zip(slopes, first, moved, strict=True):
+            if other.position != one.position:
+                own[path] = (other.position - one.position) / step
+    for stop, own in zip(first, slopes, strict=True):
+        entry = {key: getattr(stop, key) for key in ("coordinate", "position", "side")}
+        yield entry | {"slopes": own, "base": {path: base[path] for path in own}}
 
 
 def _numbers(system: System) -> Iterator[dict[str, Any]]:

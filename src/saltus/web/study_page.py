@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import Numbers, check_number, with_answers
-from saltus.errors import ParameterError, SaltusError
+from saltus.errors import ParameterError, SaltusError, shown
 from saltus.files import check_writable, write_text
 from saltus.orbits import Branch, OrbitEnd
 from saltus.systems import (
@@ -40,6 +40,7 @@ def page(
     *results: Any,
     path: Path | str | None = None,
     title: str = "",
+    presets: Mapping[str, Mapping[str, float]] | None = None,
     velocity: Numbers = 0.0,
     periods: float | None = None,
     duration: float | None = None,
@@ -65,6 +66,9 @@ def page(
         The file; by default the model's name with ".html" in the current folder.
     title
         The title of the page; by default the model's name.
+    presets
+        What the reader may try, by its name: numbers by their paths, and coordinates and velocities
+        of the start, such as `{"less damping": {"model.damping": 0.01, "theta": 0.5}}`.
     velocity, coordinates
         The state at the start of the motion with which the page begins, as in `simulate`; by
         default a state beside rest.
@@ -104,7 +108,10 @@ def page(
         system, velocity, coordinates, {"periods": periods, "duration": duration}, tol, time
     )
     check_writable(file.parent)
-    return write_text(file, _page(system, motion, title, results_as_json(results, system)))
+    proposed = _presets(system, presets)
+    return write_text(
+        file, _page(system, motion, title, results_as_json(results, system), presets=proposed)
+    )
 
 
 def explore(
@@ -308,8 +315,33 @@ def _motion(
     }
 
 
+def _presets(system: System, presets: Any) -> list[dict[str, Any]]:
+    """The presets as the page has them; numbers that the system does not take are refused."""
+    if presets is None:
+        return []
+    if not isinstance(presets, Mapping):
+        raise ParameterError(
+            f'presets must be a dictionary such as {{"slow": {{"load.frequency": 0.5}}}}, got '
+            f"{shown(presets)}",
+            "presets",
+        )
+    states = _state_names(system)
+    found = []
+    for name, given in presets.items():
+        where = f"presets[{name!r:.40}]"
+        if not isinstance(name, str) or not isinstance(given, Mapping):
+            raise ParameterError(f"{where} must be a dictionary of numbers by name", "presets")
+        for key, value in given.items():
+            check_number(f"{where}, {key}", value)
+        values = {path: float(value) for path, value in given.items() if path not in states}
+        system.with_(values)
+        start = {key: float(given[key]) for key in states if key in given}
+        found.append({"name": name, "values": values, "start": start})
+    return found
+
+
 def _page(
-    system: System, motion: Mapping[str, Any], title: str, results: list[Any], **more: bool
+    system: System, motion: Mapping[str, Any], title: str, results: list[Any], **more: Any
 ) -> str:
     """The text of a page that begins with a motion and has results laid over it."""
     content, described = page_content(system, motion, title, results)

@@ -6,7 +6,7 @@ import { Plot } from "./plot.js";
 import { Stage } from "./stage.js";
 import { Transport, button } from "./transport.js";
 import { numberGroup } from "./controls.js";
-import { energyView, phasePlane, stroboscopic, timeHistory } from "./views.js";
+import { energyView, extremaOf, phasePlane, stroboscopic, timeHistory } from "./views.js";
 import { validityNow, validityOfAll } from "./validity.js";
 import { stateOf } from "./link.js";
 import { Address } from "./address.js";
@@ -18,6 +18,7 @@ import { Choice, differingSaid, ofThisSystem, orbitSaid, paintBeneath, resultVie
 import { currentPalette, forgetPalette } from "./palette.js";
 import { entriesOf, firstState, goesOn, isPeriodic, spaced, startEntries, tamed } from "./description.js";
 import { Embedding } from "./embedding.js";
+import { History } from "./history.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").Engine} Engine */
@@ -87,8 +88,36 @@ export class Page {
     at("copy-link").addEventListener("click", async () => this.notice(await this.address.copy()));
     at("save-toml").addEventListener("click", () => save("study.toml", asToml(description, store.state)));
     at("save-python").addEventListener("click", () => save("study.py", asPython(description, store.state)));
+    this.history = new History(store, (step) => this.replaceState({ ...store.state, ...step, selected: null }), (any) => { undo.disabled = !any; });
+    const undo = /** @type {HTMLButtonElement} */ (at("undo"));
+    undo.addEventListener("click", () => this.history?.undo());
+    at("full-screen").hidden = !document.documentElement.requestFullscreen;
+    at("full-screen").addEventListener("click", () => this.toggleFullScreen());
+    this.makePresets();
     at("reset-all").addEventListener("click", () => this.replaceState({ ...this.first, theme: store.state.theme, degrees: store.state.degrees }));
     this.applyTheme();
+  }
+
+  /** What the author of the page proposes to try. */
+  makePresets() {
+    const presets = this.description.presets ?? [];
+    const choice = /** @type {HTMLSelectElement} */ (at("preset"));
+    at("preset-row").hidden = !presets.length;
+    choice.add(new Option("as it was", ""));
+    presets.forEach(({ name }, i) => choice.add(new Option(name, String(i))));
+    choice.addEventListener("change", () => {
+      const { values, start } = presets[Number(choice.value)] ?? { values: {}, start: {} };
+      const { theme, degrees } = this.store.state;
+      this.replaceState({ ...this.first, theme, degrees, values: { ...this.first.values, ...values }, start: { ...this.first.start, ...start } });
+    });
+  }
+
+  async toggleFullScreen() {
+    try {
+      await (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen());
+    } catch {
+      this.notice("The browser does not let this page fill the screen.");
+    }
   }
 
   makeControls() {
@@ -231,6 +260,7 @@ export class Page {
 
   sweepTold() {
     const { result } = this.sweep;
+    opened("view-sweep", !result.done || result.up.length > 0);
     if (this.sweepSaid) this.sweepSaid.textContent = sweepSaid(result);
     if (this.sweepRun) this.sweepRun.textContent = result.done ? "Sweep up and down" : "Stop";
     this.frame.before("sweep", () => this.plotOf("sweep")?.draw());
@@ -238,6 +268,7 @@ export class Page {
 
   basinsTold() {
     const { basins } = this;
+    opened("view-basins", basins.labels.length > 0);
     const cells = BASIN_GRID * BASIN_GRID;
     at("basins-run").textContent = basins.done ? "Compute basins" : "Stop";
     const share = `${((100 * basins.counted) / cells).toFixed(0)} % of ${BASIN_GRID} × ${BASIN_GRID} cells`;
@@ -353,6 +384,8 @@ export class Page {
     const energy = at("view-energy").closest("figure");
     const { motion } = this.session;
     if (energy) energy.hidden = motion !== null && (motion.energy?.(motion.time.first) ?? null) === null; // not every model has one
+    hideFigure("view-section", !isPeriodic(this.description)); // without a period there is no section
+    hideFigure("view-basins", !goesOn(this.description));
     this.stage.draw();
     for (const { plot } of this.plots) plot.draw();
     this.transport.show();
@@ -364,6 +397,7 @@ export class Page {
   sayAll() {
     const { motion } = this.session;
     at("summary").textContent = validityOfAll(this.session);
+    at("extrema").textContent = extremaOf(this.session);
     clearTimeout(this.checking);
     if (motion?.checked !== null) return;
     this.checking = setTimeout(() => motion === this.session.motion && motion.validity && this.sayAll(), QUIET);
@@ -410,6 +444,7 @@ export class Page {
   /** Space plays; comma and full stop step; n and p go to impacts. @param {KeyboardEvent} event */
   key(event) {
     const target = /** @type {HTMLElement} */ (event.target);
+    if ((event.ctrlKey || event.metaKey) && event.key === "z" && target.tagName !== "INPUT") return this.history?.undo();
     if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA|SUMMARY|A)$/.test(target.tagName)) return;
     if (target.tagName === "BUTTON" && event.key === " ") return;
     const { transport } = this;
@@ -429,6 +464,17 @@ function orbitOf(results, { result, branch, point }) {
 /** Whether a result has a view of its own; the others lie beneath the phase plane. @param {{kind: string}} result */
 function isPlotted({ kind }) {
   return kind === "diagram" || kind === "chart";
+}
+
+/** Show the view of a figure that waits to be asked for. @param {string} id @param {boolean} asked */
+function opened(id, asked) {
+  at(id).closest("figure")?.classList.toggle("unopened", !asked);
+}
+
+/** Hide a figure that can have no content. @param {string} id @param {boolean} hidden */
+function hideFigure(id, hidden) {
+  const figure = at(id).closest("figure");
+  if (figure) figure.hidden = hidden;
 }
 
 /** @param {string} id */

@@ -9,6 +9,8 @@ import { rangeOf, shortly } from "./numbers.js";
 /** @typedef {[number, number, number, number]} Box */
 
 const OWN_STATES = 60; // of a motion, around which the picture of a model's own drawing is laid
+const HALF_MASS = 0.16; // of the width of a mass that is drawn on a line
+const MOST_LINES = 6;
 const FLASH_TIME = 0.22; // seconds of the reader for which an impact is seen
 
 /** @typedef {{fill?: string, stroke?: string, width?: number, dash?: number[]}} Ink */
@@ -128,9 +130,13 @@ export class Stage {
 
   /** A model without a drawing: a point on a line for each coordinate. @param {ArrayLike<number>} state */
   point(state) {
-    const count = this.session.coordinates.length;
-    const shapes = this.session.coordinates.flatMap((_, i) => {
-      const y = (count - 1) / 2 - i;
+    const stops = this.stops();
+    const drawn = rowsOf(this.session.coordinates, stops);
+    const count = drawn.length;
+    const shapes = drawn.flatMap((i, line) => {
+      const y = (count - 1) / 2 - line;
+      const own = stops.filter((stop) => stop.coordinate === i);
+      if (own.length) return massAtStops(state[i] ?? 0, y, own, this.reach[i] || 1);
       const reach = this.reach[i] || 1;
       return [
         { kind: "line", points: [[-1.2, y], [1.2, y]], role: "thin" },
@@ -141,6 +147,15 @@ export class Stage {
     /** @type {Box} */
     const box = [-1.5, 1.5, -Math.max(count / 2, 0.8), Math.max(count / 2, 0.8)];
     return { shapes, box };
+  }
+
+  /** The stops of the model where the present numbers put them. @returns {{coordinate: number, side: number, position: number}[]} */
+  stops() {
+    const { values } = this.session.store.state;
+    return (this.session.description.model.stops ?? []).map(({ coordinate, side, position, slopes, base }) => ({
+      coordinate, side,
+      position: Object.entries(slopes).reduce((sum, [path, slope]) => sum + slope * ((values[path] ?? 0) - (base[path] ?? 0)), position),
+    }));
   }
 
   /** The drawing in words, for those who do not see it; not more than once a second. */
@@ -154,6 +169,31 @@ export class Stage {
     const text = `The mechanism of ${session.description.model.name} at time ${shortly(session.store.state.cursor, 5)}: ${parts.join(", ")}`;
     this.canvas.setAttribute("aria-label", text);
   }
+}
+
+/** The coordinates that are drawn: those with a stop alone, where the others are modes or many. @param {{name: string}[]} coordinates @param {{coordinate: number}[]} stops */
+function rowsOf(coordinates, stops) {
+  const all = coordinates.map((_, i) => i);
+  const few = coordinates.length <= MOST_LINES && !coordinates.some(({ name }) => /^mode_\d+$/.test(name));
+  return stops.length && !few ? all.filter((i) => stops.some((stop) => stop.coordinate === i)) : all;
+}
+
+/** A mass on a line between its stops, in lengths of the larger of its reach and theirs. @param {number} x @param {number} y @param {{side: number, position: number}[]} stops @param {number} reach @returns {Shape[]} */
+function massAtStops(x, y, stops, reach) {
+  const unit = Math.max(reach, ...stops.map(({ position }) => Math.abs(position))) || 1;
+  const at = x / unit;
+  const low = y - HALF_MASS;
+  const walls = stops.map(({ side, position }) => {
+    const face = position / unit + side * HALF_MASS;
+    const ends = [[face, low], [face + side * 0.07, low], [face + side * 0.07, y + 0.3], [face, y + 0.3]];
+    return { kind: "polygon", points: ends, role: "wall" };
+  });
+  const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => [at + (a ?? 0) * HALF_MASS, y + (b ?? 0) * HALF_MASS]);
+  return [
+    { kind: "line", points: [[-1.4, low], [1.4, low]], role: "ground" },
+    { kind: "line", points: [[0, low - 0.06], [0, low]], role: "thin" },
+    ...walls, { kind: "polygon", points: corners, role: "mass" },
+  ];
 }
 
 /** @param {HTMLElement} host @returns {[number, number]} */

@@ -8,10 +8,13 @@
  * @typedef {{name: string, kind: string, meaning?: string}} MarginEntry  `kind`: "landmark", "assumption" or "limit".
  * @typedef {{name: string, velocity: string, unit: string}} CoordinateEntry
  *
+ * @typedef {{coordinate: number, side: number, position: number, slopes: Record<string, number>, base: Record<string, number>}} Stop  A wall in a
+ *   drawing: `side` is +1 to the right of the mass; the position changes with numbers by slopes from their base.
+ *
  * @typedef {object} Description
  * @property {number} version
  * @property {string} [title]
- * @property {{name: string, coordinates: CoordinateEntry[], parameters: NumberEntry[], contacts?: any[], frictions?: any[],
+ * @property {{name: string, coordinates: CoordinateEntry[], parameters: NumberEntry[], contacts?: any[], frictions?: any[], stops?: Stop[],
  *   margins?: MarginEntry[], text?: string}} model
  * @property {{name?: string, parameters: NumberEntry[]}} [impact]
  * @property {LoadEntry[]} load
@@ -19,6 +22,7 @@
  * @property {{system: any, simulate: Record<string, any>}} study
  * @property {string} digest
  * @property {ResultEntry[]} [results]
+ * @property {{name: string, values: Numbers, start: Numbers}[]} [presets]  What the author proposes to try.
  * @property {boolean} [embedded]  Whether the page is shown in a notebook, which it tells what is changed.
  *
  * @typedef {Record<string, number>} Numbers

@@ -10,6 +10,7 @@ import { asText, symbolOf } from "./symbols.js";
 /** @typedef {import("./plot.js").PlotOptions} PlotOptions */
 /** @typedef {Omit<PlotOptions, "zoomed"|"window"> & {csv: () => Record<string, ArrayLike<number>>}} View */
 
+const MOST_NAMED = 6; // coordinates in a sentence
 const NEAR = 12; // pixels from which a click or the cursor takes hold of a point
 const PER_PIXEL = 3; // samples of a curve over time
 const OVERVIEW = 900; // samples of the energy over what is seen
@@ -35,6 +36,20 @@ function unitOf(coordinate) {
 function around(xs, ys) {
   const [x, y] = [rangeOf(xs), rangeOf(ys)];
   return x && y ? [x.low, x.high, y.low, y.high] : null;
+}
+
+/** The least and largest coordinates of the motion, and the largest kinetic energy, in words. @param {Session} session */
+export function extremaOf(session) {
+  const { motion } = session;
+  if (!motion) return "";
+  const shown = session.coordinates.slice(0, MOST_NAMED).flatMap(({ name, unit }) => {
+    const range = rangeOf([session.column(name)]);
+    return range ? [`${name.replace(/_/g, " ")} from ${shortly(range.low, 5)} to ${shortly(range.high, 5)}${unit === "1" ? "" : ` ${unit}`}`] : [];
+  });
+  const span = motion.time.last - motion.time.first;
+  const energies = Array.from({ length: OVERVIEW + 1 }, (_, i) => motion.energy?.(motion.time.first + (span * i) / OVERVIEW) ?? NaN);
+  const most = rangeOf([energies])?.high;
+  return [...shown, ...(most === undefined ? [] : [`kinetic energy up to ${shortly(most, 4)}`])].join("; ");
 }
 
 /** The phase plane. @param {Session} session @param {(x: number, y: number) => void} startAt @param {(p: Painter) => void} [beneath] @returns {View} */
