@@ -132,7 +132,7 @@ def saltus(
         ),
     ] = False,
 ) -> None:
-    """Exact non-smooth dynamics of the buckling-based metainterface and its kin.
+    """Exact dynamics of systems with impacts, friction and stops.
 
     First steps:
 
