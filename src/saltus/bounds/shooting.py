@@ -14,7 +14,7 @@ If rows `pins` c . x = d are appended, the parameter at `path` is unknown as wel
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from saltus.taylor import FREQUENCY, Expr, differentiate, number, substitute
 TIME = Expr("time")
 # of a step, at which a gap is looked at for a penetration
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
+HALVINGS = 4  # of the longest step, where a step from the guess has no enclosure
 TWO_PI = Ball(2.0 * np.pi, TWO_PI_RADIUS)
 
 
@@ -314,6 +315,11 @@ class Shooting:
             self._groups.append(made[key])
         self._distinct = list(made.values())
         self._layout(guess)
+        for _ in range(HALVINGS):
+            if self.enclose(Ball(self.x0)).proved:
+                break
+            self.settings = replace(self.settings, step=0.5 * self.settings.step)
+            self._layout(guess)
         nodes = sum(not step.from_event for step in self.steps)
         self.names = [name for names in event_names for name in names]
         self.names += [*state_names] * nodes + [path or ""] * (self.pins is not None)
