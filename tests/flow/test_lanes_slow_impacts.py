@@ -36,7 +36,8 @@ def ball(speed, e=1.0):
     """
     system = System(
         model=WallOscillator(stiffness=0.0, wall=0.0),
-        load=Load(force=1.0),  # the natural speed is then 1
+        # the natural speed is 1, with a load that is lost in rounding
+        load=Load(frequency=1.0, force=[1.0, saltus.Harmonic(1e-30)]),
         impact=VelocityReduction(e),
     )
     return system, {"x": -(speed**2) / 2.0, "velocity": 0.0, "tol": TOL}, 2.0 * speed

@@ -66,18 +66,6 @@ def names_of(event: Any, recipe: Recipe) -> tuple[str, ...]:
     return tuple(sorted(name for name in called if name and not name.startswith(INERT)))
 
 
-def without_last_bounces(rows: list[Any]) -> list[Any]:
-    """The events without the impacts right before contacts come to rest: how many of infinitely many
-    impacts are followed one by one is no property of the motion.
-    """
-    kept: list[Any] = []
-    for row in rows:
-        while row[1] == "held" and kept and kept[-1][1:] == ("impact", row[2]):
-            kept.pop()
-        kept.append(row)
-    return kept
-
-
 def read(recipe: Recipe, motion: saltus.Motion) -> Answer:
     """A motion in the terms of the first recipe."""
     view = recipe.view
@@ -96,7 +84,6 @@ def read(recipe: Recipe, motion: saltus.Motion) -> Answer:
         else:
             ordered.append([row])
     rows = [row for group in ordered for row in sorted(group, key=lambda row: row[1:])]
-    rows = without_last_bounces(rows)
     position, velocity = states_in_first_terms(recipe, motion.position, motion.velocity)
     speeds = np.abs(velocity).max()
     several = hasattr(motion.events, "_contacts")

@@ -131,6 +131,11 @@ class Recipe:
         """The number of coordinates, without the lag."""
         return len(self.mass)
 
+    @property
+    def has_inert_coordinate(self) -> bool:
+        """Whether a coordinate without effect was added."""
+        return -1 in self._old_places()
+
     # --- the same in other words ---------------------------------------------
 
     def in_units(self, length: float = 1.0, time: float = 1.0, mass: float = 1.0) -> Recipe:

@@ -11,12 +11,14 @@ import saltus
 from saltus.flow.motion.motion import state_names
 
 SAME = 1e-6  # numbers of motions without chaos over a few periods
+# powers of ten of the units of length, time and mass
+UNITS = ([-9.0, -6.0, -6.0], [6.0, 6.0, 6.0])
 
 
 def in_other_words(recipe: Recipe, rng: np.random.Generator) -> Iterator[Recipe]:
     """The same motion, written down anew in all ways."""
     yield recipe.rounded(rng)
-    length, time, mass = 10.0 ** rng.uniform([-5.0, -4.0, -6.0], [6.0, 4.0, 6.0])
+    length, time, mass = 10.0 ** rng.uniform(*UNITS)
     yield recipe.in_units(length, time, mass)
     yield recipe.mirrored()
     yield recipe.in_order(rng)
@@ -64,7 +66,7 @@ def many_ends(recipe: Recipe) -> tuple[np.ndarray, np.ndarray]:
 def test_an_ensemble_is_the_same_in_other_units_and_from_another_origin(kind: str) -> None:
     rng = np.random.default_rng([7, *kind.encode()])
     recipe = random_recipe(kind, rng)
-    length, time, mass = 10.0 ** rng.uniform([-5.0, -4.0, -6.0], [6.0, 4.0, 6.0])
+    length, time, mass = 10.0 ** rng.uniform(*UNITS)
     counts, states = many_ends(recipe)
     for other in (
         recipe.in_units(length, time, mass),
@@ -80,7 +82,7 @@ def test_an_ensemble_is_the_same_in_other_units_and_from_another_origin(kind: st
 def test_derivatives_are_the_same_in_other_units(kind: str) -> None:
     rng = np.random.default_rng([11, *kind.encode()])
     recipe = random_recipe(kind, rng)
-    length, time, mass = 10.0 ** rng.uniform([-5.0, -4.0, -6.0], [6.0, 4.0, 6.0])
+    length, time, mass = 10.0 ** rng.uniform(*UNITS)
     found = []
     for each in (recipe, recipe.in_units(length, time, mass)):
         path = "load.on_q0.amplitude"

@@ -283,19 +283,32 @@ class InGapCoordinates(ContactModel):
                     ),
                     name,
                 )
+        terms = (
+            _stacked([*self._each(values, True), *self.walls_at(t, load, order), 0.0])
+            for order, values in enumerate((_values(position), _values(velocity)))
+        )
         return self.closed_exactly(
-            *np.split(_stacked([*self._each(places), *self._each(rates)]), 2)
+            *np.split(_stacked([*self._each(places), *self._each(rates)]), 2), *terms
         )
 
-    def closed_exactly(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def closed_exactly(
+        self, q: np.ndarray, v: np.ndarray, *terms: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and velocities of this model, changed in place: what contacts hold up to
         rounding is held exactly.
+
+        Rounding is a share of the largest term of a sum: of `q`, `v` and, where they are given, of
+        `terms` of coordinates and of velocities.
         """
+        length, speed = (
+            np.maximum(np.abs(values).max(axis=0), np.abs(more).max(axis=0))
+            for values, more in zip((q, v), terms or (q, v), strict=True)
+        )
         for contact in self.contacts:
             place = self.coordinates.index(contact.coordinate)
             at = np.asarray(contact.position, dtype=float)
-            there = np.abs(q[place] - at) <= CLOSED_BELOW * (1.0 + np.abs(q).max(axis=0))
-            still = there & (np.abs(v[place]) <= CLOSED_BELOW * (1.0 + np.abs(v).max(axis=0)))
+            there = np.abs(q[place] - at) <= CLOSED_BELOW * np.maximum(length, np.abs(at))
+            still = there & (np.abs(v[place]) <= CLOSED_BELOW * speed)
             q[place], v[place] = np.where(there, at, q[place]), np.where(still, 0.0, v[place])
         return q, v
 
@@ -560,6 +573,7 @@ def _check_dependent(model: InGapCoordinates) -> None:
         for sign in (1.0, -1.0):
             others = []
             left = -float(contact.position)
+            largest = abs(left)
             for name, factor in zip(names, rows[contact.coordinate], strict=True):
                 beside = [
                     c
@@ -567,14 +581,16 @@ def _check_dependent(model: InGapCoordinates) -> None:
                     if c.coordinate == name and sign * contact.sign * c.sign * float(factor) > 0.0
                 ]
                 others += beside[:1] if float(factor) else []
-                left += (
+                term = (
                     float(factor) * float(beside[0].position)
                     if beside
                     else math.inf
                     if float(factor)
                     else 0.0
                 )
-            if abs(left) <= CLOSED_BELOW * (1.0 + abs(float(contact.position))):
+                left += term
+                largest = max(largest, abs(term))
+            if math.isfinite(left) and abs(left) <= CLOSED_BELOW * largest:
                 raise ParameterError(
                     (
                         f"the contact {contact.name!r} closes where "

@@ -20,7 +20,8 @@ from saltus.systems.contact_model import Contact, Friction, Surface
 from saltus.systems.model import is_function, is_zero, reads_of
 
 Part = Contact | Surface | Friction
-# A contact is closed, up to rounding, if both its gap and its speed are smaller than this.
+# A contact is closed, up to rounding, if both its gap and its speed are smaller than this share of
+# the terms of its sum, or of natural units.
 CLOSED_BELOW = 1e-13
 # behind the name of a model's function, its inverse, and the margin that ends this
 INVERSE = "_inverse"
@@ -295,6 +296,7 @@ def reflected(system: Any, states: np.ndarray) -> np.ndarray:
     found = with_sums(system, states).reshape(-1, 2 * len(names))
     places = [names.index(each.coordinate) for each in contacts]
     widths = np.array([np.linalg.norm(normal_of(system, place)) for place in places])
+    far = max(abs(float(each.position)) for each in contacts)
     for _ in range(1000):  # a few are enough where there is room
         gaps = (
             np.stack(
@@ -302,7 +304,8 @@ def reflected(system: Any, states: np.ndarray) -> np.ndarray:
             )
             / widths[:, None]
         )
-        if not (beyond := gaps < -CLOSED_BELOW).any():
+        rounding = CLOSED_BELOW * np.maximum(np.abs(found[:, places]).max(axis=1), far)
+        if not (beyond := gaps < -rounding).any():
             break
         for i, place in enumerate(places):
             rows = beyond[i] & (gaps.argmin(axis=0) == i)

@@ -17,7 +17,7 @@ from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.gap_places import CLOSED_BELOW, held_exactly, led, normal_of, pushed, reflected
 from saltus.systems.model import Model
 from saltus.systems.system import System
-from saltus.systems.system_units import natural_units
+from saltus.systems.system_units import ANGLES, natural_units
 
 
 def read_start(
@@ -194,7 +194,8 @@ def from_gaps(system: System, states: np.ndarray) -> np.ndarray:
     return states if system.in_gap_coordinates is system else led(system.from_gaps, states)
 
 
-HALF_WIDTH = 1.5  # the half width of the default window: about the size of the motions in the paper
+# the half width of the default window, in natural units: about the size of the motions in the paper
+HALF_WIDTH = 1.5
 
 Box = tuple[tuple[float, float], ...]  # bounds of each coordinate, then of each velocity
 
@@ -222,8 +223,8 @@ class Window(Box):
 
 
 def check_window(window: Any, system: System) -> Window:
-    """A window of the states; for None the default window, with half widths 1.5 around the contact,
-    or around 0 without one.
+    """A window of the states; for None the default window, with half widths of 1.5 natural units
+    around the contact, or around 0 without one.
 
     With several contacts the default window ends at these. With several coordinates both bounds of
     a state variable may be equal; it then has one value. Velocities of coordinates of first order
@@ -243,7 +244,8 @@ def check_window(window: Any, system: System) -> Window:
     following = len(system.model.first_order)
     # velocities that follow from the state may have any bounds
     if following and bounds.shape == (2 * len(names) - following, 2):
-        bounds = np.concatenate([bounds, [(-HALF_WIDTH, HALF_WIDTH)] * following])
+        free = _default_half_widths(system)[-following:, None] * (-1.0, 1.0)
+        bounds = np.concatenate([bounds, free])
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
     if (
@@ -271,26 +273,39 @@ def check_window(window: Any, system: System) -> Window:
 
 
 def _default_window(system: System) -> Window:
-    """The window with half widths 1.5 around the contact, or around 0 without one, cut off at the
-    contacts.
+    """The window with half widths of 1.5 natural units around the contact, or around 0 without one,
+    cut off at the contacts.
     """
     model = system.model
+    half = _default_half_widths(system).tolist()
     if model.sides:
         middle = float(model.contact)
-        return Window(((middle - HALF_WIDTH, middle + HALF_WIDTH), (-HALF_WIDTH, HALF_WIDTH)))
-    bounds = {name: [-HALF_WIDTH, HALF_WIDTH] for name in model.coordinates}
+        return Window(((middle - half[0], middle + half[0]), (-half[1], half[1])))
+    bounds = {name: [-far, far] for name, far in zip(model.coordinates, half, strict=False)}
     for contact in (each for each in model.contacts if each.coordinate in model.coordinates):
         at = float(contact.position)
         pair = bounds[contact.coordinate]
         alone = sum(other.coordinate == contact.coordinate for other in model.contacts) == 1
-        pair[:] = sorted((at, at + contact.sign * HALF_WIDTH)) if alone else pair
+        far = half[model.coordinates.index(contact.coordinate)]
+        pair[:] = sorted((at, at + contact.sign * far)) if alone else pair
         pair[contact.sign < 0] = at
     return Window(
         [
             *((low, high) for low, high in bounds.values()),
-            *[(-HALF_WIDTH, HALF_WIDTH)] * len(bounds),
+            *((-fast, fast) for fast in half[len(bounds) :]),
         ]
     )
+
+
+def _default_half_widths(system: System) -> np.ndarray:
+    """The half widths of the default window, of coordinates and then of velocities, (2 n,): natural
+    units, but for angles and their rates radians and the time of the model.
+    """
+    units = natural_units(system)
+    names = system.model.coordinates
+    angular = np.array([system.model.unit_of(name) in ANGLES for name in names])
+    speeds = np.where(angular, 1.0, units.speeds)
+    return HALF_WIDTH * np.concatenate([np.where(angular, 1.0, units.lengths), speeds])
 
 
 @cache
@@ -452,7 +467,9 @@ def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
     beside = (
         0.0
         if inner is system
-        else 4.0 * CLOSED_BELOW * (1.0 + np.abs(moved).max(axis=-1, initial=0.0))
+        else 4.0
+        * CLOSED_BELOW
+        * np.maximum(np.abs(moved).max(axis=-1), np.abs(states).max(axis=-1))
     )
     for contact in inner.model.contacts:
         place = names.index(contact.coordinate)
@@ -546,7 +563,9 @@ def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
         np.asarray(each.gap(found[..., names.index(each.coordinate)]))
         for each in system.model.contacts
     ]
-    return np.where((np.min(gaps, axis=0) < -CLOSED_BELOW)[..., None], states, found)
+    far = max(abs(float(each.position)) for each in system.model.contacts)
+    rounding = CLOSED_BELOW * np.maximum(np.abs(found[..., : len(names)]).max(axis=-1), far)
+    return np.where((np.min(gaps, axis=0) < -rounding)[..., None], states, found)
 
 
 def check_reached(model: Model, coordinate: str, values: Any, name: str) -> None:

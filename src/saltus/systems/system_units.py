@@ -67,6 +67,8 @@ class NaturalUnits:
         The time in which the system moves by itself, sqrt(d / a), at most `time`.
     free_time
         The time of its free oscillation, 1 / sqrt(abs(J)), or `time` without a stiffness.
+    has_time
+        Whether the system has a time; if not, `time` is 1 in the units of its user.
     """
 
     lengths: np.ndarray
@@ -74,6 +76,7 @@ class NaturalUnits:
     masses: np.ndarray
     own_time: float
     free_time: float
+    has_time: bool = True
 
     @cached_property
     def length(self) -> float:
@@ -117,7 +120,7 @@ class NaturalUnits:
         lengths, masses = (np.exp2(np.round(np.log2(x))) for x in (self.lengths, self.masses))
         times = (self.time, self.own_time, self.free_time)
         time, own_time, free_time = map(_power_of_two, times)
-        return NaturalUnits(lengths, time, masses, own_time, free_time)
+        return NaturalUnits(lengths, time, masses, own_time, free_time, self.has_time)
 
 
 def natural_units(system: System) -> NaturalUnits:
@@ -134,10 +137,11 @@ def natural_units(system: System) -> NaturalUnits:
 
 def time_without_period(system: System) -> float:
     """The natural time of a system on which nothing acts with the frequency of its load, or that
-    has none; inf where something does."""
+    has none, 0 if the system itself has no time; inf where something does."""
     load = system.load
     if load.frequency is None:
-        return natural_units(system).time
+        units = natural_units(system)
+        return units.time if units.has_time else 0.0
     if any(signal.periodic for signal in load.channels.values()):
         return math.inf
     alone = replace(system, load=Load(frequency=None, **load.channels))
@@ -146,7 +150,7 @@ def time_without_period(system: System) -> float:
     declared = DeclaredLoad(alone.load, model)
     if _acceleration(model, 0.0, still, model.every_side[0], declared) is None:
         return math.inf  # the model reads the frequency itself
-    return natural_units(alone).time
+    return time_without_period(alone)
 
 
 def _power_of_two(value: float) -> float:
@@ -177,7 +181,8 @@ def _found(system: System) -> NaturalUnits:
         angular = np.array([model.unit_of(name) in ANGLES for name in model.coordinates])
         # a slow load leaves angles to move by themselves within a radian
         own_rate = math.sqrt(float(np.abs(push).max(where=angular, initial=0.0)))
-        time = _time(max(rate, own_rate if rate > 0.0 else 0.0), nearest, push, stiffest)
+        known = _time(max(rate, own_rate if rate > 0.0 else 0.0), nearest, push, stiffest)
+        time = known or 1.0
         if nearest is None:
             nearest = _other_length(system, load, time)
     largest = float(np.max(nearest, where=~angular, initial=0.0))
@@ -190,7 +195,7 @@ def _found(system: System) -> NaturalUnits:
     own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
     free_time = 1.0 / math.sqrt(stiffest) if stiffest > 0.0 else time
     lengths = np.where(sound, lengths, 1.0)
-    return NaturalUnits(lengths, time, _masses(model), own_time, free_time)
+    return NaturalUnits(lengths, time, _masses(model), own_time, free_time, known > 0.0)
 
 
 def _places(model: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -332,14 +337,15 @@ def _slopes(model: Any, place: np.ndarray, side: int, load: Any) -> np.ndarray:
 
 
 def _time(rate: float, distance: np.ndarray | None, push: np.ndarray, stiffness: float) -> float:
-    """The unit of time, from the load, a distance and its acceleration, or a stiffness."""
+    """The unit of time, from the load, a distance and its acceleration, or a stiffness; 0 without
+    any of them."""
     if rate > 0.0:
         return 1.0 / rate
     squared = 1.0 / stiffness if stiffness > 0.0 else 0.0
     if distance is not None and push.any():
         squared = float(np.linalg.norm(distance) / np.linalg.norm(push))
     time = math.sqrt(squared)
-    return time if 0.0 < time < math.inf else 1.0
+    return time if 0.0 < time < math.inf else 0.0
 
 
 def _other_length(system: System, load: Any, time: float) -> np.ndarray:

@@ -27,7 +27,7 @@ from saltus.flow.contacts.layout import (
 from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
-from saltus.flow.kernel.steps import columns_at_event, expand, step_size
+from saltus.flow.kernel.steps import columns_at_event, expand, step_size, time_scale
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -296,7 +296,7 @@ def rounding_of_speed(motion, k):
     instant as another one.
     """
     speed = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
-    unit = motion.period_length if motion.period_length > 0.0 else motion.natural_time
+    unit = motion.period_length if motion.period_length > 0.0 else time_scale(motion)
     return TOGETHER * (abs(speed[0]) + abs(ground_speed(motion, k)) + abs(speed[1]) * unit)
 
 

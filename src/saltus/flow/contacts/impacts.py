@@ -14,7 +14,6 @@ from saltus.flow.contacts.complementarity import acting, complementary, invert, 
 from saltus.flow.contacts.layout import (
     EXCESS,
     FINISHED,
-    LEAST_LOSS,
     MOST_EXCESS,
     MOST_FROZEN_IMPACTS,
     VANISHED,
@@ -24,8 +23,8 @@ from saltus.flow.contacts.layout import (
     jumping,
     restitution,
 )
-from saltus.flow.kernel.layout import EXACT, SLOW, Mode
-from saltus.flow.kernel.steps import column_step, leaps, natural_speed, step_size
+from saltus.flow.kernel.layout import EXACT, LEAST_LOSS, Mode
+from saltus.flow.kernel.steps import column_step, leaps, slow_share, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -474,25 +473,21 @@ def bring_to_rest(motion, near):
 
 @lean_jit
 def slow_impacts(motion):
-    """The speed of an impact below which the end of an accumulation may be near.
-
-    Faster impacts take longer than the time for which the accelerations count as constant
-    (`frozen_limit`).
+    """The speed of an impact below which the end of an accumulation may be near, for a contact that
+    loses all of it; below this times `lost_share` for any.
     """
-    return SLOW * math.sqrt(motion.tolerance) * natural_speed(motion)
+    return slow_share(motion) * motion.fastest
 
 
 @lean_jit
-def largest_loss(motion):
-    """The largest share of its speed that a contact loses at an impact without friction.
+def lost_share(motion, i):
+    """The share of its speed that a contact loses at an impact without friction, at least
+    LEAST_LOSS.
 
     Impacts of a speed u accumulate no sooner than after 2 u / b divided by it, with the acceleration
     b: the end of faster ones need not be looked for.
     """
-    loss = LEAST_LOSS
-    for i in range(motion.contacts.shape[0]):
-        loss = max(loss, 1.0 - restitution(motion, i, i))
-    return loss
+    return max(LEAST_LOSS, 1.0 - restitution(motion, i, i))
 
 
 @lean_jit

@@ -52,7 +52,7 @@ from saltus.flow.contacts.impacts import (
     frozen_accumulation,
     hold_coordinates,
     keep_gap,
-    largest_loss,
+    lost_share,
     measure_gap,
     near_contacts,
     note_press,
@@ -118,6 +118,7 @@ from saltus.flow.kernel.steps import (
     record_step,
     shortest_step,
     step_arrays,
+    time_scale,
 )
 from saltus.taylor import jit, lean_jit
 
@@ -138,13 +139,12 @@ def end_accumulation_of(motion, t):
     count = motion.contacts.shape[0]
     if not fill_contact_matrices(motion):
         return t
-    if motion.pull == 0.0:  # the motion begins at a contact
-        motion.pull = motion.press
     slow = slow_impacts(motion)
-    slowest = slow * largest_loss(motion) if motion.frictions.shape[0] == 0 else slow
+    slowest = slow
     last = -1
     for i in range(count):
-        if 0.0 < motion.rates[i] <= slowest and motion.gaps[i] == 0.0:
+        below = min(slowest, slow * lost_share(motion, i))
+        if 0.0 < motion.rates[i] <= below and motion.gaps[i] == 0.0:
             slowest = motion.rates[i]
             last = i
     if last < 0 or motion.contacts[last, ContactColumn.WAITS] > 0:
@@ -262,7 +262,7 @@ def first_press(motion, t):
     span = motion.natural_time
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
-    expand(motion, t, 1.0, 2)
+    expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
     for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
         place = 0
         if row < motion.contacts.shape[0]:
@@ -406,7 +406,7 @@ def short_order(motion, t):
         return order
     flight = np.inf
     fast = FAST_IMPACT * natural_speed(motion)
-    radius = RADIUS * motion.natural_time
+    radius = RADIUS * time_scale(motion)
     for i in range(motion.contacts.shape[0]):
         rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
         if (

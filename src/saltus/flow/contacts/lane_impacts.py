@@ -12,8 +12,8 @@ closed contacts. Lanes in which neither is a solution are solved one at a time (
 
 from __future__ import annotations
 
-from saltus.flow.contacts.layout import LEAST_LOSS, ContactColumn
-from saltus.flow.lanes.lane_steps import natural_speeds
+from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.kernel.layout import LEAST_LOSS
 from saltus.flow.lanes.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_vectors import absolute, bits, fma, mask, maximum, select, splat
@@ -167,10 +167,7 @@ def impulses_hold(lanes, closing):
     jump = lanes.jump
     good = closing.hit
     count = lanes.sizes.contacts
-    loss = splat(LEAST_LOSS)  # `impacts.largest_loss`
-    for i in range(count):
-        loss = maximum(loss, 1.0 - lanes.restitution[count * i + i])
-    slowest = lanes.settings.slowest_impact * natural_speeds(lanes) * loss
+    slow = lanes.settings.slowest_impact * lanes.fastest
     freed = splat(1.0 * lanes.sizes.own)
     for i in range(lanes.sizes.contacts):
         row = lanes.sizes.coordinates[i]
@@ -185,7 +182,9 @@ def impulses_hold(lanes, closing):
         lanes.rates[i] = rate
         solved = (acts & bits(sign * impulse >= 0.0)) | (concerned & ~acts & bits(rate >= aimed))
         stays = bits(rate * rate <= 0.0)
-        good &= (solved & (stays | bits(rate > slowest))) | ~concerned
+        # `impacts.lost_share`
+        lost = maximum(splat(LEAST_LOSS), 1.0 - lanes.restitution[count * i + i])
+        good &= (solved & (stays | bits(rate > slow * lost))) | ~concerned
         freed = select(mask(concerned & stays), freed - 1.0, freed)
     return good & bits(freed > 0.5)
 

@@ -155,8 +155,6 @@ VANISHED = 1e-16
 FINISHED = 1e-14
 # which accumulations of one contact within those of another are cut off: near that scale the cuts
 # would keep the other one going.
-# The share of the speed lost at an impact, below which `largest_loss` does not go.
-LEAST_LOSS = 0.05
 # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
 TRIED_AGAIN = 32
 # Reactions smaller than this vanish together, in units of the largest one so far: the rounding of

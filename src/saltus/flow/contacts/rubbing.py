@@ -45,7 +45,7 @@ from saltus.flow.contacts.tangent import (
     note_velocities,
     slope,
 )
-from saltus.flow.kernel.steps import expand
+from saltus.flow.kernel.steps import change_rate, expand, piece_end
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -284,33 +284,30 @@ def rest_columns(motion, near):
 @lean_jit
 def free_pulls(motion, t):
     """Fill the second derivatives of the gaps with all contacts open, and in `falling_pulls` the
-    relative rates at which they change: with the load, or by a stiffness that is faster than it.
+    relative rates at which they change.
     """
     first = motion.parameters.size - motion.local
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
-    expand(motion, t, 1.0, 2)
+    expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
     for i in range(motion.contacts.shape[0]):
         a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
         motion.pulls[i] = motion.signs[i] * a[0]
-        rate = 1.0 / motion.natural_time
-        if a[1] != 0.0:  # bodies that fall together do not press on one another, and go on so
-            rate += abs(a[1] / a[0]) if a[0] != 0.0 else np.inf
-        if a[0] != 0.0:
-            rate = max(rate, math.sqrt(2.0 * abs(a[2] / a[0])))
-        motion.falling_pulls[i] = rate
+        # bodies that fall together do not press on one another, and go on so
+        motion.falling_pulls[i] = change_rate(a)
 
 
 @lean_jit
 def frozen_limit(motion, near):
     """The time for which the accelerations of the contacts in `near` may be taken as constant, from
-    what `free_pulls` has filled.
+    what `free_pulls` has filled; at most up to the next breakpoint of the records.
     """
-    change = 1.0 / motion.natural_time
+    change = 0.0
     for i in range(motion.contacts.shape[0]):
         if near >> i & 1:
             change = max(change, motion.falling_pulls[i])
-    return np.sqrt(10.0 * motion.tolerance) / change if change > 0.0 else np.inf
+    limit = piece_end(motion) - motion.time
+    return min(limit, np.sqrt(10.0 * motion.tolerance) / change) if change > 0.0 else limit
 
 
 @lean_jit

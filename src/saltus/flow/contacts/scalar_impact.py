@@ -15,7 +15,7 @@ from saltus.flow.contacts.impacts import (
     fill_contact_matrices,
     impact_impulses,
     jump_first_order,
-    largest_loss,
+    lost_share,
     settle_contact,
 )
 from saltus.flow.contacts.lane_handoff import functions_of
@@ -23,16 +23,10 @@ from saltus.flow.contacts.lane_impacts import read_contacts, write_closed
 from saltus.flow.kernel.memory import LaneImpactParts, MotionMemory
 from saltus.flow.kernel.steps import state_arrays
 from saltus.flow.lanes.function_types import CONTACTS_IMPACT
-from saltus.flow.lanes.handoff import natural_time_of, own_env
-from saltus.taylor import by_reference, cached_jit, lean_jit
+from saltus.flow.lanes.handoff import own_env
+from saltus.taylor import by_reference, cached_jit
 
 # --- compiled from here on ---------------------------------------------------
-
-
-@lean_jit
-def lane_speed(lane):
-    """The natural speed of a lane (`steps.natural_speed`)."""
-    return lane.pull * natural_time_of(lane) if lane.pull > 0.0 else lane.fastest
 
 
 @cached_jit(CONTACTS_IMPACT)
@@ -61,7 +55,7 @@ def contacts_impact(lane, hit):
         state[row] = lane.new_position[row]
     read_contacts(lane, contacts)
     regular = fill_contact_matrices(motion)
-    slowest = lane.settings.slowest_impact * lane_speed(lane) * largest_loss(motion)
+    slow = lane.settings.slowest_impact * lane.fastest
     chosen = hit | closed_bits(motion)
     for i in range(contacts.shape[0]):
         if hit >> i & 1:
@@ -77,7 +71,7 @@ def contacts_impact(lane, hit):
             settle_contact(motion, i, rates[i])
             if rates[i] == 0.0:
                 free -= 1
-            elif rates[i] <= slowest:
+            elif rates[i] <= slow * lost_share(motion, i):
                 return 0
     if free == 0:
         return 0

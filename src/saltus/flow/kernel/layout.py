@@ -158,9 +158,11 @@ EXACT = 1e-15
 TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a number
 
 # Accumulations of impacts.
-# In sqrt(tol) and natural speeds (`natural_speed`): after faster impacts the end of an accumulation
-# is not looked for.
+# In sqrt(tol), the lost share of the speed and the fastest impact so far: after faster impacts the
+# end of an accumulation is not looked for (`slow_share`), so that impacts are seen where nothing
+# changes their pull.
 SLOW = 3.0
+LEAST_LOSS = 0.05  # The lost share counts as no smaller than this.
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
 # In natural speeds. Here the averaged law has an error of 2e-5 of the speed if the pulls of both sides
 # change by half within a unit of time, and of 1e-11 at one wall, beside impacts that were followed one

@@ -18,6 +18,7 @@ from saltus.flow.kernel.layout import (
     ROUGHER,
     SAFETY,
     SHORTEST,
+    SLOW,
     SMALLEST,
     EventCode,
 )
@@ -300,18 +301,57 @@ def next_target(motion, t_end):
 
 
 @lean_jit
+def piece_end(motion):
+    """The time of the next breakpoint of the records, inf behind the last one."""
+    breaks = motion.breaks
+    return breaks[motion.piece] - motion.origin if motion.piece < breaks.size else np.inf
+
+
+@lean_jit
 def natural_speed(motion):
     """The speed of the largest pull at an impact so far in the natural time; where nothing pulls,
-    that of the fastest impact.
+    or there is no natural time, that of the fastest impact.
     """
-    return motion.pull * motion.natural_time if motion.pull > 0.0 else motion.fastest
+    speed = motion.pull * motion.natural_time
+    return speed if speed > 0.0 else motion.fastest
+
+
+@lean_jit
+def slow_share(motion):
+    """The speed of an impact as a share of the fastest one so far, below which the end of an
+    accumulation is looked for, where an impact takes all of the speed; where it takes less, as
+    much less.
+
+    It has no unit, and what does not act on the impacts does not change it.
+    """
+    return SLOW * math.sqrt(motion.tolerance)
+
+
+@lean_jit
+def time_scale(motion):
+    """The natural time, or without one what an impact takes to fall: 0 before the first one."""
+    if motion.natural_time > 0.0:
+        return motion.natural_time
+    return motion.fastest / motion.pull if motion.pull > 0.0 else 0.0
+
+
+@lean_jit
+def change_rate(a):
+    """The relative rate at which an acceleration changes, from the first three coefficients of its
+    series: those that follow from the load's frequency, a damping or a stiffness alike.
+    """
+    if a[1] == 0.0 and a[2] == 0.0:
+        return 0.0
+    if a[0] == 0.0:
+        return np.inf
+    return abs(a[1] / a[0]) + math.sqrt(2.0 * abs(a[2] / a[0]))
 
 
 @lean_jit
 def shortest_step(motion):
     """The step below which the acceleration counts as singular."""
-    whole = motion.period_length if motion.period_length > 0.0 else motion_end(motion)
-    return SHORTEST * min(whole, 1.0)
+    scale = time_scale(motion)
+    return SHORTEST * (scale if scale > 0.0 else motion_end(motion))
 
 
 @lean_jit
@@ -332,7 +372,7 @@ def is_away(motion, gap, place, position, tau):
         terms = terms * tau + abs(series[k])
     # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed, and no
     # time is told from another one below its rounding
-    span = max(tau, INSTANT * motion.natural_time)
+    span = max(tau, INSTANT * time_scale(motion))
     terms += abs(position) + max(motion.press, motion.pull) * span * span
     return abs(gap) > (PENETRATED + 10.0 * motion.tolerance) * terms
 

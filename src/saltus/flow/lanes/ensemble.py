@@ -14,7 +14,7 @@ import numpy as np
 from saltus.checks import Numbers, check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow.kernel.compiled import Program, limits_of, program
-from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.kernel.layout import SHORTEST, Mode, Status
 from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.compiled_lanes import (
     compile_beside,
@@ -36,10 +36,15 @@ from saltus.flow.lanes.options import (
     read_threads,
 )
 from saltus.flow.lanes.threads import Jobs, Lanes
-from saltus.flow.motion.kernel_state import natural_time
+from saltus.flow.motion.kernel_state import longest_time
 from saltus.flow.motion.simulate import Clock, clock
 from saltus.progress import Progress, silent
-from saltus.systems import System, check_system, natural_units, numbers
+from saltus.systems import (
+    System,
+    check_system,
+    natural_units,
+    numbers,
+)
 from saltus.taylor import record_tables
 
 if TYPE_CHECKING:
@@ -218,7 +223,8 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
         from_start=options.from_start,
         natural_length=natural_units(system).length,
         settle=Until.SETTLED in options.until,
-        natural_time=natural_time(system, 0.0),
+        natural_time=longest_time(system),
+        shortest_step=SHORTEST * natural_units(system).time,
     )
 
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from saltus.flow.kernel.layout import Mode, Status
-from saltus.flow.lanes.memory import BURST, LONGEST_RECURRENCE, MOST_IMPACTS
+from saltus.flow.lanes.memory import BURST, LONGEST_RECURRENCE, MOST_IMPACTS, natural_time_of
 from saltus.flow.lanes.sampling import recurrence_period
 from saltus.flow.one_contact.lane_step import begin_contact, side_at_end
 from saltus.taylor import inline_jit, lean_jit
@@ -128,16 +128,16 @@ def begin_records(lane):
 
 @lean_jit
 def unresolved(lane):
-    """Whether there were more than MOST_IMPACTS in a unit of time, or in a shorter forcing period,
-    since the last check.
-    """
+    """Whether there were more than MOST_IMPACTS in a natural time since the last check."""
     many = impacts_between_checks(lane)
     now = lane.now
-    length = lane.period_length
+    span = natural_time_of(lane)
+    if not span > 0.0:  # as in `steps.time_scale`
+        span = lane.fastest / lane.pull if lane.pull > 0.0 else 0.0
     since = lane.last_check
     lane.last_check = now
     lane.next_check += many
-    return now - since < (min(length, 1.0) if length > 0.0 else 1.0) * many / MOST_IMPACTS
+    return now - since < span * many / MOST_IMPACTS
 
 
 @inline_jit

@@ -9,15 +9,13 @@ of them.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.memory import MOTION, EventBuffers, StepBuffers
 from saltus.flow.kernel.roots import SIMPLE, first_root, horner, scale_gap
 from saltus.flow.lanes.function_types import LANE_ROOT, SCALAR_MOTION, TURNING_RANGE
-from saltus.flow.lanes.memory import NO_ROOT, TOUCH
+from saltus.flow.lanes.memory import NO_ROOT, TOUCH, natural_time_of
 from saltus.flow.one_contact.lane_handoff import (
     begin_scalar,
     end_scalar,
@@ -155,14 +153,6 @@ def scalar_state(lane):
     motion.end = lane.end_time if period == last else lane.period_start + length
     motion.horizon = (last - period) * length + lane.end_time
     return numbers, state
-
-
-@lean_jit
-def natural_time_of(lane):
-    """The natural time of a lane's load, or of its system."""
-    length = lane.period_length
-    longest = lane.settings.natural_time
-    return min(length / (2.0 * math.pi), longest) if length > 0.0 else longest
 
 
 @jit

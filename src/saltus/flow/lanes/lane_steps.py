@@ -84,12 +84,14 @@ def note_impacts(lanes, hit, speed, pull):
 
 @inline_jit
 def natural_speeds(lanes):
-    """The natural speed of each lane (`steps.natural_speed`)."""
+    """The speed of each lane of which a share is slow: the natural one (`steps.natural_speed`), or
+    that of the fastest impact.
+    """
     length = lanes.period_length
     own = splat(lanes.settings.natural_time)
     of_load = length * (0.5 / math.pi)
     time = select(mask(bits(length > 0.0) & bits(of_load < own)), of_load, own)
-    return select(mask(bits(lanes.pull > 0.0)), lanes.pull * time, lanes.fastest)
+    return maximum(lanes.pull * time, lanes.fastest)
 
 
 @inline_jit

@@ -9,6 +9,7 @@ as many slots as the structure needs. Compiled code reads and writes all of them
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.flow.kernel.layout import SERIES_LENGTH
-from saltus.taylor import RECORD_WIDTH
+from saltus.taylor import RECORD_WIDTH, lean_jit
 
 Slot = tuple[str, int]  # an array of the memory, and one of its slots
 
@@ -360,7 +361,7 @@ class Closing(NamedTuple):
 
 # --- compiled from here on ---------------------------------------------------
 
-# in a unit of time, or in a shorter forcing period: more are an accumulation that is not resolved
+# in a natural time: more are an accumulation that is not resolved
 MOST_IMPACTS = 1e6
 # impacts between two checks of their rate with several contacts, where each takes a pass of the
 # scalar kernel
@@ -373,3 +374,11 @@ TOUCH = -2.0
 FAST = 1e300  # A state beyond this has left the range of numbers.
 # the longest period for which a recurrence is looked for, in forcing periods
 LONGEST_RECURRENCE = 16
+
+
+@lean_jit
+def natural_time_of(lane):
+    """The natural time of a lane's load, or of its system (`kernel_state.natural_time`)."""
+    length = lane.period_length
+    longest = lane.settings.natural_time
+    return min(length / (2.0 * math.pi), longest) if length > 0.0 else longest

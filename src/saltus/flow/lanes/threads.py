@@ -15,7 +15,12 @@ import numpy as np
 
 from saltus.flow.contacts.layout import FrictionColumn, solver_arrays
 from saltus.flow.kernel.compiled import Program, taylor_order
-from saltus.flow.kernel.layout import CHATTER_SPEED, ROUGHER, SERIES_LENGTH, SHORTEST, SLOW
+from saltus.flow.kernel.layout import (
+    CHATTER_SPEED,
+    ROUGHER,
+    SERIES_LENGTH,
+    SLOW,
+)
 from saltus.flow.kernel.memory import MOTION
 from saltus.flow.lanes.compiled_lanes import (
     compile_everything,
@@ -173,6 +178,7 @@ class Lanes:
     natural_length: float  # in which states that recur are compared
     settle: bool  # whether a trajectory ends when it repeats itself
     natural_time: float  # of what moves without a forcing period, inf where the load has one
+    shortest_step: float  # below which an acceleration counts as singular
 
     def run(
         self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0
@@ -374,7 +380,7 @@ class Lanes:
         if not self.program.structure.several:  # impacts of one contact may lose nothing
             slowest = max(slowest, CHATTER_SPEED)
         limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
-        scales = self.natural_time, SHORTEST, slowest
+        scales = self.natural_time, self.shortest_step, slowest
         return LaneSettings(self.tol, *scales, *limits, self.natural_length)
 
     def _code(self) -> Code:

@@ -47,21 +47,26 @@ NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
 def natural_time(system: System, length: float) -> float:
-    """The natural time of a motion under a load with a period, 0 for none.
+    """The natural time of a motion under a load with a period, 0 if it has none.
 
     A frequency that acts on nothing is none, and one that is much slower than what moves by itself
     gives no scale.
     """
     of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
-    own: float | None = system._remembered(natural_time, lambda: _own_time(system))
-    if own is None:
-        return of_load if length > 0.0 else 1.0
-    return min(of_load, own)
+    time = min(of_load, longest_time(system))
+    return time if time < math.inf else 0.0
+
+
+def longest_time(system: System) -> float:
+    """The natural time under a load whose period is as long as one likes; 0 for what has no time of
+    its own, inf where the load's is always taken."""
+    found: float = system._remembered(longest_time, lambda: _own_time(system))
+    return found
 
 
 def natural_times(system: System) -> dict[str, float | None]:
     """What `natural_time` does, as numbers, so that a page does it for other periods of the load."""
-    without = time_without_period(system) if _bounces(system) else 1.0
+    without = time_without_period(system) if _bounces(system) else math.inf
     return {
         "without_period": without if math.isfinite(without) else None,
         "slow_load": SLOW_LOAD if _bounces(system) else None,
@@ -69,11 +74,11 @@ def natural_times(system: System) -> dict[str, float | None]:
     }
 
 
-def _own_time(system: System) -> float | None:
-    """The natural time without the load's period; None for what has no contact, which has no use
+def _own_time(system: System) -> float:
+    """The natural time without the load's period; inf for what has no contact, which has no use
     for it."""
     if not _bounces(system):
-        return None
+        return math.inf
     period = system.load.period
     # in usual units no own time is far below 1: under shorter periods it need not be found, which
     # takes ten times as long as a short motion

@@ -205,7 +205,7 @@ def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
     first, local, last_one, end, length = clock(float(time), system.load.period, periods, duration)
     when = Clock(int(first), float(local), int(last_one), float(end), float(length))
     if dense and whole:
-        _check_dense(when, periods, duration)
+        _check_dense(system, when, periods, duration)
     made = MotionPlan(asked, limits, when, _angles(system), [])
     last[:] = [made] if isinstance(stop_at, (str, tuple)) else []  # others may change
     return made
@@ -225,10 +225,16 @@ def _angles(system: System) -> list[tuple[int, str]]:
     ]
 
 
-def _check_dense(when: Clock, periods: float | None, duration: float | None) -> None:
+def _check_dense(
+    system: System, when: Clock, periods: float | None, duration: float | None
+) -> None:
     """Refuse a motion that is too long to be kept whole."""
     name, span = ("duration", duration) if periods is None else ("periods", periods)
-    count = float(span or 0.0) / (1.0 if periods is not None else when.length or 2.0 * math.pi)
+    length = 1.0 if periods is not None else when.length
+    if length == 0.0:
+        units = natural_units(system)
+        length = 2.0 * math.pi * units.time if units.has_time else math.inf
+    count = float(span or 0.0) / length
     if count * LIMITS.dense > LIMITS.any_machine:
         what = f"{count:.3g} periods of a motion kept whole (dense=False or times=... keep less)"
         check_memory(name, count * LIMITS.dense, what)
@@ -427,7 +433,7 @@ def _advance(
                 _refuse(system, status, now)
             return status, numbers
         if recorder.total > counted + many:
-            if time < checked_at + natural_units(system).time * many / MOST.rate:
+            if time < checked_at + _time_scale(system, numbers) * many / MOST.rate:
                 _refuse_crushed(system, now, recorder.last_hit() if system.model.contacts else [])
                 raise MotionError(
                     f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
@@ -442,6 +448,14 @@ def _advance(
             )
         now.with_empty_buffers()
         recorder.make_buffers()
+
+
+def _time_scale(system: System, numbers: Any) -> float:
+    """The natural time of a system, or without one what its fastest impact takes to fall."""
+    units = natural_units(system)
+    if units.has_time or not numbers.pull > 0.0:
+        return units.time if units.has_time else 0.0
+    return float(numbers.fastest / numbers.pull)
 
 
 def _at_contacts(system: System, recorder: Recorder) -> str:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from saltus.flow.kernel.layout import (
     CHATTER_SPEED,
     GAUSS_NODES,
     GAUSS_WEIGHTS,
+    LEAST_LOSS,
     LOSSLESS,
-    SLOW,
     SLOWLY,
     TINY,
     ZERO,
@@ -32,9 +34,11 @@ from saltus.flow.kernel.steps import (
     forget,
     motion_end,
     natural_speed,
+    piece_end,
     record_event,
     record_shift,
     record_step,
+    slow_share,
 )
 from saltus.taylor import lean_jit
 
@@ -120,11 +124,16 @@ def leave_or_stay(motion):
 
 @lean_jit
 def contact_pull(motion, side, t):
-    """The second derivative of the gap at rest at contact on one side, and its rate of change."""
+    """The second derivative of the gap at rest at contact on one side, and the relative rates at
+    which it changes and bends: over a time t by t times the first and by the square of t times the
+    second."""
     b = motion.pull_series
     w = motion.recurrences
-    motion.contact_series(t, motion.origin, side, motion.env, motion.piece, b[0], w, 1)
-    return b[0, 0], b[0, 1]
+    motion.contact_series(t, motion.origin, side, motion.env, motion.piece, b[0], w, 2)
+    size = abs(b[0, 0])
+    if size == 0.0:
+        return 0.0, 0.0, 0.0
+    return b[0, 0], abs(b[0, 1]) / size, math.sqrt(abs(b[0, 2]) / size)
 
 
 @lean_jit
@@ -145,26 +154,27 @@ def flight_change(motion, side, t):
 
 
 @lean_jit
-def accumulation(motion, speed, t, tol):
+def accumulation(motion, speed, t, tol, seen):
     """The mode that follows a small impact, and, for an accumulation, the time left until its end.
 
     REST: impacts accumulate soon. From the gap's speed v on side s the time left is 2 v (1/abs(a_s)
     + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next
     side and e1, e2 the factors of the next two impacts; its error is of the order of the square of
     the time left times the relative rate of change of the accelerations, here in units of the time
-    of this change. CHATTER: impacts lose
-    nothing, are slower than CHATTER_SPEED, and the accelerations change slowly over two of them.
-    ARC: neither of these.
+    of this change. Where they do not change the time left is exact. No breakpoint of the records may
+    come before, and v must be less than `seen` times the lost share of the speed, above which impacts
+    are to be seen. CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations
+    change slowly over two of them. ARC: neither of these.
     """
     side = float(motion.side)
     piece = motion.piece
-    here, slope_here = contact_pull(motion, side, t)
+    here, slope_here, bend_here = contact_pull(motion, side, t)
     if here >= 0.0:
         return Mode.ARC, 0.0
     next_side, after = motion.reset(
         t, motion.origin, -speed / rate_of(motion, side), side, motion.env, piece
     )
-    there, slope_there = contact_pull(motion, next_side, t)
+    there, slope_there, bend_there = contact_pull(motion, next_side, t)
     if there >= 0.0 or after != after:
         return Mode.ARC, 0.0
     motion.pull = max(motion.pull, abs(here), abs(there))
@@ -176,26 +186,29 @@ def accumulation(motion, speed, t, tol):
         second = rate_of(motion, third_side) * last / next_speed
     loss = 1.0 - first * second
     cycle = 2.0 * speed * (1.0 / abs(here) + first / abs(there))
-    span = motion.natural_time
     damps, bends = flight_change(motion, side, t)
-    slopes = abs(slope_here / here) + abs(slope_there / there)
-    change = max(1.0 / span, damps) + slopes
+    slopes = slope_here + slope_there
+    bend = max(bend_here, bend_there)
     if abs(loss) < LOSSLESS:
         slow = speed < CHATTER_SPEED * natural_speed(motion)
         # at the top of a flight of the time t stiffness has changed it by the share (t bends)^2 / 8
-        slow = slow and cycle * change < SLOWLY and 0.125 * (cycle * bends) ** 2 < SLOWLY
+        slow = slow and cycle * (damps + slopes) + (cycle * bend) ** 2 < SLOWLY
+        slow = slow and 0.125 * (cycle * bends) ** 2 < SLOWLY
         return Mode.CHATTER if slow else Mode.ARC, 0.0
     if not loss > 0.0:
         return Mode.ARC, 0.0
     left = cycle / loss
-    change = max(1.0 / span, damps, bends) + slopes
-    return Mode.REST if 0.1 * (left * change) ** 2 <= tol else Mode.ARC, left
+    change = max(damps, bends, math.sqrt(2.0) * bend) + slopes
+    exact = 0.1 * (left * change) ** 2 <= tol and t + left <= piece_end(motion)
+    lost = max(LEAST_LOSS, 1.0 - math.sqrt(max(first * second, 0.0)))
+    return Mode.REST if exact and speed < seen * lost else Mode.ARC, left
 
 
 @lean_jit
-def slow_speed(motion, tol):
-    """The speed of the gap after an impact below which the end of an accumulation may be near."""
-    return max(SLOW * math.sqrt(tol), CHATTER_SPEED) * natural_speed(motion)
+def slow_speed(motion):
+    """The speed of the gap after an impact below which the end of an accumulation, or of chatter,
+    may be near."""
+    return max(slow_share(motion) * motion.fastest, CHATTER_SPEED * natural_speed(motion))
 
 
 @lean_jit
@@ -206,7 +219,7 @@ def rest_columns(motion, t, tol):
     A motion that begins next to rest comes to rest soon, unless impacts lose nothing: then there is
     no derivative to the state.
     """
-    mode, _ = accumulation(motion, TINY, t, tol)
+    mode, _ = accumulation(motion, TINY, t, tol, np.inf)
     detail = RestDetail.AT_ONCE if mode == Mode.REST else RestDetail.NEVER_AGAIN
     columns_at_event(motion, EventCode.REST, detail, t, float(motion.side))
     motion.event_labels[motion.recorded_events - 1, 3] = detail
@@ -287,10 +300,10 @@ def decide(motion, t_end):
     speed = rate_of(motion, float(motion.side)) * velocity
     if motion.pull == 0.0:  # the motion begins at the contact
         for i in range(motion.sides):
-            pull, _ = contact_pull(motion, 1.0 - 2.0 * i, t)
+            pull, _, _ = contact_pull(motion, 1.0 - 2.0 * i, t)
             motion.pull = max(motion.pull, abs(pull))
-    if speed < slow_speed(motion, tol):
-        mode, left = accumulation(motion, speed, t, tol)
+    if speed < slow_speed(motion):
+        mode, left = accumulation(motion, speed, t, tol, slow_share(motion) * motion.fastest)
         if mode == Mode.REST and t + left > motion_end(motion):
             mode = Mode.ARC  # the motion ends before the accumulation does
         if mode == Mode.REST:

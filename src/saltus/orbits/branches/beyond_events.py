@@ -86,14 +86,17 @@ class OtherSideSettings:
     # rounding.
     rounded: float = 1e-10
     doubt: float = 2.0  # The bracket of such a change, in units of the extrapolated way.
-    # Events of two neighbouring orbits are the same if their times differ by less than this.
+    # Events of two neighbouring orbits are the same if their times differ by less than this, in
+    # natural times.
     together: float = 1e-2
     # Where no step leads on, parameters so many steps ahead are tried: the system may refuse them.
     refused: float = 10.0
-    # A motion smaller than this sticks for good: slips grow as the third power of their duration.
+    # A motion smaller than this, in natural units, sticks for good: slips grow as the third power
+    # of their duration.
     standing: float = 1e-11
-    slow: float = 1e-2  # The largest speed of an impact that has just appeared.
-    # At a change of events something vanishes: it is at most this there.
+    # The largest speed of an impact that has just appeared, in natural units.
+    slow: float = 1e-2
+    # At a change of events something vanishes: it is at most this there, in natural units.
     witness: float = 1e-6
     # An orbit that is farther than this from a change of events, and has no orbits with other
     # events beside it, is at no change: the two orbits between which it was solved for lie on two
@@ -236,7 +239,7 @@ def _turns_at_an_impact(point: OrbitPoint) -> bool:
             abs(speed[inner.coordinates.index(each.coordinate)] - float(each.ground_speed))
             for each in pressed
         ]
-        if min(slips) < SETTINGS.probes[0]:
+        if min(slips) < SETTINGS.probes[0] * point.orbit.equations.natural.speed:
             return True
     return False
 
@@ -248,7 +251,7 @@ def _stands(point: OrbitPoint) -> bool:
     orbit = point.orbit
     return (
         bool(orbit.equations.system.model.frictions)
-        and orbit.highest - orbit.lowest < SETTINGS.standing
+        and orbit.highest - orbit.lowest < SETTINGS.standing * orbit.equations.natural.length
     )
 
 
@@ -599,17 +602,14 @@ def first_change(before: EventSequence, after: EventSequence) -> SpecialKind:
     """The kind of change at which two motions from one section part, by the first event that only
     one of them has.
     """
+    together = SETTINGS.together * before.natural_time
     for i in range(max(len(before.events), len(after.events))):
         here = [
             (found.times[i], found.events[i]) for found in (before, after) if i < len(found.events)
         ]
-        if (
-            len(here) == 2
-            and here[0][1] == here[1][1]
-            and abs(here[0][0] - here[1][0]) < SETTINGS.together
-        ):
+        if len(here) == 2 and here[0][1] == here[1][1] and abs(here[0][0] - here[1][0]) < together:
             continue
-        kinds = {event.kind for time, event in here if time - min(here)[0] < SETTINGS.together}
+        kinds = {event.kind for time, event in here if time - min(here)[0] < together}
         if EventCode.REVERSAL in kinds:
             return SpecialKind.CS
         names = {

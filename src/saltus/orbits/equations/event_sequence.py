@@ -15,7 +15,7 @@ from saltus.flow import EventCode, EventKind, Motion
 from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import System, mass_rows
+from saltus.systems import NaturalUnits, System, mass_rows
 
 CHANGES = (
     EventCode.IMPACT,
@@ -63,8 +63,9 @@ class EventSequence:
     events: tuple[OrbitEvent, ...]
     times: tuple[float, ...]
     period: float
+    natural_time: float
     # the least of the gaps, speeds, reactions and durations that become 0 where an event appears or
-    # is lost
+    # is lost, in natural units
     distance: float
     # where the section lies between its neighbouring events: 0 on one of them, 1/2 in the middle
     section_distance: float
@@ -112,6 +113,7 @@ class EventSequence:
 def sequence_of(
     motion: Motion,
     sampled: SampledMotion,
+    units: NaturalUnits,
     images: Sequence[int] | None = None,
     smooth: frozenset[int] = frozenset(),
 ) -> EventSequence:
@@ -138,20 +140,20 @@ def sequence_of(
             for event in events
         )
         times, period = times + tuple(time + period for time in times), 2.0 * period
-    apart = [FARTHEST]
+    apart = [FARTHEST * units.time]
     groups = modes.groups(motion.position, smooth)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
     later = min(time for time in apart if time > ONE_INSTANT * period)
     distance, witness = min(
-        sampled.nearest_touch(smooth),
-        (min(speeds, default=math.inf), "speed of an impact"),
-        (float(later), "time between events"),
+        sampled.nearest_touch(units, smooth),
+        (min(speeds, default=math.inf) / units.speed, "speed of an impact"),
+        (float(later) / units.time, "time between events"),
     )
     events, times = _in_order(events, times, ONE_INSTANT * period)
     return EventSequence(
-        events, times, period, max(distance, 0.0), section_distance, groups, witness
+        events, times, period, units.time, max(distance, 0.0), section_distance, groups, witness
     )
 
 

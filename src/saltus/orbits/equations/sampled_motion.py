@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.flow import EventCode, EventKind, Motion, contact_pull, modes_of
-from saltus.systems import System, natural_units, reactions, stick_margins
+from saltus.systems import NaturalUnits, System, natural_units, reactions, stick_margins
 
 # in each step; minima of parabolas through them have errors of the fourth power of their distance
 SAMPLES = 33
@@ -456,27 +456,32 @@ class SampledMotion:
             least.append(self._turning_of(course, sign * self.velocity[place], is_open))
         return float(min(least))
 
-    def nearest_touch(self, smooth: frozenset[int] = frozenset()) -> tuple[float, str]:
+    def nearest_touch(
+        self, units: NaturalUnits, smooth: frozenset[int] = frozenset()
+    ) -> tuple[float, str]:
         """How near the motion comes to a further change of its mode: the least of the inner minima
         of the gaps of open contacts and of the distances from surfaces, the speeds of sliding
         frictions, the reactions of closed contacts, and the forces that sticking frictions still
-        lack to slip. Surfaces of the numbers `smooth` do not count.
+        lack to slip, all in natural units. Surfaces of the numbers `smooth` do not count.
 
         For reactions and sticking frictions the value just after an event counts too. inf without
         such minima. The second part of the result names the quantity.
         """
         modes = modes_in(self.motion.system)
-        least = [(self._lowest_of(modes.gaps(self.side, smooth)), "gap")]
+        least = [(self._lowest_of(modes.gaps(self.side, smooth)) / units.length, "gap")]
         for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
             course[:, 0] = course[:, 0] - s * ground_speed
             speed = self._turning_of(course, s[:, None] * self.acceleration[place], s != 0)
-            least.append((speed, "sliding speed"))
+            least.append((speed / units.speed, "sliding speed"))
+        # what holds a single contact is given as an acceleration
+        alone = self.motion.system.model.has_one_contact
+        largest = units.acceleration if alone else float(units.forces.max())
         for chosen, forces in modes.holding(self.side):
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
             if steps.size:
                 force = self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces)
-                least.append((force, "reaction or friction force"))
+                least.append((force / largest, "reaction or friction force"))
         value, what = min(least)
         return float(value), what
 

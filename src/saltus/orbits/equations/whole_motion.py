@@ -313,7 +313,7 @@ class WholeMotionEquations(OrbitEquations):
             sampled = SampledMotion.of(motion)
             half = motion.at(0.5 * (motion.start + motion.time))
             images = self.images if self.signature.symmetric else None
-            events = sequence_of(motion, sampled, images, self.smooth_surfaces)
+            events = sequence_of(motion, sampled, self.natural, images, self.smooth_surfaces)
             middle = np.concatenate([np.atleast_1d(part) for part in half])
             extremes = self._extremes(sampled)
             middle[self.following] = 0.0

@@ -62,7 +62,8 @@ export class Run {
   naturalTime() {
     const { without_period: own, slow_load: slow, slow_time: longest } = this.engine.layout.natural;
     const ofLoad = this.length > 0 ? this.length / (2 * Math.PI) : Infinity;
-    return Math.min(ofLoad, slow === null && this.length > 0 ? Infinity : own ?? Infinity, slow !== null && this.length > slow ? longest : Infinity);
+    const time = Math.min(ofLoad, own ?? Infinity, slow !== null && this.length > slow ? longest : Infinity);
+    return Number.isFinite(time) ? time : 0;
   }
 
   /** When the motion starts and ends: forcing periods, and times within them. @param {number} duration @param {number} [periods] */
