@@ -195,3 +195,45 @@ def test_validity_says_where_contacts_that_act_on_one_another_close_together() -
     assert "contacts that act on one another close together" in str(motion.validity)
     one = saltus.simulate(system, x=-1.0, y=0.0, z=2.0, velocity=(1.0, 0.0, 0.0), duration=1.5)
     assert one.validity.together == 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class DampedBlocks(Blocks):
+    """The two blocks with a damper between them, which carries the jump of one to the other."""
+
+    damper: float = 0.4
+
+    def force(self, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
+        (a, b), (v, w), force = theta, velocity, load.force(t)
+        between = self.damper * (v - w)
+        return force - a - DAMPING * v - between, force - b - DAMPING * w + between
+
+
+@pytest.mark.parametrize("damper", [0.0, 0.4])
+def test_slips_at_one_instant_have_a_derivative_where_their_order_makes_no_difference(
+    damper: float,
+) -> None:
+    """Both blocks begin to slide at one instant. The static force is larger than the kinetic one, so
+    that the first to slide jerks the other by the damper. Differences from both sides tell.
+    """
+    system = system_of(DampedBlocks(kinetic=0.3, static=0.5, damper=damper), 1.2)
+    start = {"a": 0.0, "b": 0.0, "velocity": (0.0, 0.0), "duration": 5.0}
+    found = saltus.sensitivities(system, **start, tol=1e-13)
+    slips = [event.time for event in found.motion.events if event.kind == "slip"]
+    assert len(slips) == 2
+    assert slips[1] == pytest.approx(slips[0], abs=1e-12)
+
+    def end(a: float) -> np.ndarray:
+        motion = saltus.simulate(system, **{**start, "a": a}, tol=1e-14, dense=False)
+        return np.concatenate([motion.position, motion.velocity])
+
+    step = 1e-6
+    sides = [(end(step) - end(0.0)) / step, (end(0.0) - end(-step)) / step]
+    if damper == 0.0:
+        assert found.undefined is None
+        np.testing.assert_allclose(sides, [found.state[:, 0]] * 2, rtol=0, atol=2e-6)
+    else:
+        assert np.abs(sides[0] - sides[1]).max() > 1e-3
+        assert np.isnan(found.state[:, 0]).all()
+        assert found.undefined is not None
+        assert "ground_a and ground_b change at one instant" in found.undefined

@@ -39,6 +39,33 @@ class Hertzian(Falling):
         return load.push(t) - x**1.5
 
 
+class HertzianStop(saltus.ContactModel):
+    """Hertz's force behind a surface, where it begins, and without a series there."""
+
+    coordinates = ("x",)
+    surfaces = (Surface(name="sphere", coordinate="x", position=0.2),)
+
+    def force(self, t, x, velocity, load, sides):
+        return -0.5 * (1.0 + sides["sphere"]) * self.law(x - 0.2)
+
+    def law(self, depth):
+        return depth**1.5
+
+
+class RootedStop(HertzianStop):
+    """The same with a root."""
+
+    def law(self, depth):
+        return np.sqrt(depth)
+
+
+class RoundedStop(HertzianStop):
+    """The same, rounded off at the surface."""
+
+    def law(self, depth):
+        return (depth**2 + 1e-12) ** 0.75
+
+
 class TwiceRubbing(RubbingBlock):
     """Two frictions in one contact."""
 
@@ -68,6 +95,8 @@ PUSHED = Load(push=1.0)
         (lambda: System(model=Timed(), load=PUSHED), "time"),
         (lambda: System(model=TwiceRubbing(), impact=NewtonImpact(0.3)), "another one is"),
         (lambda: System(model=FastSide()), "x_velocity"),
+        (lambda: System(model=HertzianStop()), "at the surface 'sphere'"),
+        (lambda: System(model=RootedStop()), "has no Taylor series"),
     ],
 )
 def test_what_is_out_of_scope_is_refused_in_one_sentence(made, words):
@@ -82,6 +111,12 @@ def test_a_force_without_a_series_ends_the_motion_in_one_sentence():
     with pytest.raises(saltus.SaltusError) as refusal:
         saltus.simulate(System(model=Hertzian(), load=Load(push=-1.0)), x=0.1, duration=5.0)
     assert "\n" not in str(refusal.value)
+
+
+def test_hertz_s_law_is_taken_where_it_is_rounded_off():
+    motion = saltus.simulate(System(model=RoundedStop()), x=0.1, velocity=1.0, duration=1.0)
+    assert [str(event.kind) for event in motion.events] == ["crossing"]
+    assert motion.events[0].time == pytest.approx(0.1, abs=1e-12)
 
 
 def test_cycles_without_a_period_are_no_orbits_and_undecided():

@@ -265,9 +265,12 @@ class InGapCoordinates(ContactModel):
         return _stacked(q), _stacked(v)
 
     def gap_states(
-        self, t: Any, position: Any, velocity: Any, load: Any
+        self, t: Any, position: Any, velocity: Any, load: Any, units: tuple[float, float]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly."""
+        """The inverse of `own_states`, in which what contacts hold up to rounding is held exactly.
+
+        `units` are the natural ones of lengths and speeds (`units_of_gaps`).
+        """
         places, rates = self.gap_values(t, load, _values(position), _values(velocity))
         for place, name in self.gap_places.stands:
             there, back = (
@@ -275,7 +278,7 @@ class InGapCoordinates(ContactModel):
                 for x in (_values(position), self.own_values(t, load, places)[0])
             )
             # rounding grows without bound beside the turn
-            if not np.all(np.abs(back - there) < 1e-6):
+            if not np.all(np.abs(back - there) <= 1e-6 * (units[0] or 1.0)):
                 raise ParameterError(
                     (
                         f"a state lies beyond where {name}{TURNS}, as its {name}{INVERSE} leads "
@@ -284,8 +287,10 @@ class InGapCoordinates(ContactModel):
                     name,
                 )
         terms = (
-            _stacked([*self._each(values, True), *self.walls_at(t, load, order), 0.0])
-            for order, values in enumerate((_values(position), _values(velocity)))
+            _stacked([*self._each(values, True), *self.walls_at(t, load, order), unit])
+            for order, (values, unit) in enumerate(
+                zip((_values(position), _values(velocity)), units, strict=True)
+            )
         )
         return self.closed_exactly(
             *np.split(_stacked([*self._each(places), *self._each(rates)]), 2), *terms
@@ -297,8 +302,8 @@ class InGapCoordinates(ContactModel):
         """Coordinates and velocities of this model, changed in place: what contacts hold up to
         rounding is held exactly.
 
-        Rounding is a share of the largest term of a sum: of `q`, `v` and, where they are given, of
-        `terms` of coordinates and of velocities.
+        Rounding is a share of natural units and of the largest term of a sum: of `q`, `v` and,
+        where they are given, of `terms` of coordinates and of velocities.
         """
         length, speed = (
             np.maximum(np.abs(values).max(axis=0), np.abs(more).max(axis=0))

@@ -18,6 +18,7 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.systems.contact_model import Contact, Friction, Surface
 from saltus.systems.model import is_function, is_zero, reads_of
+from saltus.systems.system_units import units_of_gaps
 
 Part = Contact | Surface | Friction
 # A contact is closed, up to rounding, if both its gap and its speed are smaller than this share of
@@ -263,7 +264,10 @@ def with_sums(system: Any, states: np.ndarray) -> np.ndarray:
     """States at phase 0 with the dependent sums that follow from their other coordinates."""
     model = system.model
     load = system.load
-    return led(lambda t, q, v: model.gap_states(t, *model.own_states(t, q, v, load), load), states)
+    units = units_of_gaps(system)
+    return led(
+        lambda t, q, v: model.gap_states(t, *model.own_states(t, q, v, load), load, units), states
+    )
 
 
 def normal_of(system: Any, place: int) -> np.ndarray:

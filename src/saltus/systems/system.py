@@ -23,6 +23,7 @@ from saltus.systems.mirror import mirror_of
 from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_traces, check_works
 from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
+from saltus.systems.system_units import units_of_gaps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,7 +218,7 @@ class System:
         if self._in_gaps is None:
             return position, velocity
         model: Any = self._in_gaps.model
-        return model.gap_states(time, position, velocity, self.load)
+        return model.gap_states(time, position, velocity, self.load, units_of_gaps(self))
 
     def _with_rates(self, time: float, state: np.ndarray) -> np.ndarray:
         """A state (d,), changed in place: velocities of coordinates of first order are those that

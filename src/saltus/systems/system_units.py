@@ -69,6 +69,8 @@ class NaturalUnits:
         The time of its free oscillation, 1 / sqrt(abs(J)), or `time` without a stiffness.
     has_time
         Whether the system has a time; if not, `time` is 1 in the units of its user.
+    has_length
+        Whether it has a length, likewise.
     """
 
     lengths: np.ndarray
@@ -77,6 +79,7 @@ class NaturalUnits:
     own_time: float
     free_time: float
     has_time: bool = True
+    has_length: bool = True
 
     @cached_property
     def length(self) -> float:
@@ -120,7 +123,9 @@ class NaturalUnits:
         lengths, masses = (np.exp2(np.round(np.log2(x))) for x in (self.lengths, self.masses))
         times = (self.time, self.own_time, self.free_time)
         time, own_time, free_time = map(_power_of_two, times)
-        return NaturalUnits(lengths, time, masses, own_time, free_time, self.has_time)
+        return NaturalUnits(
+            lengths, time, masses, own_time, free_time, self.has_time, self.has_length
+        )
 
 
 def natural_units(system: System) -> NaturalUnits:
@@ -133,6 +138,14 @@ def natural_units(system: System) -> NaturalUnits:
     """
     found: NaturalUnits = system._remembered(natural_units, lambda: _found(system))
     return found
+
+
+def units_of_gaps(system: System) -> tuple[float, float]:
+    """The natural units of lengths and speeds, of which rounding of gaps is a share; 0 where there
+    are none."""
+    units = natural_units(system)
+    length = units.length if units.has_length else 0.0
+    return length, length / units.time
 
 
 def time_without_period(system: System) -> float:
@@ -195,7 +208,9 @@ def _found(system: System) -> NaturalUnits:
     own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
     free_time = 1.0 / math.sqrt(stiffest) if stiffest > 0.0 else time
     lengths = np.where(sound, lengths, 1.0)
-    return NaturalUnits(lengths, time, _masses(model), own_time, free_time, known > 0.0)
+    return NaturalUnits(
+        lengths, time, _masses(model), own_time, free_time, known > 0.0, bool(sound.any())
+    )
 
 
 def _places(model: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:

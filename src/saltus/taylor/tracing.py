@@ -28,6 +28,7 @@ from saltus.taylor.graph import (
     FRICTION,
     POINTWISE,
     Expr,
+    as_expr,
     check_size,
     combine,
     differentiate,
@@ -336,6 +337,7 @@ def trace(
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
     if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
+    _check_powers(result.acceleration, _edges(model, result.contact, coordinates))
     _trace_margins(result, twin, t, q, v, side, stop_at)
     if energy:
         result.margins["kinetic_energy"] = combine(
@@ -346,6 +348,37 @@ def trace(
         result.append_tangent(paths)
         check_size(result)
     return result
+
+
+def _edges(model: Any, contact: Expr | None, coordinates: tuple[Expr, ...]) -> dict[str, Any]:
+    """Where a motion begins anew: the coordinate and its value at each contact and surface, by the
+    names of these."""
+    found: dict[str, Any] = {}
+    if contact is not None:
+        found["the contact"] = coordinates[0], contact
+    for part in (*model.contacts, *model.surfaces) if model.holds_coordinates else ():
+        place = model.coordinates.index(part.coordinate)
+        what = f"the {type(part).__name__.lower()} {part.name!r}"
+        found[what] = coordinates[place], as_expr(part.position)
+    return found
+
+
+def _check_powers(accelerations: list[Expr], edges: dict[str, Any]) -> None:
+    """Refuse a root, or a power that is not whole, whose base is provably 0 at a contact or a
+    surface: it has no Taylor series there, and no motion gets beyond it.
+    """
+    if not edges:
+        return
+    for node in ordered(accelerations):
+        if node.op not in ("pow", "sqrt"):
+            continue
+        for what, (coordinate, place) in edges.items():
+            if _known_number(substitute(node.args[0], {coordinate: place})) == 0:
+                shown = "u**0.5" if node.op == "sqrt" else "u**p, such as u**1.5,"
+                raise TraceError(
+                    f"a power {shown} has no Taylor series where u is 0, and here u is 0 at {what}: write (u**2 + d**2)**(p/2) "
+                    "with a small length d, such as (u**2 + 1e-12)**0.75 for Hertz's law of a sphere"
+                )
 
 
 def _name_records(load: Any) -> None:

@@ -136,7 +136,7 @@ SAFETY = 0.9
 # largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for
 # a sine
 GAP = 0.65
-# The error of a step is relative to the size of the state, but absolute below this size.
+# The size of a state that is 0 and stays so, to which the error of a step is relative.
 SMALLEST = 1e-6
 # A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that the
 # acceleration is singular.

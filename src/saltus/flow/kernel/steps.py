@@ -74,7 +74,7 @@ def columns_at_event(motion, kind, detail, t, side):
 @lean_jit
 def expand(motion, t, side, order):
     """Expand the state in its Taylor series at time `t`; returns the size of the model's own part
-    of the state.
+    of the state (`state_size`).
 
     The velocities of coordinates of first order follow from the state, and are put into it; as
     their accelerations are derivatives of these, they need order 1 at least.
@@ -82,7 +82,6 @@ def expand(motion, t, side, order):
     q = motion.coordinate_series
     v = motion.velocity_series
     a = motion.acceleration_series
-    size = 0.0
     g = motion.gap_series
     m = motion.margin_series
     w = motion.recurrences
@@ -90,15 +89,34 @@ def expand(motion, t, side, order):
         order = max(order, 1)
     for i in range(motion.dof):
         q[i, 0], v[i, 0] = motion.coordinates[i], motion.velocities[i]
-        if i < motion.own - motion.first_order:
-            size = max(size, abs(q[i, 0]), abs(v[i, 0]))
-        elif i < motion.own:
-            size = max(size, abs(q[i, 0]))
     motion.series(t, motion.origin, side, motion.env, motion.piece, q, v, a, g, m, w, order)
     if motion.first_order > 0:
         for i in range(motion.dof):
             motion.velocities[i] = v[i, 0]
-    return size
+    return state_size(motion, 0, motion.own)
+
+
+@lean_jit
+def state_size(motion, first, last):
+    """The size of the rows from `first` to `last` of the state, to which the error of a step is
+    relative: a speed, so that it depends on units of length and time as a speed does.
+
+    It is the largest of the velocities and of sqrt(abs(q a)), which is the amplitude of the
+    velocity of an oscillation about 0, at its ends too. Where all of these are 0 it is the largest
+    acceleration, and SMALLEST if that is 0, too.
+    """
+    q = motion.coordinate_series
+    v = motion.velocity_series
+    a = motion.acceleration_series
+    size = 0.0
+    largest = 0.0
+    for i in range(first, last):
+        pull = abs(a[i, 0])
+        size = max(size, abs(v[i, 0]), math.sqrt(abs(q[i, 0])) * math.sqrt(pull))
+        largest = max(largest, pull)
+    if size > 0.0:
+        return size
+    return largest if largest > 0.0 else SMALLEST
 
 
 @lean_jit
@@ -137,7 +155,6 @@ def step_size(coefficients, order, size, tol):
     coefficient is not 0. The growth of the series is then taken from the upper half of the
     coefficients.
     """
-    size = max(size, SMALLEST)
     at_end = growth(coefficients, order, order, size)
     before_end = growth(coefficients, order - 1, order - 1, size)
     step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
@@ -181,7 +198,7 @@ def leaps(motion, t, side, h, size):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
     for i in range(motion.own - motion.first_order, motion.own):
         defect = max(defect, abs(v_end[i, 0] - horner(v[i], order, h)))
-    return defect > DEFECT * motion.tolerance * max(size, SMALLEST) / h
+    return defect > DEFECT * motion.tolerance * size / h
 
 
 @lean_jit
@@ -248,18 +265,14 @@ def column_step(motion):
     """The longest step that the series of the tangent's columns allow, each relative to its own
     size.
     """
-    q = motion.coordinate_series
     v = motion.velocity_series
-    a = motion.acceleration_series
     step = np.inf
     own = motion.own
     order = motion.order
     tol = ROUGHER * motion.tolerance
     for first in range(own, motion.dof, own):
-        size = 0.0
-        for i in range(first, first + own):
-            size = max(size, abs(q[i, 0]), abs(v[i, 0]), abs(a[i, 0]))
-        if 0.0 < size < np.inf:
+        size = state_size(motion, first, first + own)
+        if size < np.inf:
             step = min(step, step_size(v[first : first + own], order, size, tol))
     return step
 
@@ -581,4 +594,4 @@ def in_modes(motion, t, order):
             drive_mode(motion, by_inputs + i * given, states, order)
             for k in range(order + 2):
                 motion.margin_series[i, k] += motion.mode_series[states, k]
-    return size
+    return state_size(motion, 0, own)

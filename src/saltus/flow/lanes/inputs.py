@@ -24,6 +24,7 @@ from saltus.systems import (
     parameter_table,
     read_starts,
     substitute,
+    units_of_gaps,
 )
 
 ARGUMENTS = (  # of `simulate_many`: a misspelt one arrives among the coordinates
@@ -82,7 +83,10 @@ class Inputs:
         own = len(system.model.coordinates)
         starts = list(self.values.values())[: 2 * own]
         rest = list(self.values.items())[2 * own :]
-        sums = twin.model.gap_states(self.values["time"], starts[:own], starts[own:], twin.load)
+        units = units_of_gaps(system)
+        sums = twin.model.gap_states(
+            self.values["time"], starts[:own], starts[own:], twin.load, units
+        )
         called = state_names(twin.model.coordinates)
         return replace(
             self, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest)

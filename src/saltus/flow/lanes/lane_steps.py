@@ -96,14 +96,22 @@ def natural_speeds(lanes):
 
 @inline_jit
 def state_size(lanes):
-    """The largest coordinate or velocity, without the velocities of coordinates of first order."""
-    size = splat(SMALLEST)
-    second_order = lanes.sizes.own - lanes.sizes.first_order
-    for row in range(second_order):
-        size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
-    for row in range(second_order, lanes.sizes.own):
-        size = maximum(size, absolute(lanes.position[row]))
-    return size
+    """The size of the state, a speed (`steps.state_size`)."""
+    return rows_size(lanes, 0, lanes.sizes.own)
+
+
+@inline_jit
+def rows_size(lanes, first, last):
+    """The size of some rows of the state; the accelerations are coefficients of the velocities."""
+    square = splat(0.0)
+    largest = splat(0.0)
+    for row in range(first, last):
+        speed = lanes.velocities[row][0]
+        pull = absolute(lanes.velocities[row][1])
+        square = maximum(square, maximum(speed * speed, absolute(lanes.position[row]) * pull))
+        largest = maximum(largest, pull)
+    still = select(mask(bits(largest > 0.0)), largest, splat(SMALLEST))
+    return select(mask(bits(square > 0.0)), rough_root(square), still)
 
 
 @inline_jit
@@ -126,11 +134,8 @@ def column_step(lanes, first):
     """The step that the series of a column of the tangent allows, relative to its own size
     (`steps.column_step`).
     """
-    size = splat(ZERO_TERM)
+    size = rows_size(lanes, first, first + lanes.sizes.own)
     step = splat(np.inf)
-    for row in range(first, first + lanes.sizes.own):
-        size = maximum(size, maximum(absolute(lanes.position[row]), absolute(lanes.velocity[row])))
-        size = maximum(size, absolute(lanes.velocities[row][1]))
     for row in range(first, first + lanes.sizes.own):
         step = minimum(
             step,

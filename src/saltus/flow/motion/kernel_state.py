@@ -121,8 +121,7 @@ class KernelState:
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
         span = at.length, natural_time(request.system, at.length)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, *span, request.tol)
-        if NUDGE is not None:
-            self.array["nudged"], self.array["nudge"] = NUDGE
+        self.array["nudged"], self.array["nudge"] = NUDGE or request.nudge
 
     @property
     def numbers(self) -> Any:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +14,14 @@ import numpy as np
 from saltus.checks import Numbers, check_names, instants
 from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.compiled import Program
-from saltus.flow.kernel.layout import GrazingDetail, RestDetail
+from saltus.flow.kernel.layout import EventCode, GrazingDetail, RestDetail
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.motion import Motion, in_own_coordinates, state_names
 from saltus.flow.motion.simulate import MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, check_system, solved_motion, substitute
+from saltus.systems import System, check_system, natural_units, solved_motion, substitute
 from saltus.taylor import FREQUENCY
 
 if TYPE_CHECKING:
@@ -38,6 +38,17 @@ IRREGULAR = {
         "depends on which comes first, so that there are only one-sided derivatives"
     ),
 }
+
+
+IN_ORDER = (
+    "at time {time:.9g} {names} change at one instant, and what the motion does depends on which comes first, so that there "
+    "are only one-sided derivatives"
+)
+RUBBING = (EventCode.STICK, EventCode.SLIP, EventCode.REVERSAL)
+ONE_INSTANT = 1e-11  # events of frictions nearer than this are at one instant, in natural times
+MOVED = 4096.0  # units in the last place by which events are moved: more than rounding moves them
+# Derivatives in two orders are the same if their columns differ by no more than this share.
+SAME_ORDER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +289,80 @@ def sensitivities(
         dense=dense,
         sensitivities=paths,
     )
-    return derivatives_of(request, None, progress)
+    return in_any_order(request, derivatives_of(request, None, progress))
+
+
+def in_any_order(request: MotionRequest, found: Sensitivities) -> Sensitivities:
+    """Derivatives that do not depend on the order of events of several frictions at one instant:
+    where they do, the columns are nan.
+
+    Neighbouring motions have such events one after the other, in either order. The kernel takes one
+    order; the others are those in which the events of a friction happen later or earlier by some
+    rounding. Where all give one derivative it is the derivative.
+    """
+    ties = _ties(found.motion)
+    if not ties:
+        return found
+    system = found.motion.system
+    units = natural_units(system).state
+    columns = np.hstack([found.state, found.parameters])
+    # perturbations of a state in its units, of parameters as they are
+    given = np.append(units, np.ones(found.parameters.shape[1]))
+    scaled = columns * given / units[:, None]
+    size = np.abs(scaled).max(axis=0)
+    differs = np.zeros(columns.shape[1], dtype=bool)
+    first: tuple[float, str] | None = None
+    count = len(system.contact_model.contacts)
+    for time, rows, names in ties:
+        here = np.zeros_like(differs)
+        for row in rows[:-1]:
+            for units_moved in (MOVED, -MOVED):
+                other = derivatives_of(request.moved_events(count + row, units_moved), None)
+                beside = np.hstack([other.state, other.parameters]) * given / units[:, None]
+                here |= ~(np.abs(beside - scaled).max(axis=0) <= SAME_ORDER * size)
+        if here.any() and first is None:
+            first = time, names
+        differs |= here
+    if first is None:
+        return found
+    columns[:, differs] = math.nan
+    own = found.state.shape[1]
+    at_end = found.at_end.copy()
+    at_end[:, differs] = math.nan
+    return replace(
+        found,
+        state=columns[:, :own],
+        parameters=columns[:, own:],
+        at_end=at_end,
+        undefined=found.undefined or IN_ORDER.format(time=first[0], names=first[1]),
+    )
+
+
+def _ties(motion: Motion) -> list[tuple[float, list[int], str]]:
+    """The instants at which several frictions begin to slide, stick or turn, each with the numbers
+    of these frictions and their names; of one set of frictions the first alone.
+    """
+    if not motion.system.model.holds_coordinates or len(motion.system.contact_model.frictions) < 2:
+        return []
+    frictions = motion.system.contact_model.frictions
+    count = len(motion.system.contact_model.contacts)
+    codes = motion.events.codes
+    times = motion.events.times
+    together = ONE_INSTANT * natural_units(motion.system).time
+    found: dict[tuple[int, ...], float] = {}
+    begin = 0
+    for end in range(1, len(times) + 1):
+        if end < len(times) and times[end] - times[begin] <= together + 1e-14 * abs(times[end]):
+            continue
+        rubs = [bits for kind, bits in codes[begin:end].tolist() if kind in RUBBING]
+        rows = tuple(k for k in range(len(frictions)) if any(b >> count + k & 1 for b in rubs))
+        if len(rows) > 1:
+            found.setdefault(rows, float(times[begin]))
+        begin = end
+    return [
+        (time, list(rows), " and ".join(frictions[k].name for k in rows))
+        for rows, time in found.items()
+    ]
 
 
 def derivatives_of(

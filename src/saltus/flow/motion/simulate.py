@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from copy import copy
 from operator import is_
 from typing import Any, NamedTuple
 
@@ -187,6 +188,16 @@ class MotionRequest:
         self.sensitivities = sensitivities
         self.dense = dense
         self.dense_tangent = dense_tangent
+        # the row of a contact or friction, from 1 on, whose events are moved by units in the last
+        # place; 0 for none (`moved_events`)
+        self.nudge = (0, 0.0)
+
+    def moved_events(self, row: int, units: float) -> MotionRequest:
+        """The same request, where events of one contact or friction, numbered from 0 on, happen so
+        many units in the last place later: the other order of events at one instant."""
+        other = copy(self)
+        other.nudge = (1 + row, units)
+        return other
 
 
 def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
