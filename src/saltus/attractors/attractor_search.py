@@ -358,8 +358,8 @@ def find_attractors(
     window
         Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered
         evenly by initial states; with several coordinates a pair for each of them, then for each
-        velocity. By default half widths are 1.5 around the contact, or around 0 without one. With
-        several contacts the starts take turns as to which contacts are closed.
+        velocity. By default half widths are 1.5 natural units around the contact, or around 0
+        without one; of angles 1.5 rad, and 1.5 of their rates. With several contacts the starts take turns as to which contacts are closed.
     starts
         The number of initial states.
     max_period

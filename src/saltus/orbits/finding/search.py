@@ -186,8 +186,8 @@ def search_orbits(
     once for each value.
 
     Initial states are spread evenly (a sequence of low discrepancy) over a window of the states, as
-    in `find_attractors`; by default the window has half widths of 1.5 around the contact, or around
-    0 for a model without one. Motions that settle lead to the attracting orbits. Where motions in a
+    in `find_attractors`; by default the window has half widths of 1.5 natural units around the contact,
+    or around 0 for a model without one. Motions that settle lead to the attracting orbits. Where motions in a
     transient or in chaos come back near to an earlier state, Newton's method begins and finds
     repelling orbits of up to `repelling` forcing periods.
 
@@ -205,7 +205,7 @@ def search_orbits(
         How many initial states there are at each value.
     window
         A pair (low, high) for each coordinate, then for each velocity; by default half widths of
-        1.5 around the contact.
+        1.5 natural units around the contact.
     seed
         The seed of the initial states.
     repelling
