@@ -237,3 +237,28 @@ def test_slips_at_one_instant_have_a_derivative_where_their_order_makes_no_diffe
         assert np.isnan(found.state[:, 0]).all()
         assert found.undefined is not None
         assert "ground_a and ground_b change at one instant" in found.undefined
+
+
+def test_a_pipe_as_a_structure_has_the_orbit_and_the_branch_of_the_pipe() -> None:
+    """The same equations from matrices; all along the branch both ends meet their stops at once."""
+    stiffness = np.array([[1.0 + COUPLING, -COUPLING], [-COUPLING, 1.0 + COUPLING]])
+    model = saltus.Structure(
+        mass=np.eye(2),
+        stiffness=stiffness,
+        damping=DAMPING * np.eye(2),
+        names=("a", "b"),
+        forces={"force": {"a": 1.0, "b": 1.0}},
+        contacts=[
+            saltus.Contact(name=f"stop_{c}", coordinate=c, position=0.6, sign=-1) for c in "ab"
+        ],
+    )
+    system = system_of(model, 0.5)
+    orbit = saltus.find_orbit(system, **model.start([0.0, 0.0], [0.0, 0.0]))
+    pipe = saltus.find_orbit(system_of(Pipe(), 0.5), a=0.0, b=0.0)
+    assert orbit.amplitude == pytest.approx(pipe.amplitude, abs=1e-12)
+    found, expected = np.sort_complex(orbit.multipliers), np.sort_complex(pipe.multipliers)
+    apart = np.abs(found[:, None] - expected)
+    assert apart.min(axis=0).max() < 1e-9
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.0))
+    assert [str(end) for end in branch.ends] == ["bound 0.8", "bound 1"]
+    assert not branch.special
