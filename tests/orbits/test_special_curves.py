@@ -396,3 +396,45 @@ def test_curves_of_changes_of_two_stops_lead_through_those_of_their_branches():
                 if other.kind == point.kind
             )
             assert nearest < 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class VanDerPol(saltus.ContactModel):
+    """x'' = F - x + (mu - x^2) x'."""
+
+    mu: float = 0.2
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts = ()
+
+    def force(self, t, x, v, load):
+        return load.force(t) - x + (self.mu - x**2) * v
+
+
+def test_a_curve_of_tori_is_where_areas_neither_grow_nor_shrink() -> None:
+    """The product of both multipliers is exp of the integral of mu - x^2 over a period (Liouville):
+    a complex pair lies on the circle where x^2 has the mean mu, by SciPy's integration.
+    """
+    from scipy.integrate import solve_ivp
+
+    load = saltus.Load(frequency=1.1, force=saltus.Harmonic(0.3))
+    system = saltus.System(model=VanDerPol(), load=load)
+    branch = saltus.continue_orbit(saltus.find_orbit(system, x=0.0), FORCE, (0.1, 0.35))
+    (torus,) = branch.special
+    assert torus.kind == "NS"
+    curve = saltus.continue_special(torus, FREQUENCY, (1.06, 1.4), first_bounds=(0.05, 1.0))
+    assert sorted(curve.parameters[[0, -1], 1]) == [1.06, 1.4]
+    for point in curve.points[:: max(1, len(curve.points) // 6)]:
+        amplitude, frequency = point.parameters
+
+        def rates(t, y, amplitude=amplitude, frequency=frequency):
+            x, v, _ = y
+            return v, amplitude * np.sin(frequency * t) - x + (0.2 - x * x) * v, x * x
+
+        period = 2.0 * math.pi / frequency
+        begin = [point.orbit.x, point.orbit.velocity, 0.0]
+        end = solve_ivp(rates, (0.0, period), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        np.testing.assert_allclose(end[:2], begin[:2], atol=1e-9)
+        assert end[2] / period == pytest.approx(0.2, abs=1e-9)
+        assert abs(point.orbit.multipliers.imag).min() > 1e-3
