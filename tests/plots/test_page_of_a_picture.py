@@ -3,6 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import results_to_draw
 from PIL import Image
 
 import saltus
@@ -125,3 +126,17 @@ def test_size_and_dots_are_refused_for_given_axes(branch):
         with pytest.raises(ParameterError, match=f"{name} is that of a new figure"):
             saltus.plot(branch, ax=ax, **{name: value})
     plt.close(figure)
+
+
+def test_white_cells_are_in_the_legend_of_several_charts():
+    """White is rest alone."""
+    chart = results_to_draw.chart()
+    for resting in (True, False):
+        shown = chart.copy(deep=True)
+        shown["count"].values[:] = 0 if resting else 1
+        shown["unsettled"].values[:] = 0
+        figure = plots.new_figure()
+        figure.subplots()
+        plots.chart_legend(figure, [shown], [])
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert ("rest alone" in texts) is resting

@@ -379,13 +379,15 @@ def _fillings(charts: Sequence[Any]) -> list[Patch]:
     ]
 
 
+def _rest_patch() -> Patch:
+    """The legend's entry of white cells."""
+    return Patch(facecolor="white", edgecolor=LOOK.ink, linewidth=0.4, label="rest alone")
+
+
 def _cell_handles(chart: Any) -> list[Any]:
     """Legend entries of the marks that occur in the cells of a chart."""
     handles: list[tuple[Any, Any]] = [
-        (
-            _resting(chart),
-            Patch(facecolor="white", edgecolor=LOOK.ink, linewidth=0.4, label="rest alone"),
-        ),
+        (_resting(chart), _rest_patch()),
         *((with_outcome(chart, name), _filling(name)) for name in FILLINGS),
     ]
     if "beyond_line" in chart:
@@ -435,6 +437,8 @@ def chart_legend(
         handles.append(
             Line2D([], [], **DOT | {"markersize": 4.0}, label="end of motions, no curve")
         )
+    if any(_resting(chart).any() for chart in charts):
+        handles.append(_rest_patch())
     handles += _fillings(charts)
     if closed_form:
         handles.append(Line2D([], [], ms=3, label="closed form, high frequency", **CLOSED_FORM))

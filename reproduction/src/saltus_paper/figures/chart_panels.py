@@ -117,15 +117,18 @@ def _page(data: Any, name: str) -> LivingPage:
     return System.from_json(charts[0].attrs["system"]), charts, {"theta": 0.3, "periods": 40}
 
 
+# rad, of the colours: one scale for Figs. 14 and 15, so that their charts can be compared
+COLOUR_TOP = 5.0
+
+
 @styled
 def _draw(data: Any, height: float) -> Any:
     """A chart for each panel, two in a row, all in one scale of colours."""
     panels = list(data.children.items())
     figure = new_figure(LOOK.double_column, height)
     axes = figure.subplots(-(-len(panels) // 2), 2, squeeze=False).ravel()
-    top = max(
-        float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels
-    )
+    tops = [float(np.nanmax(tree["chart"]["amplitude"].values, initial=1e-3)) for _, tree in panels]
+    top = max(COLOUR_TOP, *tops)
     cells = None
     fast = False
     dots = 0
