@@ -60,9 +60,13 @@ MAY_IMPORT = {
         "config",
     },
 }
-# of the lanes
+# of the lanes, and for other processors
 TEXTS = {
-    f"saltus.taylor.{name}" for name in ("lane_memory", "lane_vectors", "load_tables", "vectors")
+    f"saltus.taylor.{name}"
+    for name in (
+        *("lane_memory", "lane_vectors", "load_tables", "vectors"),
+        *("elementary", "portable_text", "private_numba", "numba_types"),
+    )
 }
 HEAVY = (
     *("scipy", "numba", "xarray", "matplotlib", "h5netcdf", "zarr", "distributed"),

@@ -13,8 +13,8 @@ import pytest
 from numba import njit
 
 from saltus.errors import SaltusError
-from saltus.taylor import compiled_part
-from saltus.web import elementary, linker, object_files, objects
+from saltus.taylor import compiled_part, elementary
+from saltus.web import linker, object_files, objects
 
 RNG = np.random.default_rng(5)
 NODE = shutil.which("node")

@@ -52,7 +52,7 @@ def _machine() -> Block:
     from llvmlite.binding import get_host_cpu_name
 
     from saltus.checks import free_memory
-    from saltus.flow import available_cores
+    from saltus.flow import available_cores, card_seen
     from saltus.taylor.vectors import WIDTH
 
     rows: list[Row] = [
@@ -65,6 +65,7 @@ def _machine() -> Block:
             f"{WIDTH} motions at once in a vector"
             + (" (SALTUS_LANES)" if "SALTUS_LANES" in os.environ else ""),
         ),
+        ("card", card_seen()),
     ]
     return Block("Machine", rows)
 

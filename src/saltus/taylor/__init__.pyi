@@ -14,6 +14,7 @@ from .generated import WrittenFunction as WrittenFunction
 from .generated import equations_of as equations_of
 from .generated import llvm_text as llvm_text
 from .generated import load_functions as load_functions
+from .generated import made_for as made_for
 from .graph import RECORD_WIDTH as RECORD_WIDTH
 from .graph import Expr as Expr
 from .graph import check_size as check_size
@@ -40,6 +41,10 @@ from .memory import tape as tape
 from .numba_types import Pointer as Pointer
 from .numba_types import function_type as function_type
 from .numba_types import written_type as written_type
+from .portable_text import C_FUNCTIONS as C_FUNCTIONS
+from .portable_text import elementary_texts as elementary_texts
+from .portable_text import functions_of as functions_of
+from .portable_text import made_elsewhere as made_elsewhere
 from .private_numba import entry_point as entry_point
 from .private_numba import llvm_of as llvm_of
 from .private_numba import pointer as pointer

@@ -151,6 +151,9 @@ def _field(context: Any, builder: Any, kind: Any, value: Any, attr: str) -> Any:
     if isinstance(owner, types.Record):
         return context.get_getattr(owner, attr)(context, builder, owner, value, attr)
     found = owner.types[path[-1]]
+    linked = LINKED.get((owner.instance_class.__name__, attr))
+    if linked is not None:
+        return _linked(builder, linked)
     if isinstance(found, types.BaseNamedTuple):
         return builder.gep(value, [INDEX(0), INDEX(path[-1])], inbounds=True)
     return _element(context, builder, value, path[-1], found)
@@ -235,6 +238,18 @@ def function_type(signature: Any) -> PointedFunction:
 def written_type(signature: Any) -> PointedFunction:
     """The type of arguments that are functions of this signature, written for LLVM."""
     return PointedFunction(signature, written=True)
+
+
+# Fields of named tuples that are functions with which the text of a kernel is linked by their
+# names, so that LLVM knows them; the addresses in these fields are not read.
+LINKED: dict[tuple[str, str], str] = {}
+
+
+def _linked(builder: Any, name: str) -> Any:
+    """The address of a function by its name, whose type a call knows."""
+    unknown = ir.FunctionType(ir.VoidType(), [])
+    known = builder.module.globals.get(name) or ir.Function(builder.module, unknown, name)
+    return builder.ptrtoint(known, LONG)
 
 
 register_type(PointedFunction, LONG)

@@ -41,6 +41,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+from llvmlite import ir
 from numba import cfunc, njit, types
 from numba.extending import infer_getattr
 
@@ -179,6 +180,35 @@ def llvm_of(function: Any, signature: Any) -> tuple[str, str]:
     with _private("numba.core.compiler_lock", "global_compiler_lock"):
         result.library._ensure_finalized()
     return result.library.get_llvm_str(), result.fndesc.llvm_func_name
+
+
+def value_type(kind: Any) -> Any:
+    """LLVM's type of a value of one of numba's types."""
+    return _context().get_value_type(kind)
+
+
+def _context() -> Any:
+    return _private("numba.core.registry", "cpu_target").target_context
+
+
+def by_value(name: str, inner: str, signature: Any) -> str:
+    """LLVM's text of a function `name` that takes and returns values as they are, by a function of
+    this signature that `llvm_of` has written under the name `inner`, which must not fail.
+    """
+    context = _context()
+    module = context.create_module(name)
+    convention = context.call_conv
+    callee = ir.Function(
+        module, convention.get_function_type(signature.return_type, signature.args), inner
+    )
+    kinds = [value_type(kind) for kind in signature.args]
+    function = ir.Function(module, ir.FunctionType(value_type(signature.return_type), kinds), name)
+    builder = ir.IRBuilder(function.append_basic_block())
+    _, result = convention.call_function(
+        builder, callee, signature.return_type, signature.args, function.args
+    )
+    builder.ret(result)
+    return str(module)
 
 
 def name_attributes(kind: type, of: Callable[[Any, str], Any]) -> None:

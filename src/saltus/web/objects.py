@@ -8,15 +8,10 @@ process of its own: numba must not optimise it for this machine.
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from llvmlite import binding
@@ -24,33 +19,23 @@ from llvmlite import binding
 from saltus.errors import SaltusError
 from saltus.flow import PortableKernel
 from saltus.taylor import (
+    C_FUNCTIONS,
     WrittenFunction,
-    compiled_part,
     digest,
+    elementary,
+    elementary_texts,
+    functions_of,
     kept_bytes,
     llvm_of,
     llvm_text,
+    made_elsewhere,
+    portable_text,
     source_of,
 )
-from saltus.web import elementary
 
 TARGET = "wasm32-unknown-unknown"
 # all browsers of the last years have them
 FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+mutable-globals"
-C_FUNCTIONS = {
-    **dict.fromkeys(("sin", "cos", "exp", "log", "sinh", "cosh", "tanh", "atan"), 1),
-    "pow": 2,
-    "numba_nextafter": 2,
-}
-# The process that writes the text of a kernel does not optimise it, and knows neither this machine's
-# processor nor the order in which Python's sets happen to be: the text is the same on every machine.
-WRITER = {
-    "NUMBA_OPT": "0",
-    "NUMBA_LLVM_REFPRUNE_PASS": "0",
-    "NUMBA_CPU_NAME": "generic",
-    "NUMBA_CPU_FEATURES": "",
-    "PYTHONHASHSEED": "0",
-}
 # What numba's code calls besides: memory that is never given back, but used again by the next call,
 # and a root.
 RUNTIME = """
@@ -159,6 +144,7 @@ def kernel_object(several: bool) -> bytes:
     sources = [
         PortableKernel(several).source,
         source_of(elementary),
+        source_of(portable_text),
         source_of(sys.modules[__name__]),
     ]
     return kept_bytes(
@@ -169,75 +155,19 @@ def kernel_object(several: bool) -> bytes:
 
 def _made_elsewhere(several: bool) -> bytes:
     """A kernel's object file, made by a new process."""
-    with tempfile.TemporaryDirectory(prefix="saltus-page-") as folder:
-        path = Path(folder) / "kernel.o"
-        code = f"from saltus.web import objects; objects.make_kernel({several!r}, {str(path)!r})"
-        done = subprocess.run(
-            [sys.executable, "-c", code], env=os.environ | WRITER, capture_output=True, text=True
-        )
-        if done.returncode or not path.exists():
-            last = (done.stderr.strip().splitlines() or ["it gave no reason"])[-1]
-            raise SaltusError(f"the kernel could not be compiled for a page: {last:.200}")
-        return path.read_bytes()
+    call = f"from saltus.web import objects; objects.make_kernel({several!r}, path)"
+    return made_elsewhere(call, "the kernel for a page")
 
 
 def make_kernel(several: bool, path: str) -> None:
     """Write a kernel's object file; called in a process of its own."""
     motion = PortableKernel(several)
     texts = [RUNTIME]
-    for text, name in _written(motion.source):
+    for function, signature in functions_of(motion.source):
+        text, name = llvm_of(function, signature)
         texts += [text, advance_text(name, motion.arguments)]
-    texts += [part for text in _elementary_texts() for part in text]
+    texts += [part for text in elementary_texts() for part in text]
     Path(path).write_bytes(object_code(texts, ["advance", "rewind", "sqrt", *C_FUNCTIONS]))
-
-
-def _written(source: str) -> list[tuple[str, str]]:
-    """LLVM's text, and the name there, of each function of a kernel's source that is called from
-    outside.
-    """
-    made: list[tuple[str, str]] = []
-
-    def cached_jit(signature: Any, **options: Any) -> Any:
-        def decorated(function: Any) -> Any:
-            made.append(llvm_of(function, signature))
-            return function
-
-        return decorated
-
-    module = ModuleType("saltus_page")
-    vars(module)["cached_jit"] = cached_jit
-    exec(
-        compile(source.replace("import cached_jit, ", "import "), "saltus_page", "exec"),
-        vars(module),
-    )
-    return made
-
-
-def _elementary_texts() -> Iterator[tuple[str, str]]:
-    """LLVM's text of each elementary function, and that of the function of the C library's name
-    which calls it.
-    """
-    space: dict[str, Any] = dict(vars(elementary))
-    source = "from saltus.taylor.private_numba import jit\n" + compiled_part(elementary)
-    exec(compile(source, "saltus_elementary", "exec"), space)
-    from numba import types
-
-    for name, count in C_FUNCTIONS.items():
-        function = space[f"{name.removeprefix('numba_')}_function"]
-        text, inner = llvm_of(function.py_func, types.float64(*[types.float64] * count))
-        values = ", ".join(f"double %x{i}" for i in range(count))
-        yield (
-            text,
-            f"""
-declare i32 @"{inner}"(ptr, ptr, {", ".join(["double"] * count)})
-define double @{name}({values}) {{
-  %result = alloca double
-  %problem = alloca ptr
-  %status = call i32 @"{inner}"(ptr %result, ptr %problem, {values})
-  %value = load double, ptr %result
-  ret double %value
-}}""",
-        )
 
 
 def advance_text(inner: str, arguments: list[dict[str, Any]]) -> str:

@@ -91,10 +91,11 @@ def load_driver(several: bool = False) -> Callable[..., None]:
     """The driver of all lanes, `run_lanes` of `driver.py`, for models with one or several contacts;
     it releases Python's lock.
     """
-    return entry_point(load_module("lanes", _driver_text(several)).run_lanes)
+    return entry_point(load_module("lanes", driver_text(several)).run_lanes)
 
 
-def _driver_text(several: bool) -> str:
+def driver_text(several: bool) -> str:
+    """The source of the driver."""
     step = (contact_layout, lane_impacts, contacts_step) if several else (lane_step,)
     common = (kernel_layout, memory, load_tables, lane_steps, sampling)
     return _text(several, *common, *step, forcing_periods, driver)
@@ -113,7 +114,7 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 
     Further calls return the same process, which may have ended since.
     """
-    if is_compiled(module_name("lanes", _driver_text(several))):
+    if is_compiled(module_name("lanes", driver_text(several))):
         return None
     try:
         # the other process finds packages where this one does
@@ -128,9 +129,15 @@ def compile_driver_aside(several: bool) -> subprocess.Popen[bytes] | None:
 def load_helpers(several: bool = False) -> tuple[Any, ...]:
     """The functions that the driver calls for one lane, in the order of `Helpers`."""
     names = ["first_root_of", "turning_range", "scalar_motion"]
+    names += ["contacts_impact"] if several else []
+    module = load_module("lane_helpers", helpers_text(several))
+    return tuple(pointer(getattr(module, name)) for name in names)
+
+
+def helpers_text(several: bool) -> str:
+    """The source of these functions."""
     parts = [kernel_layout, memory, load_tables, roots]
     if several:
-        names.append("contacts_impact")
         parts += [
             steps,
             contact_layout,
@@ -142,8 +149,7 @@ def load_helpers(several: bool = False) -> tuple[Any, ...]:
         parts += [handoff, scalar_impact]
     else:
         parts += [one_contact_handoff, handoff]
-    module = load_module("lane_helpers", _text(several, *parts))
-    return tuple(pointer(getattr(module, name)) for name in names)
+    return _text(several, *parts)
 
 
 def load_lane_functions(trace: Trace) -> tuple[MemoryPlan, tuple[Any, ...]]:

@@ -26,6 +26,7 @@ from __future__ import annotations
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.forcing_periods import arrive, fill, finish, records_of, unresolved
 from saltus.flow.lanes.function_types import RUN_LANES, shared
+from saltus.flow.lanes.memory import Control, is_over
 from saltus.flow.one_contact.lane_step import step_all
 from saltus.taylor import cached_jit, inline_jit, lean_jit
 from saltus.taylor.lane_memory import one
@@ -93,12 +94,13 @@ def go_on(lane, away, captured, checked, past):
     if checked and unresolved(lane):
         status = Status.UNRESOLVED
     elif away:
+        control[Control.CALLS] += 1
         scalar_motion = lane.helpers.scalar_motion
         status, detail = scalar_motion(lane)
     if status == Status.PAUSED and lane.now >= lane.period_end:
         before = lane.periods_done
         status, detail = arrive(lane, past)
-        control[1] += int(lane.periods_done - before)
+        control[Control.PERIODS] += int(lane.periods_done - before)
     if status == Status.PAUSED and captured:
         status = Status.CAPTURED
     if status != Status.PAUSED:
@@ -106,13 +108,12 @@ def go_on(lane, away, captured, checked, past):
 
 
 @lean_jit
-def run_all(lanes):
-    """Run all jobs of a group."""
-    following = 0
+def run_all(lanes, following):
+    """Run the jobs of a group from number `following` on, and those that are in its lanes."""
     control = lanes.work.control
     while True:
         following = fill_all(lanes, following)
-        if lanes.busy == 0 or control[0] != 0:
+        if lanes.busy == 0 or is_over(control):
             return
         away = 0
         captured = 0
@@ -129,7 +130,7 @@ def run_all(lanes):
                 free = past & bits(lanes.period < lanes.passed_together)
                 if free:
                     begin_together(lanes, free)
-                    control[1] += lane_count(free)
+                    control[Control.PERIODS] += lane_count(free)
                     past &= ~free
             checked = bits(lanes.impacts > lanes.next_check) & lanes.busy & ~past
             arrived = bits(lanes.now >= lanes.period_end) & lanes.busy
@@ -143,4 +144,4 @@ def run_all(lanes):
 @cached_jit(RUN_LANES, nogil=True)
 def run_lanes(group):
     """Run all jobs of a group, a tuple `LaneGroup` (`memory.py`)."""
-    run_all(shared(group))
+    run_all(shared(group), 0)

@@ -13,6 +13,8 @@ import numpy as np
 
 from saltus.checks import Numbers, check_memory, check_number, check_work
 from saltus.errors import ParameterError
+from saltus.flow.cuda.devices import read_device, target_of
+from saltus.flow.cuda.launch import run_on
 from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import SHORTEST, Mode, Status
 from saltus.flow.lanes.capture_speeds import capture_speeds
@@ -71,6 +73,7 @@ def simulate_many(
     until: Iterable[str] = (),
     sensitivities: Iterable[str] | None = None,
     threads: int | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
     **coordinates: Any,
 ) -> xarray.Dataset:
@@ -103,6 +106,9 @@ def simulate_many(
         "load.frequency", and an end at a margin with the margin.
     threads
         How many cores to use; by default all.
+    device
+        "cuda" follows the motions on a card, of models with at most one contact (`docs/howto/gpu.md`);
+        "auto" does so where there is one and it is faster.
     velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
         As for `simulate`; velocity a tuple of
         arrays where there are several coordinates.
@@ -135,7 +141,7 @@ def simulate_many(
         until=read_names("until", until, Until),
         paths=None if sensitivities is None else read_names("sensitivities", sensitivities),
     )
-    side, threads = read_side(side), read_threads(threads)
+    side, threads, device = read_side(side), read_threads(threads), read_device(device)
     inputs = read_inputs(system, velocity, time, parameters, coordinates)
     inner = system.in_gap_coordinates
     if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
@@ -146,7 +152,15 @@ def simulate_many(
         )
     return to_dataset(
         run_ensemble(
-            system, inputs, options, threads, progress, duration=duration, side=side, last=last
+            system,
+            inputs,
+            options,
+            threads,
+            progress,
+            duration=duration,
+            side=side,
+            last=last,
+            device=device,
         )
     )
 
@@ -162,6 +176,7 @@ def run_ensemble(
     side: int = 0,
     last: int | str = 1,
     captured: np.ndarray | None = None,
+    device: str = "cpu",
 ) -> EnsembleResult:
     """Compile the code that is not there yet, and run the trajectories; `captured` holds speeds of
     capture that are known.
@@ -193,8 +208,13 @@ def run_ensemble(
     lanes = compiled_lanes(system, run, options, kept)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
-    ends = lanes.run(jobs, threads, progress, total=float(np.sum(spans + 1)))
-    return EnsembleResult(own, given, options, jobs, ends)
+    total = float(np.sum(spans + 1))
+    target = target_of(device, run, inputs.size)
+    if target is None:
+        ends = lanes.run(jobs, threads, progress, total)
+        return EnsembleResult(own, given, options, jobs, ends)
+    ends = run_on(target, lanes, jobs, threads, progress, total)
+    return EnsembleResult(own, given, options, jobs, ends, target.name)
 
 
 def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:

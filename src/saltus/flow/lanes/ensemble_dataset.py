@@ -84,6 +84,7 @@ def to_dataset(result: EnsembleResult) -> xarray.Dataset:
     if result.options.paths is not None:
         _add_derivatives(writer, result, result.options.paths)
     known: dict[str, Any] = {"kind": "ensemble", "Conventions": "CF-1.8"}
+    known |= {"device": result.device} if result.device else {}
     attributes = {"title": "ensemble computed by saltus"} | provenance(
         system, tol=result.options.tol, **known
     )

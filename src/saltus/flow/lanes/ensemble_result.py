@@ -44,6 +44,7 @@ class EnsembleResult:
     options: EnsembleOptions
     jobs: Jobs
     ends: Ends
+    device: str = ""  # the card that has followed the motions
 
     @property
     def rows(self) -> int:

@@ -15,7 +15,7 @@ from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.kernel.memory import MOTION, EventBuffers, StepBuffers
 from saltus.flow.kernel.roots import SIMPLE, first_root, horner, scale_gap
 from saltus.flow.lanes.function_types import LANE_ROOT, SCALAR_MOTION, TURNING_RANGE
-from saltus.flow.lanes.memory import NO_ROOT, TOUCH, natural_time_of
+from saltus.flow.lanes.memory import NO_ROOT, TOUCH, Control, natural_time_of
 from saltus.flow.one_contact.lane_handoff import (
     begin_scalar,
     end_scalar,
@@ -242,7 +242,8 @@ def scalar_motion(lane):
         detail = record_events(lane, motion, events)
         record_extrema(lane, motion, steps)
         many = lane.impacts > lane.next_check  # then the driver checks their number
-        if (status != Status.FULL and status != Status.PAUSED) or many or lane.work.control[0] != 0:
+        over = many or lane.work.control[Control.MOST_PERIODS] == 0
+        if (status != Status.FULL and status != Status.PAUSED) or over:
             break
     put_state(lane, motion, state)
     end_scalar(lane, motion)

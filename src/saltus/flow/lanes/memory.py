@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from saltus.flow.kernel.layout import SERIES_LENGTH
-from saltus.taylor import RECORD_WIDTH, lean_jit
+from saltus.taylor import RECORD_WIDTH, inline_jit, lean_jit
 
 Slot = tuple[str, int]  # an array of the memory, and one of its slots
 
@@ -292,7 +293,21 @@ class Work(NamedTuple):
     # accelerations at the end, then the shifts of the last event along each column
     rates: np.ndarray
     samples: np.ndarray
-    control: np.ndarray  # whether to stop, forcing periods done so far
+    control: np.ndarray  # see `Control`
+
+
+class Control(IntEnum):
+    """The numbers with which a call of the driver is bounded: it returns when as many forcing
+    periods, or calls of the scalar kernel, are done.
+    """
+
+    MOST_PERIODS = 0  # 0: return now
+    PERIODS = 1  # done so far
+    MOST_CALLS = 2
+    CALLS = 3
+
+
+UNBOUNDED = [1 << 62, 0, 1 << 62, 0]  # of a call that is ended by its last trajectory
 
 
 class LaneGroup(NamedTuple):
@@ -360,6 +375,16 @@ class Closing(NamedTuple):
 
 
 # --- compiled from here on ---------------------------------------------------
+
+
+@inline_jit
+def is_over(control):
+    """Whether a call of the driver has done what it may."""
+    return (
+        control[Control.PERIODS] >= control[Control.MOST_PERIODS]
+        or control[Control.CALLS] >= control[Control.MOST_CALLS]
+    )
+
 
 # in a natural time: more are an accumulation that is not resolved
 MOST_IMPACTS = 1e6

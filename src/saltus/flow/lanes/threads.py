@@ -34,13 +34,16 @@ from saltus.flow.lanes.memory import (
     FLAGS,
     LONGEST_RECURRENCE,
     ROW,
+    UNBOUNDED,
     Code,
+    Control,
     Helpers,
     LaneGroup,
     LaneSettings,
     LaneSizes,
     MemoryPlan,
     Work,
+    is_over,
 )
 from saltus.progress import LOOK_INTERVAL, Progress, silent
 from saltus.taylor.vectors import CACHE_LINE, WIDTH
@@ -191,16 +194,10 @@ class Lanes:
             After Ctrl-C, within a step of every lane.
         """
         n = len(jobs)
-        own = self.own
         # starting a thread costs time even if it has no lanes
         threads = max(1, min(threads, math.ceil(n / WIDTH)))
-        ends = Ends(
-            np.empty((n, jobs.states.shape[1])),
-            np.zeros(n, dtype=END),
-            np.zeros((n, own + self.program.structure.sizes.columns)),
-            np.empty((n, self.kept, len(self.sampled))),
-        )
-        controls = [np.zeros(2, dtype=np.int64) for _ in range(threads)]
+        ends = self.no_ends(n)
+        controls = [np.array(UNBOUNDED) for _ in range(threads)]
         waiting = chunks(n, threads, self.kept)
         lock = threading.Lock()
         compile_everything(self.several)  # here, not in each thread
@@ -212,16 +209,26 @@ class Lanes:
                 workers.append(pool.submit(self._work, jobs, ends, waiting, lock, control))
             while wait(workers, LOOK_INTERVAL).not_done:
                 if total > 0:
-                    progress(min(1.0, sum(int(c[1]) for c in controls) / total), WHAT)
+                    progress(min(1.0, sum(int(c[Control.PERIODS]) for c in controls) / total), WHAT)
         except BaseException:
             for control in controls:
-                control[0] = 1
+                control[Control.MOST_PERIODS] = 0
             wait(workers)
             raise
         for worker in workers:
             worker.result()
         progress(1.0, WHAT)
         return ends
+
+    def no_ends(self, n: int) -> Ends:
+        """Room for the ends of so many trajectories."""
+        sizes = self.program.structure.sizes
+        return Ends(
+            np.empty((n, 2 * sizes.dof)),
+            np.zeros(n, dtype=END),
+            np.zeros((n, self.own + sizes.columns)),
+            np.empty((n, self.kept, len(self.sampled))),
+        )
 
     @property
     def several(self) -> bool:
@@ -242,22 +249,27 @@ class Lanes:
         control: np.ndarray,
     ) -> None:
         """Run chunk after chunk until there are none."""
-        group = self._group(control)
+        group = self.group(control)
         while True:
             with lock:
                 rows = next(waiting, None)
-            if rows is None or control[0]:
+            if rows is None or is_over(control):
                 return
             self._run_chunk(group, jobs, ends, rows)
 
     def _run_chunk(self, group: LaneGroup, jobs: Jobs, ends: Ends, rows: slice) -> None:
+        work = self.work(jobs, ends, rows, group.work.control)
+        load_driver(self.several)(group._replace(work=work))
+        ends.samples[rows] = work.samples[:, :, self.sampled]
+
+    def work(self, jobs: Jobs, ends: Ends, rows: slice, control: np.ndarray) -> Work:
+        """What the driver is given of some jobs, and where it writes how they end."""
         states = np.ascontiguousarray(jobs.states[rows])
         parameters = np.tile(self.parameters, (len(states), 1))
         for place, column in jobs.columns.items():
             parameters[:, place] = column[rows]
         tables = tuple(table if len(table) == 1 else table[rows] for table in jobs.records)
-        samples = np.full((len(states), self.kept, 2 * self.own + 4), np.nan)
-        work = Work(
+        return Work(
             states=states,
             jobs=jobs.rows[rows],
             parameters=parameters,
@@ -265,16 +277,12 @@ class Lanes:
             last=ends.states[rows],
             ends=ends.rows[rows],
             rates=ends.rates[rows],
-            samples=samples,
-            control=group.work.control,
+            samples=np.full((len(states), self.kept, 2 * self.own + 4), np.nan),
+            control=control,
         )
-        load_driver(self.several)(group._replace(work=work))
-        ends.samples[rows] = samples[:, :, self.sampled]
 
-    def _group(self, control: np.ndarray) -> LaneGroup:
-        """A group of lanes for one thread, still without work; `control` = [whether to stop,
-        forcing periods done so far].
-        """
+    def group(self, control: np.ndarray) -> LaneGroup:
+        """A group of lanes for one thread, still without work."""
         trace = self.program.trace
         own = self.own
         plan = self.plan

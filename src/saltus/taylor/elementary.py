@@ -1,4 +1,4 @@
-"""The elementary functions of the page: equal in every browser to the last bit, as they are built
+"""The elementary functions of pages and of cards: equal in every browser to the last bit, as they are built
 from sums and products alone.
 
 Browsers round sines, exponentials and powers differently, and a page must show the same motion in
@@ -6,7 +6,7 @@ all of them. Errors are below one unit in the last place, of tanh below 2.1
 (`tests/web/test_elementary.py` compares with 40 digits). Arguments of sine and cosine are reduced
 by as many digits of pi as they need. All constants are computed here, in whole numbers.
 
-The compiled part goes into one module with LLVM's text of the kernels (`objects.py`), under the
+The compiled part goes into one module with LLVM's text of the kernels (`portable_text.py`), under the
 names of the C library.
 """
 
@@ -18,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from saltus.taylor import jit
+from saltus.taylor.kernels import jit
 
 
 def _arctangent(x: Fraction) -> Fraction:

@@ -1,0 +1,231 @@
+"""The text for a card, followed on this processor, against the lanes; and the PTX that it becomes.
+
+No card is needed. What a motion does may not depend on where launches are cut, nor on which of two
+texts follows it: both are the lanes' own, of widths that differ. Only the elementary functions and
+fused multiply-adds may round otherwise, so motions agree to rounding times what they magnify.
+"""
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from lane_cases import FAMILIES, amplification, end_state
+
+import saltus
+from saltus.errors import ParameterError, SaltusError
+from saltus.flow.cuda import devices
+from saltus.flow.cuda.launch import LaunchSettings, example_of, run_on
+from saltus.flow.cuda.targets import Card, Host
+from saltus.flow.cuda.thread_code import OLDEST, thread_code
+from saltus.flow.kernel.compiled import limits_of, program
+from saltus.flow.lanes import ensemble
+from saltus.flow.lanes.inputs import read_inputs
+from saltus.flow.lanes.options import EnsembleOptions
+
+TOL = 1e-12
+ALL = {"sample": ("state", "extrema", "speed", "impact_count"), "last": "all"}
+EARLY = {"until": ("rest", "settled")}
+COUNTED = ("impact_count", "stop", "side", "grazings")
+MOST_LOCAL = 1 << 14  # bytes of a thread in one function
+MOST_BYTES = 16  # stores of single bytes: of truths, in errors of memory
+
+
+@pytest.fixture(scope="module")
+def host():
+    return Host()
+
+
+def on_host(monkeypatch, host):
+    """Let ensembles run in the threads of this processor."""
+    monkeypatch.setattr(ensemble, "target_of", lambda device, run, motions: host)
+
+
+def agree(name, monkeypatch, host, count=150, **options):
+    """Compare random cases of a family, followed both ways."""
+    rng = np.random.default_rng(11)
+    cases = FAMILIES[name](rng, count)
+    lanes = cases.in_lanes(tol=TOL, **options)
+    magnified = amplification(cases, lanes, TOL, rng)
+    with monkeypatch.context() as patch:
+        on_host(patch, host)
+        threads = cases.in_lanes(tol=TOL, **options)
+    calm = magnified < 100.0
+    assert calm.sum() > count / 4
+    for counted in COUNTED:
+        same = lanes[counted].values == threads[counted].values
+        assert same[calm].all(), counted
+        assert same.mean() > 0.98, counted
+    # below it rounding magnifies; a last bit of each step is 1e-15
+    allowed = 1e-12 * np.maximum(magnified, 1.0)[:, None]
+    found = end_state(lanes, cases.system) - end_state(threads, cases.system)
+    assert (np.abs(found) <= allowed)[calm].all()
+    assert threads.attrs["device"] == host.name
+    for name in set(lanes.data_vars) - set(COUNTED):
+        if lanes[name].dims == lanes["time"].dims and lanes[name].dtype.kind == "f":
+            a, b = lanes[name].values[calm], threads[name].values[calm]
+            np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["paper", "rocking"])
+def test_motions_in_threads_are_those_in_lanes(name, monkeypatch, host):
+    agree(name, monkeypatch, host, **ALL, **EARLY)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("more", [{}, ALL | EARLY], ids=["ends", "all"])
+@pytest.mark.parametrize("name", [name for name in FAMILIES if name != "pair"])
+def test_all_models_with_one_contact_agree(name, more, monkeypatch, host):
+    agree(name, monkeypatch, host, count=300, **more)
+
+
+# --- launches ----------------------------------------------------------------
+
+
+def oscillators():
+    """A metainterface whose motions lose speed at impacts: its lanes and jobs."""
+    system = saltus.System(
+        model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
+        impact=saltus.VelocityReduction(0.9),
+    )
+    options = EnsembleOptions(
+        tol=TOL, periods=20, limits=limits_of(system, ()), sample=(), until=(), paths=None
+    )
+    run = program(system, options.limits, None)
+    states = {"theta": np.linspace(-1.0, 1.0, 60)}
+    inputs = read_inputs(system, np.linspace(-0.5, 0.5, 60), 0.0, None, states)
+    jobs = ensemble._jobs(system, run, inputs, 20, None, 0)
+    return ensemble.compiled_lanes(system, run, options, 1), jobs
+
+
+def test_launches_change_nothing_wherever_they_are_cut(host):
+    lanes, jobs = oscillators()
+    whole = run_on(host, lanes, jobs, 1, settings=LaunchSettings(periods=1000))
+    for periods, most in ((1, 1 << 20), (7, 13)):
+        cut = run_on(host, lanes, jobs, 1, settings=LaunchSettings(periods, most_motions=most))
+        assert (cut.states == whole.states).all()
+        assert (cut.rows == whole.rows).all()
+
+
+def test_motions_with_many_rare_events_are_left_to_the_lanes(host):
+    lanes, jobs = oscillators()
+    left = run_on(host, lanes, jobs, 1, settings=LaunchSettings(calls=0))
+    own = lanes.run(jobs, 1)
+    assert (left.states == own.states).all()
+    assert (left.rows == own.rows).all()
+
+
+def test_an_interrupt_ends_all_launches(host):
+    lanes, jobs = oscillators()
+    asked = []
+
+    def progress(fraction, what):
+        asked.append(fraction)
+        if len(asked) > 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_on(host, lanes, jobs, 1, progress, 1200.0, LaunchSettings(periods=1))
+    assert not host._arrays
+    assert asked == sorted(asked)
+
+
+# --- the code for a card -----------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ptx():
+    lanes, jobs = oscillators()
+    return thread_code(lanes, example_of(lanes, jobs, lanes.no_ends(1)), True).code.decode()
+
+
+def test_a_card_needs_nothing_besides(ptx):
+    assert f".target {OLDEST}" in ptx
+    assert ".entry follow_all" in ptx
+    assert ".extern" not in ptx  # no name is open
+    assert "callprototype" not in ptx  # no call through an address, so the stack is known
+
+
+def test_a_card_moves_whole_words_in_little_memory_of_its_own(ptx):
+    assert len(re.findall(r"\bst\.(?:\w+\.)*b8\b", ptx)) <= MOST_BYTES
+    local = [int(size) for size in re.findall(r"\.local \.align \d+ \.b8 \S+\[(\d+)\]", ptx)]
+    assert local
+    assert max(local) <= MOST_LOCAL
+
+
+def ptxas():
+    """NVIDIA's assembler, where it is installed."""
+    found = importlib.util.find_spec("nvidia")
+    folders = [] if found is None else list(found.submodule_search_locations or [])
+    packaged = [str(path) for folder in folders for path in Path(folder).rglob("bin/ptxas")]
+    return os.environ.get("SALTUS_PTXAS") or shutil.which("ptxas") or next(iter(packaged), None)
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(ptxas() is None, reason="ptxas is not installed")
+def test_the_assembler_takes_the_code(ptx, tmp_path):
+    source = tmp_path / "thread.ptx"
+    source.write_text(ptx)
+    command = [ptxas(), "-arch=sm_80", "-O1", str(source), "-o", str(tmp_path / "thread.cubin")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+# --- devices -----------------------------------------------------------------
+
+
+def test_a_card_that_is_not_there_is_one_sentence(monkeypatch):
+    def none():
+        raise SaltusError("no card was found: this machine has no driver of NVIDIA's")
+
+    monkeypatch.setattr(devices, "card", none)
+    lanes, jobs = oscillators()
+    with pytest.raises(SaltusError, match="no card was found"):
+        devices.target_of("cuda", lanes.program, len(jobs))
+    assert devices.target_of("auto", lanes.program, 1000) is None
+
+
+def test_what_the_driver_answers_is_told(monkeypatch):
+    failing = type("Answer", (), {"__int__": lambda self: 100, "name": "CUDA_ERROR_NO_DEVICE"})()
+    driver = SimpleNamespace(cuInit=lambda flags: (failing,))
+    monkeypatch.setitem(sys.modules, "cuda", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "cuda.bindings", SimpleNamespace(driver=driver))
+    with pytest.raises(SaltusError, match="no card was found: CUDA_ERROR_NO_DEVICE"):
+        Card()
+    monkeypatch.setitem(sys.modules, "cuda.bindings", None)
+    with pytest.raises(SaltusError, match=r"pip install saltus\[cuda\]"):
+        Card()
+
+
+def test_a_card_is_taken_where_it_is_faster(monkeypatch, host):
+    monkeypatch.setattr(devices, "card", lambda: host)
+    lanes, _ = oscillators()
+    assert devices.target_of("auto", lanes.program, devices.FEWEST) is host
+    assert devices.target_of("auto", lanes.program, devices.FEWEST - 1) is None
+    assert devices.target_of("cpu", lanes.program, 1000) is None
+
+
+def test_what_a_card_cannot_follow_is_refused_by_name():
+    system = saltus.System(model=saltus.TwoStops(), load=saltus.Load())
+    with pytest.raises(ParameterError, match="several contacts"):
+        devices.target_of("cuda", program(system), 1000)
+    assert devices.target_of("auto", program(system), 1000) is None
+    with pytest.raises(ParameterError, match="device must be one of"):
+        saltus.simulate_many(system, periods=1, device="gpu")
+
+
+@pytest.mark.gpu
+def test_a_card_agrees_with_the_lanes(monkeypatch):
+    try:
+        card = devices.card()
+    except SaltusError as error:
+        pytest.skip(f"no card was seen: {error}")
+    for name in ("paper", "records", "rocking"):
+        agree(name, monkeypatch, card, count=1000, **ALL, **EARLY)
