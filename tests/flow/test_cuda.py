@@ -155,7 +155,9 @@ def test_a_card_needs_nothing_besides(ptx):
 
 def test_a_card_moves_whole_words_in_little_memory_of_its_own(ptx):
     assert len(re.findall(r"\bst\.(?:\w+\.)*b8\b", ptx)) <= MOST_BYTES
-    local = [int(size) for size in re.findall(r"\.local \.align \d+ \.b8 \S+\[(\d+)\]", ptx)]
+    local = [
+        int(size) for size in re.findall(r"\.local\s+\.align\s+\d+\s+\.b8\s+\S+\[(\d+)\]", ptx)
+    ]
     assert local
     assert max(local) <= MOST_LOCAL
 
