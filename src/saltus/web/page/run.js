@@ -62,7 +62,7 @@ export class Run {
   naturalTime() {
     const { without_period: own, slow_load: slow, slow_time: longest } = this.engine.layout.natural;
     const ofLoad = this.length > 0 ? this.length / (2 * Math.PI) : Infinity;
-    const time = Math.min(ofLoad, own ?? Infinity, slow !== null && this.length > slow ? longest : Infinity);
+    const time = Math.min(ofLoad, own ?? Infinity, slow !== null && this.length > slow ? (longest ?? Infinity) : Infinity);
     return Number.isFinite(time) ? time : 0;
   }
 
