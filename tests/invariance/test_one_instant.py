@@ -173,6 +173,28 @@ def test_a_branch_of_three_cells_that_move_alike_goes_on_where_their_contacts_op
     assert not branch.special
 
 
+@pytest.mark.thorough
+def test_a_branch_of_cells_that_move_alike_ends_where_excursions_of_all_vanish_at_once() -> None:
+    """At the SW of a single cell. Beside it speeds of these excursions are below rounding: GR, PD
+    and BPC were listed that do not exist.
+    """
+    load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.4))
+    path, impact = "load.horizontal.amplitude", saltus.NewtonImpact(e=0.0)
+    one = saltus.System(
+        model=saltus.TwoLayer(beta0=np.deg2rad(80), damping=0.1), load=load, impact=impact
+    )
+    orbit = saltus.find_orbit(one, theta_1=0.0, theta_2=-0.4)
+    (change,) = saltus.continue_orbit(orbit, path, (0.39, 0.401)).special
+    assert change.kind == "SW"
+    model = saltus.CellChain(beta0=np.deg2rad(80), cells=2, coupling=0.5, damping=0.1)
+    start = {name: 0.4 if name.startswith("lower") else 0.0 for name in model.coordinates}
+    orbit = saltus.find_orbit(saltus.System(model=model, load=load, impact=impact), **start)
+    branch = saltus.continue_orbit(orbit, path, (0.39, 0.401))
+    assert not branch.special
+    assert [end.reason.name for end in branch.ends] == ["TWO_AT_ONCE", "BOUND"]
+    assert 0.0 < branch.ends[0].parameter - change.parameter < 1e-4
+
+
 @dataclass(frozen=True, kw_only=True)
 class Cradle(saltus.ContactModel):
     """Three balls in a row, of which the outer two come from both sides at once."""

@@ -12,6 +12,7 @@ orbit is closed after half a period by its mirror image.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -120,6 +121,11 @@ class ContactsEvaluation(OrbitEvaluation):
 
     def area_factor(self) -> float | None:
         return None
+
+
+# Excursions from contacts of cells that move alike are followed down to this duration, in radians of
+# the load: there they end with a speed of some 1e-8.
+SHORTEST_EXCURSION = 1e-4
 
 
 class ContactsEquations(OrbitEquations):
@@ -421,9 +427,44 @@ class ContactsEquations(OrbitEquations):
             for change, contact in families_beside(point)
         )
 
+    @cached_property
+    def _excursions_of_cells(self) -> list[tuple[int, int]]:
+        """The events at which a contact opens without speed and closes again, each with its number,
+        between which contacts that do not act on it have events, as those of cells that move alike.
+        """
+        events = self.signature.events
+        n = len(events)
+        found = []
+        for i, begin in enumerate(events):
+            opens = not begin.is_impact or not (
+                begin.closed >> begin.contact & 1 or bounces(self.system, begin.contact)
+            )
+            for step in range(1, n if opens else 0):
+                other = events[(i + step) % n]
+                if not self.is_independent(begin.contact, other.contact):
+                    if step > 1 and other.contact == begin.contact and other.is_impact:
+                        found.append((i, i + step))
+                    break
+        return found
+
+    def _shortest_excursion_of_cells(self, point: OrbitPoint) -> float:
+        """The least duration of such an excursion, in radians of the load."""
+        if not self._excursions_of_cells or self.signature.symmetric:
+            return math.inf
+        phases = self.split(point.solution.unknowns)[1]
+        both = np.append(phases, phases + self.closing)
+        return float(min(both[last] - both[first] for first, last in self._excursions_of_cells))
+
+    def accepts(self, ahead: OrbitPoint, cut: Callable[[], Cut | End | None]) -> bool:
+        """Not where such an excursion is about to vanish: its speed is a power of its duration that
+        the equations are scaled with for one contact alone, and would be rounding."""
+        return self._shortest_excursion_of_cells(ahead) > SHORTEST_EXCURSION
+
     def stalled(
         self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds
     ) -> Cut | End | None:
+        if self._shortest_excursion_of_cells(point) < 2.0 * SHORTEST_EXCURSION:
+            return End(OrbitEnd.TWO_AT_ONCE, point.parameter)
         limit = point.orbit.motion().limit
         return None if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
 
