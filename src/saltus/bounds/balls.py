@@ -13,8 +13,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 # Above 2^-53, the relative rounding of one operation, by more than its own products.
 EPS = 2.3e-16
@@ -154,6 +152,8 @@ def _sparse_product(left: Ball, right: Ball) -> Ball:
 
     What is left out are products with exact zeros; n is the number of the others in a sum.
     """
+    from scipy import sparse
+
     entries = sparse.csc_array((right.middle != 0.0) | (right.radius != 0.0))
     n = int(np.diff(entries.indptr).max())
     middle = sparse.csc_array(right.middle)
@@ -175,6 +175,9 @@ def nearly_inverse(matrix: np.ndarray) -> np.ndarray | None:
     try:
         if len(matrix) < SPARSE_FROM:
             return np.asarray(np.linalg.inv(matrix))
+        from scipy import sparse
+        from scipy.sparse.linalg import splu
+
         return np.asarray(splu(sparse.csc_matrix(matrix)).solve(np.eye(len(matrix))))
     except (np.linalg.LinAlgError, RuntimeError):
         return None
