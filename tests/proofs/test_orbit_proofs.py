@@ -205,6 +205,47 @@ def test_both_orbits_of_a_fold_are_proved(table_orbit: saltus.PeriodicOrbit) -> 
         assert proof.stable is stable
 
 
+def outside_closed_forms(equations, count: int) -> int:
+    """How many of the impacts of random balls on tables lie outside their enclosures, in 300 bits:
+    both orbits of period 1 of random restitutions and amplitudes."""
+    rng = np.random.default_rng(7)
+    wrong = 0
+    proofs = 0
+    for e, share in zip(rng.uniform(0.1, 0.9, count), rng.uniform(1.02, 1.6, count), strict=True):
+        amplitude = float(share * math.pi * (1 - e) / (1 + e))
+        own = type(equations)(
+            ball_on_table(amplitude, float(e)), equations.signature, equations.paths, equations.tol
+        )
+        shift = math.acos(-1.0 / share)
+        for phase in (2.0 * math.pi - shift, shift):
+            orbit = PeriodicOrbit.near(own, np.array([phase, 2.0 * math.pi / (1 + e)]), own.values)
+            assert orbit is not None
+            proof = saltus.prove(orbit)
+            if proof.proved is None:
+                continue
+            proofs += 1
+            with mp.workprec(300):
+                exact_e = mp.mpf(float(e))
+                ratio = mp.pi * (1 - exact_e) / (1 + exact_e) / mp.mpf(amplitude)
+                exact = mp.acos(-ratio)
+                time = 2 * mp.pi - exact if phase > math.pi else exact
+                wrong += not contains(proof.impact_times[0], time)
+                wrong += not contains(proof.impact_speeds[0], 2 * mp.pi / (1 + exact_e))
+    assert proofs > count
+    return wrong
+
+
+def test_random_balls_on_tables_contain_their_closed_forms(
+    table_orbit: saltus.PeriodicOrbit,
+) -> None:
+    assert outside_closed_forms(table_orbit.equations, 5) == 0
+
+
+@pytest.mark.thorough
+def test_a_hundred_orbits_contain_their_closed_forms(table_orbit: saltus.PeriodicOrbit) -> None:
+    assert outside_closed_forms(table_orbit.equations, 50) == 0
+
+
 def test_contacts_of_several_coordinates_are_proved() -> None:
     """The impact pair: multipliers by interval arithmetic against the orbit's own."""
     system = saltus.System(
