@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from saltus.errors import ParameterError, SaltusError
+from saltus.errors import ParameterError, SaltusError, shown
 from saltus.flow.cuda.targets import Card, Target
 from saltus.flow.kernel.compiled import Program
 from saltus.progress import say
@@ -23,11 +23,10 @@ def read_device(device: Any) -> str:
     ParameterError
         It is none.
     """
-    if device not in DEVICES:
-        raise ParameterError(
-            f"device must be one of {', '.join(DEVICES)}, got {device!r}", "device"
-        )
-    return str(device)
+    if not isinstance(device, str) or device not in DEVICES:
+        wanted = ", ".join(DEVICES)
+        raise ParameterError(f"device must be one of {wanted}, got {shown(device)}", "device")
+    return device
 
 
 def target_of(device: str, run: Program, motions: int) -> Target | None:
