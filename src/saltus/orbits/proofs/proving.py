@@ -26,7 +26,9 @@ def prove(
     step: float | None = None,
     order: int | None = None,
 ) -> OrbitProof:
-    """Prove that an orbit exists, is alone near it, keeps its contacts open, and is stable or not."""
+    """Prove that an orbit exists, is alone near it, keeps its contacts open, and is stable or
+    not.
+    """
 
 
 @overload
@@ -37,7 +39,9 @@ def prove(
     step: float | None = None,
     order: int | None = None,
 ) -> SpecialProof:
-    """Prove a fold, a period doubling, a symmetry breaking or a grazing, and enclose its parameter."""
+    """Prove a fold, a period doubling, a symmetry breaking or a grazing, and enclose its
+    parameter.
+    """
 
 
 @overload
@@ -115,6 +119,7 @@ def prove(
     Jackson and J. D. Pryce, Reliable Computing 7 (2001); K. Church and C. Fortin (2021) prove orbits
     of gravitational billiards, whose flights are parabolas.
     """
+    check_proof(_system_of(result), radii, step, order, most_boxes)
     default = ShootingSettings()
     settings = ShootingSettings(
         step=default.step if step is None else float(step),
@@ -122,16 +127,21 @@ def prove(
     )
     widths = None if radii is None else dict(radii)
     if isinstance(result, PeriodicOrbit):
-        check_proof(result.system, radii, step, order)
         return prove_orbit(result, widths, settings)
     if isinstance(result, SpecialPoint):
-        check_proof(result.orbit.system, radii, step, order)
         return prove_special(result, widths, settings)
+    return prove_branch(result, widths, settings, int(most_boxes), progress)
+
+
+def _system_of(result: PeriodicOrbit | SpecialPoint | Branch) -> System:
+    if isinstance(result, PeriodicOrbit):
+        return result.system
+    if isinstance(result, SpecialPoint):
+        return result.orbit.system
     if isinstance(result, Branch):
-        check_proof(result.points[0].orbit.system, radii, step, order, most_boxes)
-        return prove_branch(result, widths, settings, int(most_boxes), progress)
+        return result.points[0].orbit.system
     raise ParameterError(
-        f"prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
+        "prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
         f"{shown(result)}",
         "result",
     )
