@@ -42,7 +42,9 @@ def ratios(table: dict[str, list[float]], ours: str) -> dict[str, list[float]]:
 
 
 def asked(results: dict[str, Any]) -> list[tuple[str, str, str]]:
-    """What the lanes and the start were asked to reach, what was found, and whether that is enough."""
+    """What the lanes and the start were asked to reach, what was found, and whether that is
+    enough.
+    """
     lines = []
     table = at_equal_error(results["work"])
     if OURS in table:

@@ -54,9 +54,9 @@ def _about(results: dict[str, Any]) -> str:
     about = results["about"]
     lines = [f"* {key}: {value}" for key, value in about.items()]
     return (
-        "The case: the paper's system under load (i), beta0 = 80 deg, C = 0.1, V = -0.5, H = 0.5, Omega = 1, e = 1, over 20 "
-        "forcing periods; one trajectory-period is one motion over one of them.\n\n"
-        + "\n".join(lines)
+        "The case: the paper's system under load (i), beta0 = 80 deg, C = 0.1, V = -0.5, H = 0.5,"
+        " Omega = 1, e = 1, over 20 forcing periods; one trajectory-period is one motion over one"
+        " of them.\n\n" + "\n".join(lines)
     )
 
 
@@ -77,10 +77,10 @@ def _equal_error(work: list[dict[str, Any]]) -> str:
 
     rows = [[name, *(cell(name, i) for i in range(len(TARGETS)))] for name in times]
     return (
-        "## At equal achieved error, on one core\n\n"
-        "Microseconds of processor time for a trajectory-period, and in brackets how many times that of "
-        f"{ours}. The error is the largest over sixteen motions whose ends are known to 25 digits; times are interpolated in "
-        "log-log between the tolerances of each code.\n\n"
+        "## At equal achieved error, on one core\n\nMicroseconds of processor time for a"
+        f" trajectory-period, and in brackets how many times that of {ours}. The error is the"
+        " largest over sixteen motions whose ends are known to 25 digits; times are interpolated"
+        " in log-log between the tolerances of each code.\n\n"
         + table(("code", *(f"{t:.0e}" for t in TARGETS)), rows)
     )
 
@@ -115,8 +115,9 @@ def _one_motion(rows: list[dict[str, Any]] | None) -> str:
         for code in codes
     ]
     return (
-        "## One motion beside heyoka.py's scalar code, at equal achieved error\n\nMicroseconds of processor time for a call, the "
-        "least of all rounds, and in brackets how many times that of heyoka.py, whose integrator is made once and used again.\n\n"
+        "## One motion beside heyoka.py's scalar code, at equal achieved error\n\nMicroseconds of"
+        " processor time for a call, the least of all rounds, and in brackets how many times that"
+        " of heyoka.py, whose integrator is made once and used again.\n\n"
         + table(("periods", "code", *(f"{t:.0e}" for t in LOOSE), "asked: at most"), cells)
     )
 
@@ -171,9 +172,10 @@ def _fits(rows: list[dict[str, Any]] | None) -> str:
         for row in rows
     ]
     return (
-        "## A fit with exact derivatives, on one core\n\nFrom 300 noisy samples of 12 units of time, from a guess 3 % off. "
-        "SciPy's `least_squares` with two-point differences of `simulate` ends at the loosest of its tolerances with which it "
-        "misses the least squares by less than 1e-5 standard errors.\n\n" + table(head, cells)
+        "## A fit with exact derivatives, on one core\n\nFrom 300 noisy samples of 12 units of"
+        " time, from a guess 3 % off. SciPy's `least_squares` with two-point differences of"
+        " `simulate` ends at the loosest of its tolerances with which it misses the least squares"
+        " by less than 1e-5 standard errors.\n\n" + table(head, cells)
     )
 
 
@@ -209,16 +211,17 @@ def _paper_way(rows: list[dict[str, Any]], work: list[dict[str, Any]]) -> str:
         for row in rows
     ]
     return (
-        "## The paper's way\n\nRK45 at 1e-8 with steps of at most 1e-4 on the equation with sgn(theta) smoothed to "
-        f"tanh(B theta / 2), over one period; compared with {ours} at its loosest tolerance.\n\n"
+        "## The paper's way\n\nRK45 at 1e-8 with steps of at most 1e-4 on the equation with"
+        f" sgn(theta) smoothed to tanh(B theta / 2), over one period; compared with {ours} at its"
+        " loosest tolerance.\n\n"
         + table(("B", "error after one period", "seconds a period", f"times {ours}"), cells)
     )
 
 
 def _zeno(rows: list[dict[str, Any]]) -> str:
     return (
-        "## Infinitely many impacts in a finite time\n\ne = 0.8, H = 0, from theta = 0.3: the motion is at rest from "
-        "17.82077858790958 on. What each code does until time 25:\n\n"
+        "## Infinitely many impacts in a finite time\n\ne = 0.8, H = 0, from theta = 0.3: the"
+        " motion is at rest from 17.82077858790958 on. What each code does until time 25:\n\n"
         + table(("code", "outcome"), ([row["peer"], row["verdict"]] for row in rows))
     )
 
@@ -229,9 +232,10 @@ def _grid(row: dict[str, Any] | None) -> str:
     if "fails" in row:
         return f"## A grid of initial states\n\nfails: {row['fails']}"
     text = (
-        f"{row['n']} x {row['n']} states over {row['periods']} periods at tol {row['tol']:.0e}: {row['seconds']:.1f} s, "
-        f"{row['rate'] / 1e6:.2f} million trajectory-periods a second; peak memory {row['peak'] / 2**20:.0f} MiB, of which "
-        f"{row['peak_before'] / 2**20:.0f} before it began and {row['bytes_of_result'] / 2**20:.0f} of results."
+        f"{row['n']} x {row['n']} states over {row['periods']} periods at tol {row['tol']:.0e}:"
+        f" {row['seconds']:.1f} s, {row['rate'] / 1e6:.2f} million trajectory-periods a second;"
+        f" peak memory {row['peak'] / 2**20:.0f} MiB, of which {row['peak_before'] / 2**20:.0f}"
+        f" before it began and {row['bytes_of_result'] / 2**20:.0f} of results."
     )
     return (
         "## A grid of initial states\n\n"

@@ -61,7 +61,8 @@ figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 saltus.plot(branch, ax=axes[0])
 saltus.plot(basins, ax=axes[1])
 
-# the first and the last orbit that cross the stop are next to those that linear theory touches it by
+# the first and the last orbit that cross the stop are next to those that linear theory touches it
+# by
 frequency = np.array([orbit.frequency for orbit in branch.orbits])
 crossing = np.flatnonzero([len(orbit.motion().events) > 0 for orbit in branch.orbits])
 assert frequency[crossing[0] - 1] <= touched[0] <= frequency[crossing[0]]

@@ -80,8 +80,8 @@ if test "$(id -u)" = 0 && command -v apt-get >/dev/null; then
     apt-get install -qq --no-install-recommends python3-siconos gcc >/dev/null || echo "no Siconos here"
 fi
 test -d .venv-peers || .venv/bin/python -m venv .venv-peers --without-pip
-# What .venv has is there too, without being installed again. addsitedir reads the .pth files as well:
-# saltus itself is installed by one.
+# What .venv has is there too, without being installed again. addsitedir reads the .pth files as
+# well: saltus itself is installed by one.
 .venv/bin/python -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' > \
     "$(.venv-peers/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/venv.pth"
 .venv/bin/python -m pip --python .venv-peers/bin/python install --quiet --no-compile --require-hashes -r requirements-bench.lock
@@ -128,9 +128,9 @@ def steps(number: int) -> tuple[Step, ...]:
         Step(
             "wheel",
             "the wheel in an empty environment: the README's blocks, the commands, a page",
-            ".venv/bin/python -m venv --clear .venv-dist && .venv-dist/bin/pip install -q uv hatchling\n"
-            ".venv-dist/bin/python release/try_wheel.py --newest --only "
-            '"$(.venv/bin/python -c "import sys; print(*sys.version_info[:2], sep=\'.\')")"',
+            ".venv/bin/python -m venv --clear .venv-dist && .venv-dist/bin/pip install -q uv"
+            " hatchling\n.venv-dist/bin/python release/try_wheel.py --newest --only"
+            ' "$(.venv/bin/python -c "import sys; print(*sys.version_info[:2], sep=\'.\')")"',
             15,
             counted=r"(\d+) blocks of the README",
         ),
@@ -186,7 +186,9 @@ def thorough_files(share: int, shares: int) -> list[str]:
 
 
 def commit_number() -> int:
-    """How many commits came before; in a shallow clone, which cannot know, a number of the commit."""
+    """How many commits came before; in a shallow clone, which cannot know, a number of the
+    commit.
+    """
 
     def git(*arguments: str) -> str:
         return subprocess.run(

@@ -54,5 +54,6 @@ if made.stat().st_size < 50_000:
     sys.exit("the page has no code")
 kinds = [kind for page in pages for kind, *_ in blocks(page.read_text(encoding="utf-8"))]
 print(
-    f"{kinds.count('python') + kinds.count('console')} blocks of the README and the tour, and a page"
+    f"{kinds.count('python') + kinds.count('console')} blocks of the README and the tour, and a"
+    " page"
 )

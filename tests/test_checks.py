@@ -31,7 +31,8 @@ def searched(system, *, window=None, starts=8):
             (1, 2),
             {},
             (
-                r"searched\(\) too many positional arguments; give the arguments after the first by "
+                r"searched\(\) too many positional arguments; give the arguments after the"
+                r" first by "
                 r"their names$"
             ),
         ),

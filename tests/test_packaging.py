@@ -1,4 +1,6 @@
-"""What is published: the wheel holds all that saltus reads, and every place says the same version."""
+"""What is published: the wheel holds all that saltus reads, and every place says the same
+version.
+"""
 
 import json
 import re

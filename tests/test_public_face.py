@@ -466,7 +466,9 @@ def _arguments(function):
 
 
 def test_every_public_name_is_asked(made):
-    """A formula of a model is none of them; whatever else there is has arguments here, and answers."""
+    """A formula of a model is none of them; whatever else there is has arguments here, and
+    answers.
+    """
     asked = set(good(made))
     # of several classes
     once = {name.partition(".")[2] for name in asked if name.startswith("Branch.")}

@@ -29,7 +29,9 @@ TURNED_BACK = HIGHEST + 0.2  # a branch that comes back here has lost its way
 
 @dataclass(frozen=True)
 class Mesh:
-    """The discretisation: NTST intervals, adapted at every step, with NCOL collocation points each."""
+    """The discretisation: NTST intervals, adapted at every step, with NCOL collocation points
+    each.
+    """
 
     intervals: int
     points: int = 4
@@ -124,7 +126,9 @@ def constants(
 
 
 def run(program: Path, orbit: np.ndarray, text: str, limit: float = LIMIT) -> Run:
-    """Follow the branch that starts at `orbit` (rows of time and state) under the constants `text`."""
+    """Follow the branch that starts at `orbit` (rows of time and state) under the constants
+    `text`.
+    """
     with tempfile.TemporaryDirectory() as folder:
         np.savetxt(Path(folder) / "smoothed.dat", orbit, fmt="%.17g")
         before, fails = _used(), ""

@@ -49,12 +49,14 @@ def _reading() -> str:
         for amplitude, known in KNOWN.items()
     )
     return (
-        f"The symmetric orbits of period 1 under load (i), beta0 = 80 deg, C = 0.1, V = -0.5, from Omega = {HIGHEST:g} down to "
-        f"{LOWEST:g}. AUTO follows them with sgn(theta) smoothed to tanh(B theta / 2) (`smoothing`), from the exact orbit at "
-        f"Omega = {HIGHEST:g}; mesh is NTST x NCOL. Exact Omega: {exact}. Seconds are processor time on one core; those of "
-        "saltus come after its code was compiled. *Impossible* are the labels that no orbit can deserve: a torus "
-        "(the multipliers' product is exp(-C T) < 1), or a period doubling of a symmetric orbit. BP and PD on the asymmetric "
-        "orbits onto which AUTO slips at a branch point are not counted there."
+        "The symmetric orbits of period 1 under load (i), beta0 = 80 deg, C = 0.1, V = -0.5, from"
+        f" Omega = {HIGHEST:g} down to {LOWEST:g}. AUTO follows them with sgn(theta) smoothed to"
+        f" tanh(B theta / 2) (`smoothing`), from the exact orbit at Omega = {HIGHEST:g}; mesh is"
+        f" NTST x NCOL. Exact Omega: {exact}. Seconds are processor time on one core; those of"
+        " saltus come after its code was compiled. *Impossible* are the labels that no orbit can"
+        " deserve: a torus (the multipliers' product is exp(-C T) < 1), or a period doubling of a"
+        " symmetric orbit. BP and PD on the asymmetric orbits onto which AUTO slips at a branch"
+        " point are not counted there."
     )
 
 
@@ -99,7 +101,9 @@ def _grazing(found: dict[str, Any] | None, known: Known) -> str:
 
 
 def _ratio(exact: dict[str, Any], rows: list[dict[str, Any]]) -> str:
-    """How long each B takes for the same range, on its cheapest mesh that gets through and on all."""
+    """How long each B takes for the same range, on its cheapest mesh that gets through and on
+    all.
+    """
     if "fails" in exact:
         return ""
     texts = []
@@ -115,6 +119,6 @@ def _ratio(exact: dict[str, Any], rows: list[dict[str, Any]]) -> str:
         )
         texts.append(f"* B = {sharpness:g}: {cells or 'no mesh gets there'}")
     return (
-        f"From Omega = {HIGHEST:g} to {TIMED:g} saltus takes {number(exact['seconds'])} s; AUTO:\n\n"
-        + "\n".join(texts)
+        f"From Omega = {HIGHEST:g} to {TIMED:g} saltus takes {number(exact['seconds'])} s;"
+        " AUTO:\n\n" + "\n".join(texts)
     )

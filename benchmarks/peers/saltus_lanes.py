@@ -26,7 +26,9 @@ def run(
     threads: int | None,
     **options: Any,
 ) -> Any:
-    """An ensemble of motions over the measured number of periods, of which only the ends are kept."""
+    """An ensemble of motions over the measured number of periods, of which only the ends are
+    kept.
+    """
     return saltus.simulate_many(
         what,
         theta=theta,

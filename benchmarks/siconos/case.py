@@ -1,4 +1,6 @@
-"""The six motions: both layers with Newton's law of impact and no transfer, which Siconos has too."""
+"""The six motions: both layers with Newton's law of impact and no transfer, which Siconos has
+too.
+"""
 
 from __future__ import annotations
 

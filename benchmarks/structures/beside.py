@@ -213,7 +213,9 @@ def _sizes(rows: dict[str, Any]) -> list[str]:
 
 
 def _periods(rows: dict[str, Any], target: float) -> list[tuple[str, ...]]:
-    """The lines of the table at an error: microseconds for a period of each code, and the ratios."""
+    """The lines of the table at an error: microseconds for a period of each code, and the
+    ratios.
+    """
     from structures.case import PERIODS
 
     found = []

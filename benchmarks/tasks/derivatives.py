@@ -1,4 +1,6 @@
-"""What derivatives cost: the flow with them over the flow without, at one tolerance, on one core."""
+"""What derivatives cost: the flow with them over the flow without, at one tolerance, on one
+core.
+"""
 
 from __future__ import annotations
 

@@ -18,9 +18,9 @@ from typing import Any
 
 BETA0, AMPLITUDE = math.radians(80), "load.horizontal.amplitude"
 SYSTEM = (
-    "import math, saltus, numpy as np; model = saltus.Metainterface(beta0=math.radians(80), damping=0.1);"
-    "load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.5));"
-    "system = saltus.System(model=model, load=load);"
+    "import math, saltus, numpy as np; model = saltus.Metainterface(beta0=math.radians(80),"
+    " damping=0.1);load = saltus.Load(frequency=1.0, vertical=-0.5,"
+    " horizontal=saltus.Harmonic(amplitude=0.5));system = saltus.System(model=model, load=load);"
 )
 MOTION = "saltus.simulate(system, theta=0.3, periods=20)"
 CHART = (

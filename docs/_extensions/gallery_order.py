@@ -11,20 +11,18 @@ GROUPS = {  # by subject, as the first paragraph of the gallery lists them
     "Rocking blocks and records": (
         "rocking_block housner overturning overturning_spectrum at2_record record falling_block"
     ),
-    "Friction, backlash, soft stops": (
-        "belt stribeck rubbing_absorber backlash bilinear soft_stop"
-    ),
-    "Structures": ("mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop"),
-    "Harvesters and coordinates of first order": ("harvester piezo_harvester"),
+    "Friction, backlash, soft stops": "belt stribeck rubbing_absorber backlash bilinear soft_stop",
+    "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop",
+    "Harvesters and coordinates of first order": "harvester piezo_harvester",
     "Orbits, branches, spectra": (
         "orbits period_doubling resting_orbit proved_fold response_spectrum duffing smoothing"
     ),
     "Attractors and chaos": (
         "basins erosion capture chaos coming_to_rest potential_wells ensemble stability_chart"
     ),
-    "The metainterface": ("quickstart two_layers cell_chain physical_units"),
-    "Fits, design, other programs": ("identification sensitivities design_grid from_sympy in_jax"),
-    "To show": ("animation notebook"),
+    "The metainterface": "quickstart two_layers cell_chain physical_units",
+    "Fits, design, other programs": "identification sensitivities design_grid from_sympy in_jax",
+    "To show": "animation notebook",
 }
 ORDER = tuple(name for names in GROUPS.values() for name in names.split())
 
@@ -46,7 +44,9 @@ class InOrder:
 
 
 def reset(_, __):
-    """Every example begins with the house's settings, with letters that can be read on a thumbnail."""
+    """Every example begins with the house's settings, with letters that can be read on a
+    thumbnail.
+    """
     plt.rcdefaults()
     letters = {
         name: size + 3.0

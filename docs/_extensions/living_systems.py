@@ -32,7 +32,9 @@ def wall():
 
 @cache
 def tristable():
-    """The metainterface of Fig. 4c: three stable states under a constant load, and the curves between their basins."""
+    """The metainterface of Fig. 4c: three stable states under a constant load, and the curves
+    between their basins.
+    """
     beta0 = np.deg2rad(80)
     system = saltus.System(
         model=saltus.Metainterface(beta0=beta0, damping=0.1),

@@ -93,7 +93,9 @@ def public_names():
 
 def _answers(package, name):
     found = getattr(package, name)
-    """Whether it is a function for users; those that draw are told by `saltus.plot`, which draws all."""
+    """Whether it is a function for users; those that draw are told by `saltus.plot`, which draws
+    all.
+    """
     return (
         inspect.isfunction(found)
         and hasattr(found, "answers")

@@ -1,4 +1,6 @@
-"""What all tests of the reproduction share: the settings of those of saltus, and the command line."""
+"""What all tests of the reproduction share: the settings of those of saltus, and the command
+line.
+"""
 
 import shutil
 

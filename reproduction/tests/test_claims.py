@@ -226,9 +226,10 @@ def test_the_ledger_counts_section_by_section_in_the_papers_order():
         ("1", "0", "0", "1", "0", "0", "–"),
         ("5", "2", "1", "1", "0", "1", "–"),
     ]
-    assert tally(claims) == (
-        "5 statements of the paper: as printed 2, corrected by an erratum 1, undecided 1, not checked 0, in disagreement 1. "
-        "Checks of our own that hold: 0 of 0."
+    assert (
+        tally(claims)
+        == "5 statements of the paper: as printed 2, corrected by an erratum 1, undecided 1, not"
+        " checked 0, in disagreement 1. Checks of our own that hold: 0 of 0."
     )
 
 

@@ -117,10 +117,8 @@ def _check_tables(diagram: Any) -> None:
     ]
     if missing:
         raise ParameterError(
-            (
-                "diagram must be the tree of a diagram, or of one panel; this one has no "
-                f"{missing[0]!r}"
-            ),
+            "diagram must be the tree of a diagram, or of one panel; this one has no "
+            f"{missing[0]!r}",
             "diagram",
         )
 

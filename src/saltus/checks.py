@@ -210,7 +210,8 @@ def check_memory(name: str, size: float, what: str) -> None:
     free = free_memory() if size > LIMITS.any_machine else math.inf
     if size > LIMITS.memory * free:
         raise ParameterError(
-            f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free",
+            f"{name} is too large: {what} need about {size / 1e9:.3g} GB of memory, and"
+            f" {free / 1e9:.3g} GB are free",
             name,
         )
 
@@ -226,8 +227,9 @@ def check_work(name: str, motions: float, periods: float) -> None:
     if motions * periods > LIMITS.work:
         days = motions * periods / LIMITS.work * 4.0
         raise ParameterError(
-            f"{name} is too large: {motions:.3g} motions of {periods:.3g} forcing periods take about {days:.2g} days of one "
-            f"core, and {LIMITS.work:.0e} periods in all are the most",
+            f"{name} is too large: {motions:.3g} motions of {periods:.3g} forcing periods take"
+            f" about {days:.2g} days of one core, and {LIMITS.work:.0e} periods in all are the"
+            " most",
             name,
         )
 
@@ -468,7 +470,10 @@ def notice_degrees(name: str, value: float) -> None:
     meant in radians.
     """
     if abs(value) > 2.0 * math.pi and float(value).is_integer():
-        text = f"{name} = {value:g} is read in radians; {value:g} degrees are np.radians({value:g}) = {math.radians(value):.6g}"
+        text = (
+            f"{name} = {value:g} is read in radians; {value:g} degrees are np.radians({value:g}) ="
+            f" {math.radians(value):.6g}"
+        )
         warnings.warn(text, UserWarning, stacklevel=2)
 
 
@@ -505,11 +510,13 @@ def check_environment() -> None:
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if disabled not in ("", "0"):
         raise SaltusError(
-            "the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler; unset it"
+            "the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler;"
+            " unset it"
         )
     if not (threads.isdecimal() and int(threads) > 0):
         raise SaltusError(
-            f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of threads; unset it"
+            f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of"
+            " threads; unset it"
         )
 
 
@@ -679,7 +686,10 @@ def bound_arguments(
             sentence += f"; give {those} by their names{f': {example}' if example else ''}"
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
-            sentence = f"has no argument {wrong!r:.40}; {near(wrong, [name for name in known if name != 'self'])}"
+            sentence = (
+                f"has no argument {wrong!r:.40};"
+                f" {near(wrong, [name for name in known if name != 'self'])}"
+            )
         else:
             # missing, or given twice
             wrong = next((name for name in known if sentence.endswith(repr(name))), None)

@@ -97,7 +97,9 @@ def show_progress(fraction: float, what: str) -> None:
 
 
 class FractionMemory:
-    """A progress that remembers the fraction, for parts of the work that know nothing of the whole."""
+    """A progress that remembers the fraction, for parts of the work that know nothing of the
+    whole.
+    """
 
     def __init__(self, progress: Progress) -> None:
         self.progress = progress

@@ -29,7 +29,9 @@ def test_the_average_of_a_quasi_periodic_series_converges_faster_than_any_power(
 
 @pytest.mark.parametrize("memory", [0.0, 0.9, 0.98])
 def test_error_bars_cover_the_true_mean_of_correlated_series_as_often_as_they_say(memory):
-    """x_j = memory x_{j-1} + noise, whose mean is 0; the bars are wide enough in 95 of 100 cases."""
+    """x_j = memory x_{j-1} + noise, whose mean is 0; the bars are wide enough in 95 of 100
+    cases.
+    """
     rng, count = np.random.default_rng(5), 4000
     noise = rng.standard_normal((count, 400))
     series = np.empty_like(noise)

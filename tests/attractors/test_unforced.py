@@ -1,4 +1,6 @@
-"""Motions on which nothing acts that varies: a cycle has no forcing period, and one judge says so."""
+"""Motions on which nothing acts that varies: a cycle has no forcing period, and one judge says
+so.
+"""
 
 import math
 

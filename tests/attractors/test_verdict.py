@@ -41,7 +41,9 @@ def test_a_periodic_motion_is_certified_by_its_own_equations(e):
 
 
 def test_a_longer_period_is_counted_in_forcing_periods():
-    """Hhat = 1 at Omega = 2.6: the family of period 3 between the folds of numerics.md, section 7."""
+    """Hhat = 1 at Omega = 2.6: the family of period 3 between the folds of numerics.md, section
+    7.
+    """
     found = [
         classify(forced(1.0, 2.6), theta=theta, velocity=v)
         for theta, v in ((4.0, 0.0), (3.0, 2.0), (-3.5, -1.0))

@@ -81,17 +81,21 @@ EQUIVALENT: dict[str, str] = {
     "polynomial_hull: sign turned: abs(middle) + spread": SPARE,
     "polynomial_hull: sign turned: spread + (n + 2.0) * EPS * (abs(middle) + spread)": SPARE,
     "polynomial_hull: sign turned: 0.5 * abs(ym[k]) + yr[k] + 2.0 * n * EPS * abs(ym[k])": SPARE,
-    "horner_ball: sign turned: abs(value) * hr + spread * (abs(hm) + hr) + EPS * abs(scaled)": SPARE,
+    "horner_ball: sign turned: abs(value) * hr + spread * (abs(hm) + hr) + EPS * abs(scaled)": (
+        SPARE
+    ),
     "series_of: sign turned: (r[root, k] / factor + EPS * abs(ym[c, k + 2])) * UP + TINY": SPARE,
     "one_step: sign turned: tr + 0.5 * h + EPS * abs(middle_time)": SPARE,
     "one_step: sign turned: 1.5 * reach + 1e-10 * abs(bm[c, d])": GUESS,
     "one_step: sign turned: abs(bm[c, d]) + nr[c, d]": GUESS,
     "one_step: sign turned: INFLATED * nr[c, d] + 1e-10 * (abs(bm[c, d]) + nr[c, d]) + TINY": GUESS,
     "one_step: sign turned: INFLATED * nr[c, d] + 1e-10 * (abs(bm[c, d]) + nr[c, d])": GUESS,
-    "one_step: no rounding: nodes, numbers, constant, roots, n, middles, radii, tm, tr, hm, hr, cm, "
-    "cr, work": SPARE,
-    "series_of: no rounding: nodes, numbers, constant, roots, order, middles, radii, tm, tr, m, r, "
-    "ym, yr, accelerate": SPARE,
+    "one_step: no rounding: nodes, numbers, constant, roots, n, middles, radii, tm, tr, hm, hr, cm, cr, work": (
+        SPARE
+    ),
+    "series_of: no rounding: nodes, numbers, constant, roots, order, middles, radii, tm, tr, m, r, ym, yr, accelerate": (
+        SPARE
+    ),
     "series_of: sign turned: (k + 1.0) * yr[p, k + 1] + EPS * abs(x)": SPARE,
     "series_of: sign turned: r[root, k] / factor + EPS * abs(ym[c, k + 2])": SPARE,
 }

@@ -268,7 +268,9 @@ def test_what_has_no_end_is_not_read(tmp_path):
 
 
 def test_arrays_without_names_of_their_axes_are_read_without_a_warning(tmp_path, recwarn):
-    """Other programs leave them out; a remark of h5netcdf's stood before the sentence of the user."""
+    """Other programs leave them out; a remark of h5netcdf's stood before the sentence of the
+    user.
+    """
     import h5py
 
     with h5py.File(tmp_path / "other.nc", "w") as file:

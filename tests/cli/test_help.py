@@ -36,8 +36,8 @@ def test_the_version(saltus):
 
 def test_help_imports_nothing_heavy():
     script = (
-        "import sys; sys.argv = ['saltus', '--help']\nfrom saltus.cli import main\n"
-        f"try:\n    main()\nexcept SystemExit:\n    print('heavy:', *(set({HEAVY!r}) & set(sys.modules)))"
+        "import sys; sys.argv = ['saltus', '--help']\nfrom saltus.cli import main\ntry:\n   "
+        f" main()\nexcept SystemExit:\n    print('heavy:', *(set({HEAVY!r}) & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
@@ -73,8 +73,9 @@ def test_a_terminal_of_few_letters_shows_the_others_as_escapes(tmp_path):
 def test_linear_algebra_has_one_thread_unless_the_user_says_otherwise(own, threads):
     """Before numpy is loaded, which reads it then."""
     script = (
-        "import os, sys; sys.argv = ['saltus', '--version']\nfrom saltus.cli import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
+        "import os, sys; sys.argv = ['saltus', '--version']\nfrom saltus.cli import main\ntry:\n   "
+        " main()\nexcept SystemExit:\n    print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in"
+        " sys.modules)"
     )
     clean = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run(

@@ -30,10 +30,8 @@ def value(text, head):
 def test_a_metainterface_under_load(info):
     text = info(
         SYSTEM
-        + (
-            "damping = 0.1\n[load]\nfrequency = 2\nhorizontal = { amplitude = 0.5 }\nvertical = "
-            "-0.5\n"
-        )
+        + "damping = 0.1\n[load]\nfrequency = 2\nhorizontal = { amplitude = 0.5 }\nvertical = "
+        "-0.5\n"
     )
     assert value(text, "forcing period 2 pi / Omega") == pytest.approx(math.pi, rel=1e-7)
     assert value(text, "Hcr = |V / tan(beta0)|, the undeformed state is lost") == pytest.approx(
@@ -98,8 +96,8 @@ def test_the_period_is_that_of_the_studys_own_start(info):
         ),
         (
             (
-                "frequency = 1\nhorizontal = { amplitude = 1 }\nvertical = { amplitude = 1, order = "
-                "2 }"
+                "frequency = 1\nhorizontal = { amplitude = 1 }\nvertical = { amplitude = 1, order"
+                " = 2 }"
             ),
             "half a period later",
         ),
@@ -163,8 +161,8 @@ def test_a_model_that_cannot_be_traced_is_refused(refused, tmp_path):
     (tmp_path / "own.py").write_text(OWN.format(body="raise ZeroDivisionError('by naught')"))
     (tmp_path / "study.toml").write_text('[model]\ntype = "own.py:Own"\nstiffness = 3\n')
     sentence = refused("info", tmp_path / "study.toml")
-    assert sentence == (
-        f"saltus: {tmp_path}/study.toml, model: Own.acceleration failed: "
+    assert (
+        sentence == f"saltus: {tmp_path}/study.toml, model: Own.acceleration failed: "
         "ZeroDivisionError: by naught"
     )
 

@@ -12,10 +12,11 @@ from saltus.config import load_study
 from saltus.errors import ParameterError
 
 NAMES = (
-    "type beta0 damping stiffness_ratio smoothing alpha wall frequency horizontal vertical amplitude order phase mean file time "
-    "value quantity scale e r theta x velocity periods duration tol side stop_at samples Metainterface RockingBlock "
-    "WallOscillator TwoLayer VelocityReduction EnergyRestitution InelasticImpact force acceleration line_limit "
-    "__class__ self saltus:x os:path a.py:B"
+    "type beta0 damping stiffness_ratio smoothing alpha wall frequency horizontal vertical"
+    " amplitude order phase mean file time value quantity scale e r theta x velocity periods"
+    " duration tol side stop_at samples Metainterface RockingBlock WallOscillator TwoLayer"
+    " VelocityReduction EnergyRestitution InelasticImpact force acceleration line_limit __class__"
+    " self saltus:x os:path a.py:B"
 )
 WORDS = st.sampled_from(NAMES.split(" "))
 NUMBERS = st.sampled_from(

@@ -15,8 +15,10 @@ FORCED = MODEL + "[load]\nfrequency = 1.0\nhorizontal = { amplitude = 0.5 }\nver
 ASKS = {
     "motion": "[simulate]\ntheta = 0.3\nperiods = 3\n",
     "phase_portrait": "[phase_portrait]\nstarts = [[0.3, 0.0]]\nduration = 2\n",
-    "bifurcation_diagram": "[bifurcation_diagram]\nbounds = [0.4, 0.5]\nmax_period = 1\nvalues = [0.45]\nstarts = 4\n"
-    "bands = false\n",
+    "bifurcation_diagram": (
+        "[bifurcation_diagram]\nbounds = [0.4, 0.5]\nmax_period = 1\nvalues = [0.45]\nstarts = 4\n"
+        "bands = false\n"
+    ),
     "attractors": "[attractors]\nstarts = 8\n",
     "basins": "[basins]\ntheta = [-1, 0, 1]\nvelocity = [0, 1]\n",
     "stability_chart": "[stability_chart]\nhorizontal = [0.1, 0.3]\nvertical = [-1.9, -0.5]\n",

@@ -32,10 +32,13 @@ frequency = 1.5
 force = { amplitude = 1.0 }
 """
 FILES = {
-    "shaking.csv": "time,force\n"
-    + "\n".join(f"{0.1 * i},{math.sin(0.13 * i * i):.6f}" for i in range(200))
-    + "\n",
-    "hinged.py": """
+    "shaking.csv": (
+        "time,force\n"
+        + "\n".join(f"{0.1 * i},{math.sin(0.13 * i * i):.6f}" for i in range(200))
+        + "\n"
+    ),
+    "hinged.py": (
+        """
 from dataclasses import dataclass
 from saltus import OneContactModel
 
@@ -47,23 +50,38 @@ class Hinged(OneContactModel):
 
     def acceleration(self, t, x, velocity, side, load):
         return load.force(t) - self.damping * velocity - x - 0.2 * side
-""",
+"""
+    ),
 }
 STUDIES = {
     "motion": "[simulate]\ntheta = 0.3\nperiods = 200\n",
     "portrait": "[phase_portrait]\nduration = 20\n",
-    "spectrum": "[response_spectrum]\nbounds = [0.95, 1.05]\nmax_period = 1\nstarts = 4\neffort = 'quick'\n",
+    "spectrum": (
+        "[response_spectrum]\nbounds = [0.95, 1.05]\nmax_period = 1\nstarts = 4\neffort = 'quick'\n"
+    ),
     "attractors": "[attractors]\nstarts = 8\nmax_period = 2\n",
-    "basins": "[basins]\ntheta = { from = -1, to = 1, count = 20 }\nvelocity = { from = -1, to = 1, count = 20 }\nrows = 2\n",
-    "chart": "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 8 }\n"
-    "vertical = { from = -0.9, to = -0.3, count = 8 }\nstarts = 2\nperiods = 60\n",
-    "borders": "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 4 }\n"
-    "vertical = { from = -0.9, to = -0.3, count = 3 }\nstarts = 2\nperiods = 60\ncurves = 1\n",
+    "basins": (
+        "[basins]\ntheta = { from = -1, to = 1, count = 20 }\nvelocity = { from = -1, to = 1, count"
+        " = 20 }\nrows = 2\n"
+    ),
+    "chart": (
+        "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 8 }\n"
+        "vertical = { from = -0.9, to = -0.3, count = 8 }\nstarts = 2\nperiods = 60\n"
+    ),
+    "borders": (
+        "[stability_chart]\nhorizontal = { from = 0.1, to = 0.5, count = 4 }\n"
+        "vertical = { from = -0.9, to = -0.3, count = 3 }\nstarts = 2\nperiods = 60\ncurves = 1\n"
+    ),
     "record": "[simulate]\ntheta = 0.3\nperiods = 60\n",
-    "own model": "[stability_chart]\nhorizontal = { from = 0.5, to = 1.0, count = 5 }\n"
-    "vertical = { from = 1.4, to = 1.8, count = 6 }\n"
-    'paths = ["load.force.amplitude", "load.frequency"]\nstarts = 2\nperiods = 60\nrows = 1\n',
-    "own basins": "[basins]\nx = { from = -1, to = 1, count = 16 }\nvelocity = { from = -1, to = 1, count = 16 }\nrows = 2\n",
+    "own model": (
+        "[stability_chart]\nhorizontal = { from = 0.5, to = 1.0, count = 5 }\n"
+        "vertical = { from = 1.4, to = 1.8, count = 6 }\n"
+        'paths = ["load.force.amplitude", "load.frequency"]\nstarts = 2\nperiods = 60\nrows = 1\n'
+    ),
+    "own basins": (
+        "[basins]\nx = { from = -1, to = 1, count = 16 }\nvelocity = { from = -1, to = 1, count ="
+        " 16 }\nrows = 2\n"
+    ),
 }
 INTERRUPTS = 8  # of each kind of study
 # a phase portrait is of a constant load
@@ -181,13 +199,14 @@ def test_a_process_that_compiles_computes_the_same_bytes_as_one_that_loads(tmp_p
     own, then loaded from it.
     """
     script = (
-        "import hashlib, numpy as np, saltus\n"
-        "model = saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1)\n"
-        "load = saltus.Load(frequency=0.5, horizontal=saltus.Harmonic(amplitude=2.0), vertical=-0.5)\n"
-        "system = saltus.System(model=model, load=load)\n"
-        "many = saltus.simulate_many(system, theta=np.linspace(-1, 1, 200), velocity=0.1, periods=200, tol=1e-11)\n"
-        "one = saltus.simulate(system, theta=0.3, periods=100)\n"
-        "print(hashlib.sha256(many['theta'].values.tobytes() + np.float64(one.theta).tobytes()).hexdigest())\n"
+        "import hashlib, numpy as np, saltus\nmodel = saltus.Metainterface(beta0=np.deg2rad(80),"
+        " damping=0.1)\nload = saltus.Load(frequency=0.5,"
+        " horizontal=saltus.Harmonic(amplitude=2.0), vertical=-0.5)\nsystem ="
+        " saltus.System(model=model, load=load)\nmany = saltus.simulate_many(system,"
+        " theta=np.linspace(-1, 1, 200), velocity=0.1, periods=200, tol=1e-11)\none ="
+        " saltus.simulate(system, theta=0.3,"
+        " periods=100)\nprint(hashlib.sha256(many['theta'].values.tobytes() +"
+        " np.float64(one.theta).tobytes()).hexdigest())\n"
     )
     monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
     runs = [

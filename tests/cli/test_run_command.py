@@ -25,8 +25,14 @@ from saltus.theory import equilibria
 MODEL = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\ndamping = 0.1\n'
 FORCED = MODEL + "[load]\nfrequency = 1.0\nhorizontal = { amplitude = 0.5 }\nvertical = -0.5\n"
 CONSTANT = MODEL + "[load]\nhorizontal = 0.05\nvertical = -1.5\n"
-CHART = "[stability_chart]\nhorizontal = { from = 0, to = 0.5, count = 6 }\nvertical = { from = -1, to = -0.1, count = 4 }\n"
-BASINS = "[basins]\ntheta = { from = -2, to = 2, count = 6 }\nvelocity = { from = -2, to = 2, count = 5 }\n"
+CHART = (
+    "[stability_chart]\nhorizontal = { from = 0, to = 0.5, count = 6 }\nvertical = { from = -1, to"
+    " = -0.1, count = 4 }\n"
+)
+BASINS = (
+    "[basins]\ntheta = { from = -2, to = 2, count = 6 }\nvelocity = { from = -2, to = 2, count ="
+    " 5 }\n"
+)
 DIAGRAM = "bounds = [0.8, 1.0]\nmax_period = 1\nvalues = [0.88]\nstarts = 6\nbands = false\n"
 
 
@@ -49,8 +55,8 @@ def files(folder):
 
 def test_a_study_asks_for_a_motion_a_portrait_and_attractors_at_once(saltus, study, tmp_path):
     path = study(
-        CONSTANT
-        + "[simulate]\ntheta = 0.3\nduration = 5\n[phase_portrait]\nduration = 5\n[attractors]\nstarts = 32\n"
+        CONSTANT + "[simulate]\ntheta = 0.3\nduration = 5\n[phase_portrait]\nduration ="
+        " 5\n[attractors]\nstarts = 32\n"
     )
     result = saltus("run", path, "-o", tmp_path / "out")
     assert result.exit_code == 0
@@ -128,9 +134,9 @@ def test_basins_are_those_of_python_and_their_cells_stay_in_a_store(saltus, stud
 
 def test_a_chart_of_lengths_has_no_radians(saltus, study, tmp_path):
     path = study(
-        '[model]\ntype = "WallOscillator"\nwall = 0.5\ndamping = 0.2\n[load]\nfrequency = 1\nforce = { amplitude = 0.6 }\n'
-        '[stability_chart]\nhorizontal = [0.3, 0.6]\nvertical = [0.9, 1.1]\npaths = ["load.force.amplitude", "load.frequency"]\n'
-        "starts = 2\n"
+        '[model]\ntype = "WallOscillator"\nwall = 0.5\ndamping = 0.2\n[load]\nfrequency = 1\nforce'
+        " = { amplitude = 0.6 }\n[stability_chart]\nhorizontal = [0.3, 0.6]\nvertical = [0.9,"
+        ' 1.1]\npaths = ["load.force.amplitude", "load.frequency"]\nstarts = 2\n'
     )
     result = saltus("run", path, "-o", tmp_path / "out", "--no-plot")
     assert re.search(r"in 4 of 4 cells, the largest amplitude is [\d.]+\d\.\n", result.stdout)
@@ -171,7 +177,10 @@ REFUSED = {
     ),
     "count_text": (
         FORCED + '[basins]\ntheta = { from = 0, to = 1, count = "9" }\n',
-        'basins.theta has a count that must be a number, got the text "9"; write it without quotes: 9',
+        (
+            'basins.theta has a count that must be a number, got the text "9"; write it without'
+            " quotes: 9"
+        ),
     ),
     "count_near": (
         FORCED + "[basins]\ntheta = { from = 0, to = 1, cont = 9 }\n",
@@ -323,7 +332,10 @@ def test_a_scheduler_that_is_of_no_use_is_refused(
 
 # --- a real process ----------------------------------------------------------
 
-LONG_CHART = "[stability_chart]\nhorizontal = [0, 0.3]\nvertical = { from = -1, to = -0.1, count = 16 }\nrows = 1\nstarts = 6\n"
+LONG_CHART = (
+    "[stability_chart]\nhorizontal = [0, 0.3]\nvertical = { from = -1, to = -0.1, count = 16"
+    " }\nrows = 1\nstarts = 6\n"
+)
 
 
 def test_an_interrupted_chart_goes_on_where_it_was(started, saltus, study, tmp_path):

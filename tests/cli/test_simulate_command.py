@@ -17,8 +17,8 @@ from saltus.systems import System
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SYSTEM = '[model]\ntype = "Metainterface"\nbeta0 = "80 deg"\n'
 SHORT = (
-    SYSTEM
-    + "damping = 0.1\n[load]\nfrequency = 1\nhorizontal = { amplitude = 0.5 }\nvertical = -0.5\n[simulate]\ntheta = 0.3\n"
+    SYSTEM + "damping = 0.1\n[load]\nfrequency = 1\nhorizontal = { amplitude = 0.5 }\nvertical ="
+    " -0.5\n[simulate]\ntheta = 0.3\n"
 )
 
 
@@ -72,8 +72,8 @@ def test_the_default_folder_bears_the_studys_name(saltus, study, tmp_path, monke
 
 def test_the_summary_tells_impacts_and_rest(saltus, study, tmp_path):
     text = (
-        SYSTEM
-        + 'damping = 0.1\n[load]\nvertical = -0.5\n[impact]\ntype = "VelocityReduction"\ne = 0.8\n[simulate]\ntheta = 0.3\n'
+        SYSTEM + 'damping = 0.1\n[load]\nvertical = -0.5\n[impact]\ntype = "VelocityReduction"\ne ='
+        " 0.8\n[simulate]\ntheta = 0.3\n"
     )
     out = saltus("simulate", study(text + "duration = 30\n"), "-o", tmp_path, "--no-plot").stdout
     assert "the time asked for, at rest" in out
@@ -111,8 +111,8 @@ def test_a_motion_that_is_not_unique_is_refused(refused, study, tmp_path):
 def test_an_impact_without_a_solution_is_refused(refused, study, tmp_path):
     # T+ = T-/2 is below the energy that the ground's own velocity leaves at any theta' (errata 26).
     text = (
-        SYSTEM
-        + "[load]\nfrequency = 1\nvertical = -0.5\nground_horizontal = { amplitude = 2 }\n[impact]\n"
+        SYSTEM + "[load]\nfrequency = 1\nvertical = -0.5\nground_horizontal = { amplitude = 2"
+        " }\n[impact]\n"
     )
     path = study(
         text + 'type = "EnergyRestitution"\nr = 0.01\n[simulate]\ntheta = 0.1\nduration = 20\n'
@@ -191,9 +191,9 @@ def test_the_example_model_is_also_a_script():
 
 def test_an_operation_that_cannot_be_traced_is_refused(refused, study, tmp_path):
     (tmp_path / "own.py").write_text(
-        "from dataclasses import dataclass\nimport numpy as np\nfrom saltus.systems import Model\n\n"
-        "@dataclass(frozen=True)\nclass Own(Model):\n"
-        "    def acceleration(self, t, theta, velocity, side, load):\n        return -np.floor(theta)\n"
+        "from dataclasses import dataclass\nimport numpy as np\nfrom saltus.systems import"
+        " Model\n\n@dataclass(frozen=True)\nclass Own(Model):\n    def acceleration(self, t, theta,"
+        " velocity, side, load):\n        return -np.floor(theta)\n"
     )
     path = study('[model]\ntype = "own.py:Own"\n[simulate]\nduration = 1\n')
     sentence = refused("simulate", path, "-o", tmp_path / "out")
@@ -205,7 +205,10 @@ def test_an_interrupt_within_an_exec_ends_with_status_130(started, study, tmp_pa
     """dataclasses and numba exec texts, and Python treats an interrupt there as one that nothing
     has caught.
     """
-    wait = "import os, signal, threading; os.kill(os.getpid(), signal.SIGINT); threading.Event().wait(30)"
+    wait = (
+        "import os, signal, threading; os.kill(os.getpid(), signal.SIGINT);"
+        " threading.Event().wait(30)"
+    )
     (tmp_path / "own.py").write_text(f"exec({wait!r})\n")
     process = started(
         [sys.executable, "-m", "saltus", "info", study('[model]\ntype = "own.py:Own"\n')],

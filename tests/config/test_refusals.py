@@ -89,8 +89,8 @@ CASES = {
     "one_contact": (
         MODEL + '[impact]\ntype = "NewtonImpact"\ne = 0.5\n',
         (
-            "a Metainterface passes its contact and does not bounce there, so that impact.e must be "
-            "0, got 0.5"
+            "a Metainterface passes its contact and does not bounce there, so that impact.e must be"
+            " 0, got 0.5"
         ),
     ),
     "smoothing": (

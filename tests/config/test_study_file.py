@@ -78,8 +78,8 @@ def test_angles_are_degrees_or_radians(study, written, radians):
 
 def test_every_angle_may_be_in_degrees(study):
     read = study(
-        '[model]\ntype = "RockingBlock"\nalpha = "15 deg"\n[load]\nfrequency = 2\n'
-        'ground_horizontal = { amplitude = 0.1, phase = "90 deg" }\n[simulate]\ntheta = "-5 deg"\nduration = 3\n'
+        '[model]\ntype = "RockingBlock"\nalpha = "15 deg"\n[load]\nfrequency = 2\nground_horizontal'
+        ' = { amplitude = 0.1, phase = "90 deg" }\n[simulate]\ntheta = "-5 deg"\nduration = 3\n'
     )
     assert read.system.model == RockingBlock(alpha=math.radians(15))
     assert read.system.get("load.ground_horizontal.phase") == math.pi / 2
@@ -90,7 +90,8 @@ def test_every_angle_may_be_in_degrees(study):
 
 def test_a_list_is_the_sum_of_its_signals(study):
     read = study(
-        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[load]\nfrequency = 1\nhorizontal = [0.2, { amplitude = 0.5, order = 3 }]\n'
+        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[load]\nfrequency = 1\nhorizontal = [0.2, {'
+        " amplitude = 0.5, order = 3 }]\n"
     )
     assert read.system.load == Load(
         frequency=1.0, horizontal=Harmonic(amplitude=0.5, order=3).__radd__(0.2)
@@ -114,7 +115,8 @@ def test_impact_laws(study, table, law):
 
 def test_the_wall_oscillator_starts_at_x(study):
     read = study(
-        '[model]\ntype = "WallOscillator"\nwall = 0.5\n[load]\nforce = 0.1\n[simulate]\nx = -0.2\nduration = 4\n'
+        '[model]\ntype = "WallOscillator"\nwall = 0.5\n[load]\nforce = 0.1\n[simulate]\nx ='
+        " -0.2\nduration = 4\n"
     )
     assert read.system.model == WallOscillator(wall=0.5)
     assert read.settings().arguments["x"] == -0.2
@@ -122,8 +124,9 @@ def test_the_wall_oscillator_starts_at_x(study):
 
 def test_all_settings(study):
     settings = study(
-        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = -0.1\nvelocity = 2\nduration = 3\ntol = 1e-8\n'
-        'time = 1.5\nside = -1\nstop_at = ["line_limit", "reaction"]\nsamples = 11\n'
+        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = -0.1\nvelocity ='
+        ' 2\nduration = 3\ntol = 1e-8\ntime = 1.5\nside = -1\nstop_at = ["line_limit",'
+        ' "reaction"]\nsamples = 11\n'
     ).settings()
     assert settings.arguments == {
         "theta": -0.1,
@@ -139,7 +142,8 @@ def test_all_settings(study):
 
 def test_what_a_run_is_given_takes_the_place_of_the_file_s_own(study):
     read = study(
-        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = 0.1\nduration = 3\ntol = 1e-8\n'
+        '[model]\ntype = "Metainterface"\nbeta0 = 1\n[simulate]\ntheta = 0.1\nduration = 3\ntol ='
+        " 1e-8\n"
     )
     motion = read.run(duration=0.5, tol=1e-10)
     assert (motion.time, motion.tol) == (0.5, 1e-10)

@@ -134,7 +134,9 @@ class Cases:
         return system, {"velocity": velocity, "time": float(self.time[i]), **state, **self.span}
 
     def alone(self, i: int, **options: Any) -> Any:
-        """One case by the scalar kernel: its motion, or the name of the reason why there is none."""
+        """One case by the scalar kernel: its motion, or the name of the reason why there is
+        none.
+        """
         system, arguments = self.one(i)
         try:
             return saltus.simulate(system, **(arguments | {"dense": False} | options))
@@ -345,7 +347,9 @@ def constant_loads(rng, n):
 
 
 def records(rng, n):
-    """A force record, a ground acceleration and a ground displacement of samples at unequal times."""
+    """A force record, a ground acceleration and a ground displacement of samples at unequal
+    times.
+    """
     fixed = np.random.default_rng(5)  # the records are part of the system
     t = np.cumsum(fixed.uniform(0.2, 1.0, 30)) - 8.0
     load = Load(
@@ -399,8 +403,9 @@ def rocking(rng, n, impact=None):
     columns = {
         "model.alpha": rng.uniform(0.05, 0.8, n),
         "load.frequency": frequency,
-        "load.ground_horizontal.amplitude": mixed(rng, n, 0.0, rng.uniform(0, 1.5, n))
-        / frequency**2,
+        "load.ground_horizontal.amplitude": (
+            mixed(rng, n, 0.0, rng.uniform(0, 1.5, n)) / frequency**2
+        ),
         "load.ground_vertical.amplitude": mixed(rng, n, 0.0, rng.uniform(0, 0.5, n)) / frequency**2,
     }
     if impact is None:

@@ -421,7 +421,9 @@ def checked_impacts(drawn: Drawn, motion, rows: np.ndarray) -> Impacts:
 
 
 def check_balances(drawn: Drawn, duration: float) -> list[str]:
-    """Follow a motion and compare it with all that it must keep; returns the kinds of its events."""
+    """Follow a motion and compare it with all that it must keep; returns the kinds of its
+    events.
+    """
     layout, system, given = drawn.layout, drawn.system, drawn.given
     motion = saltus.simulate(system, **drawn.start, duration=duration)
     n, rows, count = (

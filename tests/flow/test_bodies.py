@@ -200,7 +200,9 @@ def energy(model, position, velocity):
 
 
 def check_balances(row, random):
-    """Momentum, and energy with half the sum of J (1 - e) abs(v-); returns the number of impacts."""
+    """Momentum, and energy with half the sum of J (1 - e) abs(v-); returns the number of
+    impacts.
+    """
     count = len(row.coordinates)
     masses, e = random.uniform(0.2, 3.0, count), random.uniform(0.3, 1.0)
     model = row(
@@ -234,7 +236,9 @@ def check_balances(row, random):
 
 
 def checked(rows, check, random):
-    """The impacts of ten thousand motions of rows, each checked, and how many of them were refused."""
+    """The impacts of ten thousand motions of rows, each checked, and how many of them were
+    refused.
+    """
     impacts, refused = 0, 0
     for i in range(10_000):
         try:
@@ -262,7 +266,9 @@ def test_ten_thousand_rows_of_two_to_eight_bodies_keep_the_balances():
 
 @dataclass(frozen=True, kw_only=True)
 class Ball(ContactModel):
-    """x'' = -g above a table, and below a ceiling at a height over it, that move with the ground."""
+    """x'' = -g above a table, and below a ceiling at a height over it, that move with the
+    ground.
+    """
 
     gravity: float = 1.0
     height: float = 50.0
@@ -433,9 +439,10 @@ class Duffing(ContactModel):
 
     def force(self, t, q, v, load):
         pull = 0.6 * (q[1] - q[0]) + self.cubic * (q[1] - q[0]) ** 3
-        return load.force(t) - 0.05 * v[0] - q[0] - self.cubic * q[0] ** 3 + pull, -pull - 0.05 * v[
-            1
-        ]
+        return (
+            load.force(t) - 0.05 * v[0] - q[0] - self.cubic * q[0] ** 3 + pull,
+            -pull - 0.05 * v[1],
+        )
 
 
 def duffing_by_dop853(state, end, e=0.8):
@@ -482,7 +489,8 @@ def test_two_duffing_oscillators_that_hit_each_other_and_a_wall_move_as_dop853_w
     np.testing.assert_allclose(motion.final_state, state, rtol=0, atol=1e-11)
 
 
-# --- all at once: coefficients that are no whole numbers, a table that shakes, and a mass that hits both ---
+# --- all at once: coefficients that are no whole numbers, a table that shakes, and a mass that hits
+# both ---
 
 
 @dataclass(frozen=True, kw_only=True)

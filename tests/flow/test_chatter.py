@@ -36,7 +36,9 @@ def pulls(numbers, t):
 
 
 def law(numbers, v0, t, lower_factor=1.0):
-    """Speed on the upper side at t from v0 at 0; on the lower side it is `lower_factor` times that."""
+    """Speed on the upper side at t from v0 at 0; on the lower side it is `lower_factor` times
+    that.
+    """
     damping = (numbers["C"] * numbers.get("c", 1.0) / (1 + numbers.get("m", 0.0)), numbers["C"])
 
     def sums(s):
@@ -96,7 +98,9 @@ CONSERVATIVE = {"C": 0.0, "V": -0.5, "H": 0.06, "W": 0.2}
 
 
 def worst_relative_error(numbers, v0, duration, lower_factor=1.0, impact=None):
-    """Of the law against the impacts that the kernel resolves, all those that leave the upper side."""
+    """Of the law against the impacts that the kernel resolves, all those that leave the upper
+    side.
+    """
     motion = simulate(
         forced(**numbers, impact=impact), theta=0.0, velocity=-v0, duration=duration, tol=1e-15
     )

@@ -16,7 +16,9 @@ from saltus.systems import ContactModel, Harmonic, Load, System
 
 @dataclass(frozen=True, kw_only=True)
 class Row(ContactModel):
-    """Masses in a row, each above a wall of its own, with springs and dampers between neighbours."""
+    """Masses in a row, each above a wall of its own, with springs and dampers between
+    neighbours.
+    """
 
     stiffness: float = 0.4
     damping: float = 0.1
@@ -91,7 +93,9 @@ def derivatives(system, start, duration, paths=()):
 
 
 def moved(system, start, k, by, paths):
-    """The system and start with the k-th of the numbers of the start and of the parameters moved."""
+    """The system and start with the k-th of the numbers of the start and of the parameters
+    moved.
+    """
     if k < len(start):
         return system, np.array(start) + by * (np.arange(len(start)) == k)
     path = paths[k - len(start)]

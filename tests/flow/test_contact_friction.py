@@ -524,7 +524,9 @@ def test_a_mass_leaves_the_wall_where_it_is_pulled_with_more_than_static_frictio
 
 
 def test_two_bodies_that_rub_each_other_stop_together():
-    """Friction along y - x: momentum is kept, and the distance slides (v^2 / 2) / (mu (1 + 1 / m))."""
+    """Friction along y - x: momentum is kept, and the distance slides (v^2 / 2) / (mu (1 + 1 /
+    m)).
+    """
 
     @dataclass(frozen=True, kw_only=True)
     class Pair(saltus.ContactModel):

@@ -20,7 +20,9 @@ from saltus.taylor.rules import FUNCTIONS
 
 @dataclass(frozen=True, kw_only=True)
 class FallingBlock(ContactModel):
-    """A block of mass 1 that falls on one of its corners, which lies at the height y - depth(tilt)."""
+    """A block of mass 1 that falls on one of its corners, which lies at the height y -
+    depth(tilt).
+    """
 
     half_width: float = 0.4
     half_height: float = 0.7

@@ -131,7 +131,9 @@ def test_ten_thousand_rows_between_walls_keep_the_balances():
 
 @dataclass(frozen=True, kw_only=True)
 class Ball(ContactModel):
-    """x'' = -g between a table that shakes and a ceiling that does not: two gaps of one coordinate."""
+    """x'' = -g between a table that shakes and a ceiling that does not: two gaps of one
+    coordinate.
+    """
 
     gravity: float = 0.3
     height: float = 2.5
@@ -417,7 +419,9 @@ def test_lanes_with_a_dependent_gap_are_followed_as_one_by_one():
 
 
 def test_a_class_that_is_no_dataclass_may_keep_sums():
-    """A model without numbers of its own works without the decorator in each kind of coordinates."""
+    """A model without numbers of its own works without the decorator in each kind of
+    coordinates.
+    """
 
     class Pair(ContactModel):
         coordinates = ("a", "b")

@@ -119,8 +119,9 @@ def test_100_random_motions_agree_with_heyoka_to_1e_9(integrator, record_propert
             worst = max(worst, np.abs(state - [motion.theta, motion.velocity]).max())
             compared, impacts = compared + 1, impacts + len(times)
     said = (
-        f"{compared} of {CASES} compared, {impacts} impacts, largest difference {worst:.1e}; "
-        f"left out: {grazing} near a grazing or at rest, {sensitive} with a derivative above {LARGE_DERIVATIVE:g}"
+        f"{compared} of {CASES} compared, {impacts} impacts, largest difference {worst:.1e}; left"
+        f" out: {grazing} near a grazing or at rest, {sensitive} with a derivative above"
+        f" {LARGE_DERIVATIVE:g}"
     )
     record_property("comparison", said)
     print(said)

@@ -53,7 +53,9 @@ class Order(NamedTuple):
 
 
 class Few(NamedTuple):
-    """A group of lanes with the three series of one coordinate, and slots for what goes in and out."""
+    """A group of lanes with the three series of one coordinate, and slots for what goes in and
+    out.
+    """
 
     memory: Any
     places: Any

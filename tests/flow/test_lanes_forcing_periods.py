@@ -20,8 +20,10 @@ RECORD = Record([-2.0, -0.7, 0.31, 1.3, 2.9, 9.0], [0.0, 0.3, -0.2, 0.4, 0.1, 0.
 SYSTEMS = {
     "short": forced(H=0.0, e=0.9).with_(SHORT),
     "ordinary": forced(e=0.9, H=0.3, W=2.0),
-    "record": forced(H=0.0, e=0.9).with_(
-        {"load": Load(frequency=7.0, horizontal=RECORD + Harmonic(0.1), vertical=-0.5)}
+    "record": (
+        forced(H=0.0, e=0.9).with_(
+            {"load": Load(frequency=7.0, horizontal=RECORD + Harmonic(0.1), vertical=-0.5)}
+        )
     ),
 }
 
@@ -29,7 +31,9 @@ SYSTEMS = {
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize(("time", "periods"), [(0.3, 20.0), (-1e-20, 12.0), (-1.3, 17.4)])
 def test_each_period_has_what_the_scalar_motion_has_in_it(system, time, periods):
-    """State, extrema, impacts and least speed; the time at the end, and how many periods it took."""
+    """State, extrema, impacts and least speed; the time at the end, and how many periods it
+    took.
+    """
     system, starts = SYSTEMS[system], np.array([0.3, 0.7])
     ends = saltus.simulate_many(
         system, theta=starts, time=time, periods=periods, sample=KINDS, last="all", tol=1e-13

@@ -59,7 +59,9 @@ def test_a_ball_comes_to_rest_on_a_floor_anywhere(floor: float, gravity: float, 
 
 
 def test_friction_shortens_the_bounces_of_a_ball_in_millimetres() -> None:
-    """Up with g + mu, down with g - mu: each bounce has e sqrt((g - mu) / (g + mu)) of the speed."""
+    """Up with g + mu, down with g - mu: each bounce has e sqrt((g - mu) / (g + mu)) of the
+    speed.
+    """
     gravity, mu, e, floor = 9810.0, 1962.0, 0.6, 1000.0
     ball = saltus.System(model=Ball(floor=floor, gravity=gravity, rub=mu), impact=NewtonImpact(e))
     motion = saltus.simulate(ball, y=floor + 500.0, duration=3.0)

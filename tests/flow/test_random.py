@@ -27,7 +27,9 @@ SLOWEST = 20.0  # seconds: a motion that takes longer hangs
 
 
 def system(*, beta0, C, k, m, c, W, H, phase, mean, V, V_wave, lower, zeta, nu, impact):
-    """Every channel carries something; all these systems share one structure for each impact law."""
+    """Every channel carries something; all these systems share one structure for each impact
+    law.
+    """
     return System(
         model=Metainterface(
             beta0=beta0, damping=C, stiffness_ratio=k, mass_ratio=m, dissipation_ratio=c

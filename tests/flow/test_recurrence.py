@@ -1,4 +1,6 @@
-"""Recurrence: rest, periods, extrema and impacts of many motions at once, against single motions."""
+"""Recurrence: rest, periods, extrema and impacts of many motions at once, against single
+motions.
+"""
 
 import numpy as np
 import pytest

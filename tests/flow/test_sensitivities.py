@@ -106,9 +106,11 @@ def test_all_derivatives_are_those_of_a_30_digit_motion(numbers, start, impacts,
     span = (length.get("periods"), length.get("duration"))
     with mp.workdps(30):
         columns = [
-            difference(lambda x: precise(numbers, (x, start[1]), *span), start[0])
-            if start[0]
-            else None,
+            (
+                difference(lambda x: precise(numbers, (x, start[1]), *span), start[0])
+                if start[0]
+                else None
+            ),
             difference(lambda v: precise(numbers, (start[0], v), *span), start[1]),
             *(
                 difference(
@@ -220,7 +222,9 @@ def test_the_wall_s_place_and_law_and_the_oscillator_s_numbers():
 
 
 def test_the_start_counts_in_the_derivative_to_the_frequency():
-    """From time t0 on H(t) = H sin(W t): W moves the phase at the start as well, by t0 a unit of W."""
+    """From time t0 on H(t) = H sin(W t): W moves the phase at the start as well, by t0 a unit of
+    W.
+    """
     t0, system = 12345.678, forced(H=0.5, W=1.3)
     late = saltus.sensitivities(
         system, theta=0.3, duration=9.0, time=t0, parameters=("load.frequency",), tol=1e-14

@@ -104,7 +104,9 @@ def test_the_end_of_an_accumulation_on_unequal_layers_moves_as_its_differences_d
 
 
 def test_a_release_moves_with_the_load_that_holds_it():
-    """Rest ends where H sin(W t) = abs(V) / tan(beta0); what came before the rest does not matter."""
+    """Rest ends where H sin(W t) = abs(V) / tan(beta0); what came before the rest does not
+    matter.
+    """
     H, W, V = 0.25, 0.05, -0.5
     system = forced(e=0.3, H=H, W=W, C=0.3, V=V)
     result = saltus.sensitivities(system, theta=0.05, duration=20.0, parameters=SHARED_PATHS)

@@ -18,7 +18,9 @@ SMOOTH = EXACT.with_({"model.smoothing": 50.0})
 
 
 def smoothed_acceleration(t, theta, velocity, sharpness):
-    """`gov_eqn_theta_long` with k = c = 1, m = 0 and q of `smoothing` for the sign, written again."""
+    """`gov_eqn_theta_long` with k = c = 1, m = 0 and q of `smoothing` for the sign, written
+    again.
+    """
     power = math.exp(min(sharpness * theta, 700.0))
     q = (power - 1) / (power + 1)
     angle = math.radians(80) + theta * q

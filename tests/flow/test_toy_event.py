@@ -22,25 +22,31 @@ PEAK = {
         '    CROSSING = "crossing"': '    CROSSING = "crossing"\n    PEAK = "peak"\n    # once'
     },
     "flow/one_contact/kernel.py": {
-        "    tau = first * h if hit >= 0 else h\n": """\
+        "    tau = first * h if hit >= 0 else h\n": (
+            """\
     tau = first * h if hit >= 0 else h
     if motion.velocity_series[0, 0] > 0.0:
         top = margin_root(motion.velocity_series[0], order, h, poly) * h
         if top < tau:
             record_event(motion, EventCode.PEAK, 0, t + top, 0.0, 0.0)
 """
+        )
     },
     "flow/motion/motion.py": {
-        '    dataset.attrs = {"title": "motion computed by saltus"': """\
+        '    dataset.attrs = {"title": "motion computed by saltus"': (
+            """\
     dataset["peak_time"] = ("peak", motion.events.of(EventKind.PEAK).times, {"units": "1"})
     dataset.attrs = {"title": "motion computed by saltus\""""
+        )
     },
     "plots/motion.py": {
-        "    limit = _limit_angle(dataset)\n": """\
+        "    limit = _limit_angle(dataset)\n": (
+            """\
     for peak in dataset["peak_time"].values:
         history.axvline(peak, gid="peak")
     limit = _limit_angle(dataset)
 """
+        )
     },
 }
 MOTION = """

@@ -182,12 +182,14 @@ class Recipe:
                 )
                 for s in self.surfaces
             ),
-            lag=None
-            if self.lag is None
-            else replace(
-                self.lag,
-                span=self.lag.span * time,
-                push=tuple(k * stiffness for k in self.lag.push),
+            lag=(
+                None
+                if self.lag is None
+                else replace(
+                    self.lag,
+                    span=self.lag.span * time,
+                    push=tuple(k * stiffness for k in self.lag.push),
+                )
             ),
             lag_start=self.lag_start * length,
             bias=self.bias * force,
@@ -372,9 +374,11 @@ class Recipe:
             position=np.append(self.position, 0.3 * v.length),
             velocity=np.append(self.velocity, 0.2 * v.length / v.time),
             contacts=tuple(replace(c, row=more(c.row)) for c in self.contacts),
-            lag=None
-            if self.lag is None
-            else replace(self.lag, row=more(self.lag.row), push=more(self.lag.push)),
+            lag=(
+                None
+                if self.lag is None
+                else replace(self.lag, row=more(self.lag.row), push=more(self.lag.push))
+            ),
             view=replace(v, places=self._places()),
         )
 
@@ -788,7 +792,9 @@ def _positive(rng: np.random.Generator, size: int, coupling: float = 0.3) -> np.
 
 
 def _basis(name: str, size: int, rng: np.random.Generator, **parts: Any) -> Recipe:
-    """A recipe of a size, shaken harmonically, with what is given in the place of what is random."""
+    """A recipe of a size, shaken harmonically, with what is given in the place of what is
+    random.
+    """
     places = range(size)
     frequency = float(rng.uniform(0.6, 2.0))
     loads = tuple(

@@ -1,4 +1,6 @@
-"""What the verbs answer does not depend on units, origin, order, inert parts, mirror and rounding."""
+"""What the verbs answer does not depend on units, origin, order, inert parts, mirror and
+rounding.
+"""
 
 from __future__ import annotations
 

@@ -53,7 +53,10 @@ def differences(
                 if not low < value < high:
                     continue
                 again = saltus.continue_orbit(orbit, path, (low, high))
-                where = f"{special.kind} {special.parameter:.9g} from {value:.9g} in ({low:.4g}, {high:.4g})"
+                where = (
+                    f"{special.kind} {special.parameter:.9g} from {value:.9g} in ({low:.4g},"
+                    f" {high:.4g})"
+                )
                 between = min(low, high) < special.parameter < max(low, high)
                 if between and not is_in(str(special.kind), special.parameter, listed(again), near):
                     found.append(f"{where}: not found again, {listed(again)} {again.ends}")

@@ -51,7 +51,9 @@ class TwoBlocks(saltus.ContactModel):
 
 @pytest.fixture(scope="module")
 def orbit() -> saltus.PeriodicOrbit:
-    """The motion in step, in which both turn round at one instant twice a period and never stick."""
+    """The motion in step, in which both turn round at one instant twice a period and never
+    stick.
+    """
     load = saltus.Load(frequency=FREQUENCY, force=saltus.Harmonic(amplitude=1.0))
     return saltus.find_orbit(
         saltus.System(model=TwoBlocks(), load=load), x=0.2, y=-0.1, velocity=(0.1, 0.0)

@@ -64,7 +64,9 @@ def listed(branch: saltus.Branch) -> list[tuple[str, float]]:
 
 @pytest.fixture(scope="module")
 def in_small_steps() -> list[tuple[str, float]]:
-    """The special points of the orbits of four periods, from their birth over a fold to their end."""
+    """The special points of the orbits of four periods, from their birth over a fold to their
+    end.
+    """
     branch = branch_through(0.597, 4, (0.5, 0.8), step=0.02)
     assert max(orbit.defect for orbit in branch.orbits[1:-1:16]) < 1e-9
     return listed(branch)

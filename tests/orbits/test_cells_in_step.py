@@ -94,7 +94,9 @@ def test_multipliers_of_cells_that_close_alike_are_those_of_their_motion() -> No
 
 @pytest.mark.thorough
 def test_multipliers_of_eight_cells_are_those_of_differences_of_motions() -> None:
-    """Without restitution a cell has one layer open at a time: eight angles and their rates move."""
+    """Without restitution a cell has one layer open at a time: eight angles and their rates
+    move.
+    """
     load = saltus.Load(frequency=1.0, vertical=-0.5, horizontal=saltus.Harmonic(amplitude=0.15))
     model = saltus.CellChain(beta0=BETA80, cells=8, coupling=0.5, damping=0.1)
     system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.0))
@@ -147,7 +149,9 @@ def test_multipliers_are_the_rate_at_which_a_motion_beside_it_comes_back(
 def test_rounding_makes_no_special_points_along_their_branch(
     in_step: saltus.PeriodicOrbit, branch: saltus.Branch
 ) -> None:
-    """What the cells do at one instant comes in an order that rounding decides, at each point anew."""
+    """What the cells do at one instant comes in an order that rounding decides, at each point
+    anew.
+    """
     assert not branch.special
     assert [str(end) for end in branch.ends] == ["bound 0.999", "bound 1.01"]
     assert all(same_orbit(orbit, orbit) for orbit in branch.orbits)

@@ -250,7 +250,9 @@ def test_a_branch_ends_where_one_layer_is_at_its_contact_as_the_other_one_closes
 
 @dataclass(frozen=True, kw_only=True)
 class ImpactAbsorber(saltus.ContactModel):
-    """x'' + 2 zeta x' + x = F(tau) + r, eps y'' = -r, with y a ball in a cavity of x: |x - y| <= b."""
+    """x'' + 2 zeta x' + x = F(tau) + r, eps y'' = -r, with y a ball in a cavity of x: |x - y| <=
+    b.
+    """
 
     zeta: float = 0.02
     eps: float = 0.05

@@ -145,7 +145,7 @@ def test_a_force_that_jumps_keeps_its_grazing_a_square_root():
     system = soft_stop(preload=0.2, amplitude=0.25, frequency=1.6)
     orbit = saltus.find_orbit(system, x=0.0)
     branch = saltus.continue_orbit(orbit, FREQUENCY, (1.0, 2.0))
-    (special, *_) = [s for s in branch.special if s.kind == SpecialKind.GR]
+    special, *_ = [s for s in branch.special if s.kind == SpecialKind.GR]
     assert special.orbit.grazes
     assert not special.orbit.stable
     assert special.orbit.crossings == 0
@@ -191,7 +191,9 @@ def test_an_orbit_is_followed_where_its_contact_becomes_a_singularity():
 
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 def test_no_torus_is_born_where_areas_never_grow(damping):
-    """Without damping the complex pairs lie on the unit circle, and rounding decides on which side."""
+    """Without damping the complex pairs lie on the unit circle, and rounding decides on which
+    side.
+    """
     system = soft_stop(damping=damping, amplitude=0.05, frequency=0.6)
     orbit = saltus.find_orbit(system, x=0.0, settle=0, period=1)
     branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.01, 0.6))
@@ -215,7 +217,7 @@ def test_a_torus_is_born_where_areas_may_grow():
     load = saltus.Load(frequency=1.3, force=saltus.Harmonic(1.5))
     orbit = saltus.find_orbit(saltus.System(model=VanDerPol(), load=load), x=1.0)
     branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.2, 2.0))
-    (torus, *_) = [s for s in branch.special if s.kind == SpecialKind.NS]
+    torus, *_ = [s for s in branch.special if s.kind == SpecialKind.NS]
     assert np.prod(torus.orbit.multipliers).real == pytest.approx(1.0, abs=1e-9)
 
 

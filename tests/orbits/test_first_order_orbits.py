@@ -1,4 +1,6 @@
-"""Orbits, branches, verdicts, attractors and exponents of models with coordinates of first order."""
+"""Orbits, branches, verdicts, attractors and exponents of models with coordinates of first
+order.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,10 @@ def linear(model: Piezo, amplitude: float, frequency: Any) -> tuple[Any, Any]:
     """The complex amplitudes of x and of the voltage without impacts."""
     ratio = model.coupling * 1j * frequency / (1j * frequency + 1.0 / model.resistance)
     push = amplitude * frequency**2
-    return push / (
-        1.0 - frequency**2 + 1j * frequency * model.damping + model.coupling * ratio
-    ), ratio
+    return (
+        push / (1.0 - frequency**2 + 1j * frequency * model.damping + model.coupling * ratio),
+        ratio,
+    )
 
 
 def test_a_linear_harvester_has_the_amplitude_the_multipliers_and_the_power_of_its_closed_form() -> (

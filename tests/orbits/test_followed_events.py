@@ -67,7 +67,9 @@ def test_a_stick_appears_where_the_sliding_motion_reaches_the_speed_of_the_belt(
 def test_a_stick_is_lost_where_den_hartogs_motion_would_stand_still(
     standing: saltus.Branch,
 ) -> None:
-    """Crossing-sliding: at its turning points the force on the mass is all that friction can bear."""
+    """Crossing-sliding: at its turning points the force on the mass is all that friction can
+    bear.
+    """
 
     def reserve(frequency: float) -> float:
         """abs(F(t) - x) - mu at the turning point of the motion that never sticks, solved for half

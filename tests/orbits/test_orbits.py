@@ -95,7 +95,9 @@ def test_multipliers_are_those_of_the_flow(orbit):
                                               ("around a deformed "
                                               "equilibrium"), "small"])  # fmt: skip
 def test_product_of_multipliers_is_the_determinant_law(name):
-    """e^2 for each impact, exp(-C [c T_lower / (1 + m) + T_upper]) for the time spent on each side."""
+    """e^2 for each impact, exp(-C [c T_lower / (1 + m) + T_upper]) for the time spent on each
+    side.
+    """
     orbit = orbit_of(name)
     model, e = orbit.system.model, orbit.system.impact.e
     ends = np.append(orbit.impact_times, orbit.impact_times[:1] + orbit.duration)

@@ -64,7 +64,9 @@ def between_specials(seed):
 
 
 def ends_on_its_bounds(seed):
-    """That a branch within narrower bounds is a part of it: its ends are orbits of the wider one."""
+    """That a branch within narrower bounds is a part of it: its ends are orbits of the wider
+    one.
+    """
     whole, rng = followed(seed, STEP), np.random.default_rng(seed)
     orbit, path, bounds = random_branch(MODELS[seed % len(MODELS)], seed)
     value = orbit.system.get(path)

@@ -358,7 +358,9 @@ def test_shrinks_to_rest_at_hcr_like_the_square_of_what_is_beyond():
 
 
 def test_a_release_lost_on_one_side_and_born_on_it_is_the_same_point():
-    """With a mean load the releases are lost one after the other, at Hcr + mean and at Hcr - mean."""
+    """With a mean load the releases are lost one after the other, at Hcr + mean and at Hcr -
+    mean.
+    """
     both = family_of("unequal layers, a mean load", HHAT, (0.05, 0.25))
     assert [p.kind for p in both.special][:2] == ["RL", "RL"]
     assert [p.parameter for p in both.special][:2] == pytest.approx(
@@ -534,7 +536,9 @@ def dies_away(A):
 
 
 def test_the_wall_may_be_scaled_instead_of_the_force():
-    """The oscillator is linear: every special point in A / d is one in d, found along another path."""
+    """The oscillator is linear: every special point in A / d is one in d, found along another
+    path.
+    """
     force, wall = (
         family_of(OTHER, AMPLITUDE, (0.1, 3.0)),
         family_of(OTHER, "model.wall", (0.1, 0.5)),

@@ -88,7 +88,9 @@ def low_frequency_special(kind: str) -> SpecialPoint:
 
 @cache
 def low_frequency(kind: str) -> SpecialCurve:
-    """Curves through the special points about the change from two to six crossings at Hhat = 0.5."""
+    """Curves through the special points about the change from two to six crossings at Hhat =
+    0.5.
+    """
     return saltus.continue_special(
         low_frequency_special(kind), AMPLITUDE, (0.3, 0.6), first_bounds=(0.18, 0.4)
     )

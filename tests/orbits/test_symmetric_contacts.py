@@ -235,8 +235,9 @@ def test_every_orbit_of_a_branch_of_both_layers_is_a_motion(mirrored: saltus.Bra
     At the grazing of small loads the motions beside it have such an impact at once, which throws
     the closed layer open.
     """
-    # At a grazing itself rounding decides whether the motion has an impact there, and at a switching
-    # itself whether a contact opens just before an impact or with it; `defect` may be inf at both.
+    # At a grazing itself rounding decides whether the motion has an impact there, and at a
+    # switching itself whether a contact opens just before an impact or with it; `defect` may be inf
+    # at both.
     between = [o for o in mirrored.orbits if not o.grazes and abs(o.pressing) > 1e-9]
     assert len(between) > 0.8 * len(mirrored.orbits)
     for orbit in between:

@@ -102,7 +102,9 @@ def test_a_closed_motion_is_drawn_closed():
 
 
 def test_arrows_point_along_the_motion():
-    """To the right above the axis and to the left below it: velocity is the rate of the coordinate."""
+    """To the right above the axis and to the left below it: velocity is the rate of the
+    coordinate.
+    """
     figure = figure_of(draw_plane(portrait()))
     arrows = figure.axes[0].texts
     assert len(arrows) > 10

@@ -19,7 +19,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def ball_on_table(amplitude: float, e: float = 0.5) -> saltus.System:
-    """A ball under an acceleration of 1 on a table that moves with the amplitude, at frequency 1."""
+    """A ball under an acceleration of 1 on a table that moves with the amplitude, at frequency
+    1.
+    """
     return saltus.System(
         model=saltus.WallOscillator(stiffness=0.0, damping=0.0, wall=0.0),
         load=saltus.Load(frequency=1.0, force=1.0, ground=saltus.Harmonic(amplitude=amplitude)),
@@ -91,7 +93,9 @@ def test_a_linear_oscillator_at_a_wall_contains_its_closed_form() -> None:
 
 
 def wall_impacts(guess: list[tuple[float, float]], period: float) -> list[tuple[mp.mpf, mp.mpf]]:
-    """Times and speeds of the impacts of the closed form, with doubles c = 0.1, W = 0.8, e = 0.7."""
+    """Times and speeds of the impacts of the closed form, with doubles c = 0.1, W = 0.8, e =
+    0.7.
+    """
     c, w, force, e = mp.mpf(0.1), mp.mpf(0.8), mp.mpf(0.5), mp.mpf(0.7)
     decay = c / 2
     fast = mp.sqrt(1 - decay**2)

@@ -107,7 +107,8 @@ from saltus import response_spectrum
 
 def heard(share, what, times=[]):
     times += [what] * what.startswith({when!r})
-    if len(times) > 1:  # its modules are imported by then: Python may lose a signal while it imports
+    # its modules are imported by then: Python may lose a signal while it imports
+    if len(times) > 1:
         print("ready", flush=True)
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs are started without

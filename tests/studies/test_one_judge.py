@@ -81,7 +81,8 @@ def test_four_doors_have_one_judge(expected):
     if expected is Ending.TRANSIENT:
         assert verdict.kind is Ending.PERIODIC or verdict.cause.name == "TRANSIENT"
         assert kinds == {Ending.PERIODIC}
-        # how long each start takes is decided by rounding: all may have settled, so that none is judged
+        # how long each start takes is decided by rounding: all may have settled, so that none is
+        # judged
         settled = not cell["unsettled"] and np.isnan(cell["exponent"])
         assert settled or Ending(int(cell["verdict"])) in (Ending.TRANSIENT, Ending.PERIODIC)
         assert int(cell["count"]) > 0

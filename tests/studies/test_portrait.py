@@ -69,7 +69,9 @@ def test_a_damped_motion_only_loses_energy():
 
 
 def test_an_impact_with_loss_is_drawn_as_a_jump():
-    """Both velocities are there, v+ = e v-, with nan between them, at the same instant and place."""
+    """Both velocities are there, v+ = e v-, with nan between them, at the same instant and
+    place.
+    """
     data = portrait(C=0.1, e=0.8)
     jumps = 0
     for time, place, velocity in zip(

@@ -166,18 +166,12 @@ def test_digests_are_those_of_other_processes(tmp_path):
     """Whatever seed the hashes of texts have: a store is gone on with after a restart."""
     script = tmp_path / "a_script.py"
     script.write_text(
-        "import functools, sys, numpy as np, saltus\n"
-        "from saltus.sweep.content import contents_of\n"
-        "words = {'one', 'two', 'three', 'four'}\n"
-        "table = {word: np.arange(3) for word in words}\n"
-        "block = saltus.PhysicalBlock(half_width=0.2, half_height=0.8)\n"
-        "class Rule:\n"
-        "    def __init__(self): self.rule = self\n"
-        "    def __call__(self, x): return x in words\n"
-        "rule = Rule()\n"
-        "def asked(x):\n"
-        "    return len(table) * x if x in {1.0, 2.0} or 'a' in {'b', 'c'} else rule(x) + block.alpha\n"
-        "print(sorted(contents_of(asked).items()))\n"
+        "import functools, sys, numpy as np, saltus\nfrom saltus.sweep.content import"
+        " contents_of\nwords = {'one', 'two', 'three', 'four'}\ntable = {word: np.arange(3) for"
+        " word in words}\nblock = saltus.PhysicalBlock(half_width=0.2, half_height=0.8)\nclass"
+        " Rule:\n    def __init__(self): self.rule = self\n    def __call__(self, x): return x in"
+        " words\nrule = Rule()\ndef asked(x):\n    return len(table) * x if x in {1.0, 2.0} or 'a'"
+        " in {'b', 'c'} else rule(x) + block.alpha\nprint(sorted(contents_of(asked).items()))\n"
     )
     found = set()
     for seed in ("1", "2", "3"):

@@ -144,7 +144,10 @@ quantity = "velocity"
     path.write_text(text.replace("MavroeidisPapageorgiou", "HalfSin"))
     with pytest.raises(
         ParameterError,
-        match=r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean 'HalfSine'",
+        match=(
+            r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean"
+            r" 'HalfSine'"
+        ),
     ):
         load_study(path)
 

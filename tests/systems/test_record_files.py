@@ -46,7 +46,8 @@ def csmip(said="in cm/sec2. (8f10.3)", components=3, form="%10.3f"):
         for name, factor in (("accel", 1.0), ("veloc", 0.1), ("displ", 0.01)):
             rate = {"accel": "/sec2", "veloc": "/sec", "displ": ""}[name]
             text.append(
-                f"   43 points of {name} data equally spaced at  .020 sec, {said.replace('/sec2', rate)}"
+                f"   43 points of {name} data equally spaced at  .020 sec,"
+                f" {said.replace('/sec2', rate)}"
             )
             text += lines_of((k + 1) * factor * ACCELERATION, 8, form)
         text.append(f"/&  ----------  End of data for channel {k + 1}  ----------")
@@ -179,8 +180,9 @@ def test_a_study_reads_the_same_files(tmp_path):
     body = PhysicalBlock(half_width=0.3, half_height=1.5)
     expected = body.system(Load(ground_horizontal=Record.read(tmp_path / "X.AT2", baseline=1)))
     (tmp_path / "study.toml").write_text(
-        f"[model]\ntype = 'RockingBlock'\nalpha = {body.alpha!r}\n[load]\n"
-        f"ground_horizontal = {{ file = 'X.AT2', baseline = 1, time_scale = {body.frequency!r}, scale = {1 / body.gravity!r} }}\n"
+        f"[model]\ntype = 'RockingBlock'\nalpha = {body.alpha!r}\n[load]\nground_horizontal = {{"
+        f" file = 'X.AT2', baseline = 1, time_scale = {body.frequency!r}, scale ="
+        f" {1 / body.gravity!r} }}\n"
     )
     system = load_study(tmp_path / "study.toml").system
     assert isinstance(system, System)

@@ -83,7 +83,9 @@ def test_erratum_16_an_impulse_on_one_layer_moves_the_other_open_one(
 
 
 def test_erratum_16_angles_do_not_jump_so_the_printed_conditions_are_refused():
-    """Table 1 asks for theta_j(+) != theta_*; continuity of the angles (`controtrot`) forbids it."""
+    """Table 1 asks for theta_j(+) != theta_*; continuity of the angles (`controtrot`) forbids
+    it.
+    """
     before = LayerState((0.0, -0.4), (-1.0, 0.2))
     with pytest.raises(ParameterError, match="angles are continuous"):
         name_impact(before, LayerState((0.0, -0.5), (0.0, 0.1)))

@@ -232,7 +232,9 @@ def test_its_contract_is_a_model_with_a_contact_of_each_layer_that_stops_at_the_
 
 
 def test_massless_middle_has_a_singular_mass_matrix_where_the_bars_are_parallel():
-    """det M = m + sin(beta_1 + beta_2)^2, so only m = 0 fails, and only where beta_1 + beta_2 = pi."""
+    """det M = m + sin(beta_1 + beta_2)^2, so only m = 0 fails, and only where beta_1 + beta_2 =
+    pi.
+    """
     beta0 = math.radians(80)
     theta = (math.radians(5), -math.radians(15))
     for m in (0.0, 0.3):

@@ -15,7 +15,9 @@ from saltus.taylor import record_table, trace, written_type
 
 @cache
 def caller(name):
-    """A function that calls a generated one, which has no wrapper for Python, through its pointer."""
+    """A function that calls a generated one, which has no wrapper for Python, through its
+    pointer.
+    """
     signature = getattr(memory, name.upper())
     arguments = ", ".join(f"x{i}" for i in range(len(signature.args)))
     scope = {}

@@ -28,9 +28,10 @@ system = saltus.System(model=wall, load=load, impact=saltus.VelocityReduction(0.
 motion = saltus.simulate(system, x=0.1, velocity=0.2, periods=5)
 """
 MOTION = SYSTEM + "print(json.dumps([motion.x, motion.velocity, len(motion.impacts)]))"
-BOTH = SYSTEM + (
-    "many = saltus.simulate_many(system, x=[0.1], velocity=0.2, periods=5, threads=1)\n"
-    "print(json.dumps([motion.x, motion.velocity, len(motion.impacts), float(many.x[0]), float(many.velocity[0])]))"
+BOTH = (
+    SYSTEM + "many = saltus.simulate_many(system, x=[0.1], velocity=0.2, periods=5,"
+    " threads=1)\nprint(json.dumps([motion.x, motion.velocity, len(motion.impacts),"
+    " float(many.x[0]), float(many.velocity[0])]))"
 )
 
 
@@ -293,7 +294,9 @@ def test_motions_are_the_same_in_numba_s_plain_way(tmp_path):
 
 
 def test_what_is_private_of_numba_is_imported_in_one_file():
-    """By name, or by its name in a string; `numba`, `numba.extending` and `numba.types` are public."""
+    """By name, or by its name in a string; `numba`, `numba.extending` and `numba.types` are
+    public.
+    """
     found = set()
     for path in (SOURCE / "saltus").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):

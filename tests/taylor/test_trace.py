@@ -308,8 +308,8 @@ def nested(count):
         (
             nested(3000),
             (
-                "have 3003 operations, 3000 of them functions, products and quotients, .* take about "
-                "25 minutes to compile"
+                "have 3003 operations, 3000 of them functions, products and quotients, .* take"
+                " about 25 minutes to compile"
             ),
         ),
         (

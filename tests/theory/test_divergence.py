@@ -21,7 +21,9 @@ def cell(degrees, vertical, k=1.0, m=0.0, **load):
 
 
 def test_linear_equilibria_solve_the_first_order_expansion():
-    """theta_A, theta_B and their energies from SymPy's own expansion of `gov_eqn_constant_loading`."""
+    """theta_A, theta_B and their energies from SymPy's own expansion of
+    `gov_eqn_constant_loading`.
+    """
     x, b, k, v = sp.symbols("x b k v")
     slope = sp.series(k * x - v * sp.cos(b + x), x, 0, 2).removeO()
     root = sp.solve(slope, x)[0]

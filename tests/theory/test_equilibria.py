@@ -75,7 +75,9 @@ forces = st.floats(-4, 4)
 @settings(deadline=None, max_examples=150)
 @given(st.floats(0.1, 3.0), st.floats(0.1, 4), forces, forces, forces, forces)
 def test_no_equilibrium_is_missed(beta0, k, h, v, h1, v1):
-    """Sign changes of the moment on a dense scan, each side, against what the closed form brackets."""
+    """Sign changes of the moment on a dense scan, each side, against what the closed form
+    brackets.
+    """
     load = Load(horizontal=h, vertical=v, lower_horizontal=h1, lower_vertical=v1)
     system = System(model=Metainterface(beta0=beta0, stiffness_ratio=k), load=load)
     limit = 2 * (math.pi - beta0)

@@ -67,7 +67,9 @@ def _one_sided(model, load, side, x):
 
 
 def quadrature_period(theta0, beta0, vertical):
-    """4 times the integral of dx / v with v^2 / 2 = P(theta0) - P(x), the linearised P, by mpmath."""
+    """4 times the integral of dx / v with v^2 / 2 = P(theta0) - P(x), the linearised P, by
+    mpmath.
+    """
     with mp.workdps(30):
         kappa, push = (
             1 + mp.mpf(vertical) * mp.sin(mp.mpf(beta0)),
@@ -159,7 +161,9 @@ def test_upright_period_has_a_relative_error_of_second_order(vertical):
 
 
 def peaks_and_periods(e, theta0, cycles):
-    """Peaks at the start of each cycle and their spacing, from the exact piecewise-linear motion."""
+    """Peaks at the start of each cycle and their spacing, from the exact piecewise-linear
+    motion.
+    """
     model, load = Metainterface(beta0=BETA), Load(vertical=-0.5)
     motion = linear_motion(
         System(model=model, load=load, impact=VelocityReduction(e)), theta0, 2 * cycles

@@ -36,7 +36,9 @@ UNKNOWN = 1e-2  # a motion whose end changes by more than this is compared in no
 
 
 def expected_pages() -> dict[str, list[str]]:
-    """The names of the files of all pages that are made: of the documentation, and of the report."""
+    """The names of the files of all pages that are made: of the documentation, and of the
+    report.
+    """
     from saltus_paper.parts import FIGURES
 
     return {

@@ -81,7 +81,9 @@ def block(rng):
 
 
 def recorded(rng):
-    """A block on a measured ground, whose scale and the block's slenderness are those of the page."""
+    """A block on a measured ground, whose scale and the block's slenderness are those of the
+    page.
+    """
     times = np.linspace(0.0, 12.0, 61)
     values = np.sin(1.3 * times) * np.exp(-0.1 * times) + 0.4 * np.cos(3.1 * times)
     record = saltus.Record(
@@ -176,7 +178,9 @@ def length_of(system):
 
 
 def started(system, start, shift=0.0):
-    """The motion from a start that is moved by a little, or the sentence with which it is refused."""
+    """The motion from a start that is moved by a little, or the sentence with which it is
+    refused.
+    """
     moved = {name: value + shift if value else value for name, value in start.items()}
     speeds = moved.pop("velocity", 0.0)
     try:
@@ -245,7 +249,9 @@ def compared(motion, beside, other):
 
 
 def check_whole(system, motion, beside, other, at=AT):
-    """A motion that rounding does not change: its end, its margins and its energy are the page's."""
+    """A motion that rounding does not change: its end, its margins and its energy are the
+    page's.
+    """
     assert other["stop"] == motion.stop
     ends = [np.append(np.ravel(m.position), np.ravel(m.velocity)) for m in (motion, *beside)]
     spread = max(np.max(np.abs(end - ends[0])) for end in ends[1:])

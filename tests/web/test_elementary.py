@@ -1,4 +1,6 @@
-"""The page's own elementary functions against 40 digits, and what the linker makes of object files."""
+"""The page's own elementary functions against 40 digits, and what the linker makes of object
+files.
+"""
 
 from __future__ import annotations
 
@@ -148,9 +150,10 @@ def test_two_object_files_become_one_module(tmp_path):
         pytest.skip("node is not installed here")
     (tmp_path / "made.wasm").write_bytes(made.content)
     script = (
-        f"const code = require('fs').readFileSync({str(tmp_path / 'made.wasm')!r});"
-        "WebAssembly.instantiate(code).then(({instance: {exports}}) => console.log(JSON.stringify("
-        f"[exports.added(0), exports.added(1), exports.through({made.table['other']}, 5)])))"
+        "const code ="
+        f" require('fs').readFileSync({str(tmp_path / 'made.wasm')!r});WebAssembly.instantiate(code).then(({{instance:"
+        " {exports}}) => console.log(JSON.stringify([exports.added(0), exports.added(1),"
+        f" exports.through({made.table['other']}, 5)])))"
     )
     assert json.loads(subprocess.check_output([NODE, "-e", script])) == [47, 9, 12]
 

@@ -281,8 +281,10 @@ def test_the_page_in_its_frame_and_the_notebook_tell_each_other(notebook):
 def test_a_click_in_the_frame_reaches_python_and_the_view_can_be_closed(notebook):
     for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
         notebook.point(kind, 1080.0, 250.0)  # somewhere in the phase plane
-    heard = notebook.evaluate("""new Promise((done) => { const look = () => (saved.length && saved.at(-1).start.x !== 0
-    ? done(saved.at(-1).start) : setTimeout(look, 10)); look(); })""")
+    heard = notebook.evaluate(
+        """new Promise((done) => { const look = () => (saved.length && saved.at(-1).start.x !== 0
+    ? done(saved.at(-1).start) : setTimeout(look, 10)); look(); })"""
+    )
     assert heard["time"] == 0
     assert heard["x"] != 0
     assert heard["x_velocity"] != 0

@@ -62,7 +62,9 @@ def page(window):
 
 
 def simulated(page, system=CELL, **more):
-    """Python's motion from the state at the start of the page's, over the same number of periods."""
+    """Python's motion from the state at the start of the page's, over the same number of
+    periods.
+    """
     now = state(page)
     start = now["start"]
     return saltus.simulate(
@@ -260,7 +262,7 @@ def test_what_is_not_to_be_believed_is_said_there_and_then(page):
     said = "document.querySelector('#summary').textContent.includes('passed first')"
     page.evaluate(
         f"new Promise((done) => {{ const look = () => ({said} ? done() : setTimeout(look, 20)); "
-        f"look(); }})"
+        "look(); })"
     )
     assert f"line limit passed first at {first:.6g}" in text(page, "#summary")
 
@@ -372,8 +374,10 @@ def test_a_sweep_up_and_down_is_that_of_frequency_sweep(page):
             .find((l) => l.textContent.startsWith({name!r})).querySelector('input');
             i.value = '{value}'; i.dispatchEvent(new Event('change')); }})()""")
     page.click("#sweep-controls .run")
-    result = page.evaluate("""new Promise((done) => { const look = () => saltusPage.sweep.result.done
-    ? done(saltusPage.sweep.result) : setTimeout(look, 20); look(); })""")
+    result = page.evaluate(
+        """new Promise((done) => { const look = () => saltusPage.sweep.result.done
+    ? done(saltusPage.sweep.result) : setTimeout(look, 20); look(); })"""
+    )
     swept = saltus.frequency_sweep(CELL, values, periods=60, stop_early=False, theta=0.4, tol=1e-12)
     for way in ("up", "down"):
         ours = sorted(result[way], key=lambda point: point["value"])

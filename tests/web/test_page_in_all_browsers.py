@@ -48,8 +48,10 @@ def check_same_bits(kinds, each, folder, browsers):
         )
         file = saltus.page(made[0][0], path=folder / "page.html", **made[0][1])
         for browser in browsers:
-            browser.open(file, READY) if isinstance(browser, FirefoxPage) else browser.open(
-                file, 1200
+            (
+                browser.open(file, READY)
+                if isinstance(browser, FirefoxPage)
+                else browser.open(file, 1200)
             )
             found = browser.evaluate(f"{FOLLOWED}({json.dumps({'asked': asked, 'at': AT})})")
             for one, other in zip(known, found, strict=True):

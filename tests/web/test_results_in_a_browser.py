@@ -120,9 +120,11 @@ def test_a_click_into_a_chart_starts_the_largest_motion_of_its_cell(page):
         now = state(page)
         assert now["values"][made.AMPLITUDE] == horizontal
         assert now["values"]["load.vertical"] == vertical
-        largest = page.evaluate("""(() => { const m = saltusPage.session.motion, T = saltusPage.session.period;
+        largest = page.evaluate(
+            """(() => { const m = saltusPage.session.motion, T = saltusPage.session.period;
         const times = Float64Array.from({length: 4000}, (_, i) => m.time.last - 6 * T * (i / 4000));
-        return Math.max(...m.sample(times).theta.map(Math.abs)); })()""")
+        return Math.max(...m.sample(times).theta.map(Math.abs)); })()"""
+        )
         assert largest == pytest.approx(
             float(data["amplitude"].sel(horizontal=horizontal, vertical=vertical)), rel=1e-5
         )

@@ -36,11 +36,16 @@ REFUSED = {
     ("own, first order", "page"): FIRST_ORDER,
 }
 REASONS = {
-    SUMS: "A page works in coordinates that contacts hold one by one: "
-    "`saltus.page(system.in_gap_coordinates)` makes one.",
+    SUMS: (
+        "A page works in coordinates that contacts hold one by one: "
+        "`saltus.page(system.in_gap_coordinates)` makes one."
+    ),
     SURFACES: "A page follows no surfaces so far.",
     RUBBING: "A page follows no frictions in contacts so far.",
-    EXTREMA: "Extrema of ensembles are those of coordinates that contacts hold one by one: give `system.in_gap_coordinates`.",
+    EXTREMA: (
+        "Extrema of ensembles are those of coordinates that contacts hold one by one: give"
+        " `system.in_gap_coordinates`."
+    ),
     MANY: "`lyapunov_many` is for models with one coordinate; `lyapunov_spectrum` takes any.",
     FIRST_ORDER: "A page follows no coordinates of first order so far.",
 }

@@ -35,7 +35,9 @@ def dataset(
     system: System | None = None,
     **attributes: Any,
 ) -> xr.Dataset:
-    """A Dataset from `name: (dims, values, units, meaning)`, with its provenance in its attributes."""
+    """A Dataset from `name: (dims, values, units, meaning)`, with its provenance in its
+    attributes.
+    """
     parts = {name: _variable(*parts) for name, parts in variables.items()}
     axes = {
         name: _variable(*parts) if isinstance(parts, tuple) else parts

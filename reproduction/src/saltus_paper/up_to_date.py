@@ -1,4 +1,6 @@
-"""Whether an output is up to date: a key from what made it, and the fingerprints of what it left."""
+"""Whether an output is up to date: a key from what made it, and the fingerprints of what it
+left.
+"""
 
 from __future__ import annotations
 

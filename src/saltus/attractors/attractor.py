@@ -432,7 +432,9 @@ def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
 
 
 def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str, Any]:
-    """The variables over (attractor,), and those of the states at phase 0 over (attractor, state)."""
+    """The variables over (attractor,), and those of the states at phase 0 over (attractor,
+    state).
+    """
     most = max([1, *(min(len(m.states), LAST_STATES) for m in members)])
     states = np.full((len(members), most, system.dimension), np.nan)
     for row, member in zip(states, members, strict=True):

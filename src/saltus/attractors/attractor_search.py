@@ -87,7 +87,9 @@ WAITING = UNDECIDED - 1  # the label of motions that may still be assigned to an
 
 @dataclass
 class KnownAttractors:
-    """The attractors of a system with a forcing period; the label of each is its place in the list."""
+    """The attractors of a system with a forcing period; the label of each is its place in the
+    list.
+    """
 
     system: System
     members: list[Attractor] = field(default_factory=list)
@@ -510,10 +512,8 @@ def _known(system: System, known: Any) -> list[PeriodicOrbit]:
         ]
         if unlike or type(orbit.system.model) is not type(system.model):
             raise ParameterError(
-                (
-                    "a known orbit belongs to another system; it differs in "
-                    f"{', '.join(unlike) or 'its model'}"
-                ),
+                "a known orbit belongs to another system; it differs in "
+                f"{', '.join(unlike) or 'its model'}",
                 "known",
             )
     return [orbit for orbit in orbits if orbit.stable]

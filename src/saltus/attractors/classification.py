@@ -150,7 +150,9 @@ class Verdict(Result):
 
 @dataclass(frozen=True)
 class _Case:
-    """The arguments of `classify`: the system, and how long and how exactly its motion is followed."""
+    """The arguments of `classify`: the system, and how long and how exactly its motion is
+    followed.
+    """
 
     system: System
     clock: System  # the same system, with a forcing period also under a constant load

@@ -27,21 +27,31 @@ class Reason(NumberedSentence):
     NOT_SURE = 0, "{seen}, which regular motion and weak chaos may both show{torus}"
     CHAOS = (
         1,
-        "{seen}, and none of those beside it settles any more, which excludes transients of a mean life below {life:.3g} periods",
+        (
+            "{seen}, and none of those beside it settles any more, which excludes transients of a"
+            " mean life below {life:.3g} periods"
+        ),
     )
     TRANSIENT = (
         2,
-        "{seen}, but {gone} of the motions beside it settle, after {life:.3g} forcing periods in the mean: a transient",
+        (
+            "{seen}, but {gone} of the motions beside it settle, after {life:.3g} forcing periods"
+            " in the mean: a transient"
+        ),
     )
     FEW_SETTLED = (
         3,
-        "{seen}, and {gone} of the motions beside it settle: too few to tell a long transient from chaos beside one",
+        (
+            "{seen}, and {gone} of the motions beside it settle: too few to tell a long transient"
+            " from chaos beside one"
+        ),
     )
     COMING_TOGETHER = (
         4,
         (
-            "{seen}: motions beside it come together with it, so that it settles slowly, or on an orbit of more than "
-            "{longest} forcing periods, which a larger max_period may find, unless rounding decides its period"
+            "{seen}: motions beside it come together with it, so that it settles slowly, or on an"
+            " orbit of more than {longest} forcing periods, which a larger max_period may find,"
+            " unless rounding decides its period"
         ),
     )
     TORUS = 5, "{seen}, it does not repeat itself, and the 0-1 test sees order (K = {K:.3g})"
@@ -50,7 +60,10 @@ class Reason(NumberedSentence):
     LIMIT = 8, "a limit of the model ends it and all motions beside it"
     CAPTURED = (
         9,
-        "within {periods} forcing periods it is captured by the contact, from where no later load pulls it",
+        (
+            "within {periods} forcing periods it is captured by the contact, from where no later"
+            " load pulls it"
+        ),
     )
     STANDS = (
         10,
@@ -68,22 +81,23 @@ class Reason(NumberedSentence):
     CONSERVATIVE = (
         17,
         (
-            "under constant loads it goes on moving: it has not lost its energy, has none to lose, or gains some on a cycle, which "
-            "has no forcing period"
+            "under constant loads it goes on moving: it has not lost its energy, has none to lose,"
+            " or gains some on a cycle, which has no forcing period"
         ),
     )
     SELF_EXCITED = (
         18,
         (
-            "under constant loads it goes on moving: the ground that its friction moves on may drive it round a cycle, which has "
-            "no forcing period"
+            "under constant loads it goes on moving: the ground that its friction moves on may"
+            " drive it round a cycle, which has no forcing period"
         ),
     )
     ROUNDING = (
         19,
         (
-            "{seen} when steps make an error of {tol:.0e}, and {other} when they make {looser:.0e}: differences grow so much "
-            "from one rest to the next that rounding decides the period, and no orbit can be told"
+            "{seen} when steps make an error of {tol:.0e}, and {other} when they make {looser:.0e}:"
+            " differences grow so much from one rest to the next that rounding decides the period,"
+            " and no orbit can be told"
         ),
     )
 
@@ -189,7 +203,10 @@ class Judged:
         exponent, error, least = (
             float(values[row]) for values in (self.exponent, self.error, self.resolution)
         )
-        seen = f"its largest exponent is {exponent:.4g} +- {error:.1g}, where regular motion may show {least:.1g}"
+        seen = (
+            f"its largest exponent is {exponent:.4g} +- {error:.1g}, where regular motion may show"
+            f" {least:.1g}"
+        )
         numbers = {
             "gone": int(self.settled_count[row]),
             "life": float(self.mean_life[row]),
@@ -445,8 +462,8 @@ class _Judgement:
         attractor, (n,).
         """
         later = np.arange(self.history.shape[1])[:, None] >= self.rounds - self.rounds // 2
-        (left, followed) = self.history.sum(axis=1)
-        (left_late, followed_late) = np.where(later, self.history, 0.0).sum(axis=1)
+        left, followed = self.history.sum(axis=1)
+        left_late, followed_late = np.where(later, self.history, 0.0).sum(axis=1)
         does_not_fall = (
             left_late * (followed - followed_late)
             >= self.settings.steady * (left - left_late) * followed_late

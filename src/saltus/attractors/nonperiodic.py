@@ -103,7 +103,8 @@ def zero_one_test(series: Numbers, *, every: int = 1, seed: int = 0, count: int 
         ) from None
     if values.ndim != 1 or values.size < FEWEST_ENTRIES or not np.isfinite(values).all():
         raise ParameterError(
-            f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape {values.shape}",
+            f"the 0-1 test takes at least {FEWEST_ENTRIES} finite numbers in one row, got shape"
+            f" {values.shape}",
             "series",
         )
     check_count("count", count, 1, 100_000)
@@ -201,11 +202,15 @@ def excludes_tori(system: System) -> str | None:
         return None
     assert rate is not None
     if system.load.period is None:
-        return f"under constant loads a motion of one coordinate has no room for a torus, and {continuous} and areas shrink"
+        return (
+            "under constant loads a motion of one coordinate has no room for a torus, and"
+            f" {continuous} and areas shrink"
+        )
     left = math.exp(-rate * system.load.period)
     return (
-        f"the stroboscopic map is continuous, as {continuous}, and it shrinks areas, in a forcing period to at most {left:.3g} "
-        "of what they were, so that it has no invariant closed curve (errata 22)"
+        f"the stroboscopic map is continuous, as {continuous}, and it shrinks areas, in a forcing"
+        f" period to at most {left:.3g} of what they were, so that it has no invariant closed curve"
+        " (errata 22)"
     )
 
 

@@ -145,10 +145,8 @@ def check_constant(system: System) -> None:
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(
-                (
-                    f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` "
-                    "are for loads that repeat"
-                ),
+                f"load.{name} varies, so there is no phase plane; `basins` and `stable_manifold` "
+                "are for loads that repeat",
                 f"load.{name}",
             )
 

@@ -91,8 +91,8 @@ def normal_form(side: Side, other: Side | None) -> Form:
     """h1 and h2 on a side, with their rates of change; `other` is the next side of the cycle, or
     None if it is the same side.
     """
-    (q, q1, q2) = _logarithmic(side.pull)
-    (c, c1, c2) = side.damping
+    q, q1, q2 = _logarithmic(side.pull)
+    c, c1, c2 = side.damping
     b = -(q + c)
     b1 = -(q1 + c1)
     b2 = -(q2 + c2)
@@ -242,7 +242,9 @@ def first_guess(forms: list[Form], loss: Any) -> Any:
 
 @dataclass
 class Budget:
-    """The bounds of M and abs(S) on one side for all speeds up to a largest one, arrays (cells, n)."""
+    """The bounds of M and abs(S) on one side for all speeds up to a largest one, arrays (cells,
+    n).
+    """
 
     form: Form
     growth: Any

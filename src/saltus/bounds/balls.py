@@ -21,7 +21,8 @@ UP = 1.0 + 1e-14
 TINY = 1e-290  # above what underflow loses
 # The rows from which on zeros of shooting equations are left out.
 SPARSE_FROM = 120
-# 2 pi less the double nearest to it is 2.449e-16 (Payne and Hanek's digits: 6.283185307179586476...)
+# 2 pi less the double nearest to it is 2.449e-16 (Payne and Hanek's digits:
+# 6.283185307179586476...)
 TWO_PI_RADIUS = 2.5e-16
 
 

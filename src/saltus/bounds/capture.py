@@ -365,7 +365,9 @@ class _Law:
         return Interval(edges[:-1], edges[1:] * (1 + SLACK)) / leaves.parameters[self.frequency]
 
     def _proved(self, always: Leaves, reach: np.ndarray, limit: np.ndarray) -> np.ndarray:
-        """The proved speeds, at most `limit`, with the factors of impacts up to the speed `reach`."""
+        """The proved speeds, at most `limit`, with the factors of impacts up to the speed
+        `reach`.
+        """
         least = np.full_like(limit, np.inf)
         for cycle in self.cycles:
             impacts = self._impacts(cycle, always, reach)

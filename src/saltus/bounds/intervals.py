@@ -185,7 +185,9 @@ def _increasing(function: Any) -> Callable[[Interval], Interval]:
 
 
 def _wave(function: Any, peak: float) -> Callable[[Interval], Interval]:
-    """A sine or cosine, whose maxima are at `peak` + 2 pi k and whose minima are half a turn later."""
+    """A sine or cosine, whose maxima are at `peak` + 2 pi k and whose minima are half a turn
+    later.
+    """
 
     def bounds(x: Interval) -> Interval:
         x = outward(x.lo, x.hi, LIBRARY)

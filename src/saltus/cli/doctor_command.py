@@ -141,7 +141,9 @@ def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _leaned_on(wrong: list[str]) -> Block:
-    """Tests of what saltus relies on in other packages, if its loss would cause no error elsewhere."""
+    """Tests of what saltus relies on in other packages, if its loss would cause no error
+    elsewhere.
+    """
     trials = {
         "public functions (lazy_loader)": (
             _answers,

@@ -1,4 +1,6 @@
-"""`saltus info`: what is known of a system before it moves, in closed form, and how it is printed."""
+"""`saltus info`: what is known of a system before it moves, in closed form, and how it is
+printed.
+"""
 
 from __future__ import annotations
 

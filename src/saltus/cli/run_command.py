@@ -43,10 +43,8 @@ def run_study(
     if study.simulate is None and not study.asks:
         study.source.refuse(
             (),
-            (
-                "asks for nothing; add [simulate], or [response_spectrum], [stability_chart], ... "
-                "(docs/study.md)"
-            ),
+            "asks for nothing; add [simulate], or [response_spectrum], [stability_chart], ... "
+            "(docs/study.md)",
         )
     output = Path("results") / study.name if output is None else output
     check_writable(output)

@@ -55,7 +55,8 @@ def _state(motion: Motion) -> list[tuple[str, str]]:
 def _events(motion: Motion) -> list[tuple[str, str]]:
     impacts = motion.impacts
     last = (
-        f", the last at {impacts.time[-1]:.12g} with speed {np.abs(impacts.velocity_before[-1]).max():.6g}"
+        f", the last at {impacts.time[-1]:.12g} with speed"
+        f" {np.abs(impacts.velocity_before[-1]).max():.6g}"
         if len(impacts)
         else ""
     )
@@ -101,7 +102,10 @@ def _portrait(data: Any) -> Iterator[str]:
     unstable = data.sizes["equilibrium"] - stable
     why = data.attrs.get("no_separatrices")
     count = f"no separatrices ({why})" if why else f"{data.sizes['separatrix']} separatrices"
-    yield f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria, {count}."
+    yield (
+        f"{data.sizes['motion']} motions, {stable} stable and {unstable} unstable equilibria,"
+        f" {count}."
+    )
 
 
 def _chart(data: Any) -> Iterator[str]:
@@ -138,8 +142,9 @@ def _borders(tree: Any) -> Iterator[str]:
     )
     added = int(tree["chart"].attrs["added_by_continuation"])
     yield (
-        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells {located} are located between "
-        f"them, {harmless} are none, as the same motion goes on, and {left.sizes['change']} are not explained."
+        f"Exact borders: {curves} as curves. Of {total} ends of motions between neighbouring cells"
+        f" {located} are located between them, {harmless} are none, as the same motion goes on, and"
+        f" {left.sizes['change']} are not explained."
     )
     if added:
         yield f"{added} motions of cells, to which no start leads, are known from their neighbours."
@@ -285,7 +290,8 @@ def print_verified(path: Path) -> None:
     wrong = list[str]()
     if not found:
         raise ParameterError(
-            f"there is no result of saltus at {path}; give a .nc file, a .zarr folder, or a folder with such"
+            f"there is no result of saltus at {path}; give a .nc file, a .zarr folder, or a folder"
+            " with such"
         )
     for file in found:
         try:

@@ -65,10 +65,8 @@ def read_source(path: Path) -> tuple[Source, dict[str, Any]]:
         if path.is_file() and path.stat().st_size > LIMITS.count:
             source.refuse(
                 (),
-                (
-                    f"has {path.stat().st_size} bytes; a study has at most {LIMITS.count}, long "
-                    "records have files of their own"
-                ),
+                f"has {path.stat().st_size} bytes; a study has at most {LIMITS.count}, long "
+                "records have files of their own",
             )
         text = path.read_text(encoding="utf-8-sig")
     except ParameterError:
@@ -204,7 +202,9 @@ def read_switch(value: Any) -> bool:
 
 
 def read_values(value: Any) -> np.ndarray:
-    """Numbers (or angles) from a list, or from a table such as { from = 0, to = 0.5, count = 101 }."""
+    """Numbers (or angles) from a list, or from a table such as { from = 0, to = 0.5, count = 101
+    }.
+    """
     if isinstance(value, list) and value:
         return np.array([read_angle(item) for item in value])
     if isinstance(value, dict):
@@ -342,9 +342,11 @@ def readers_of(cls: type) -> dict[str, Reader]:
     """The readers of the fields of a dataclass; a field whose metadata says "rad" is an angle."""
     hints = typing.get_type_hints(cls)
     return {
-        f.name: read_angle
-        if f.metadata.get("unit") == "rad"
-        else reader_of(hints.get(f.name)) or read_anything
+        f.name: (
+            read_angle
+            if f.metadata.get("unit") == "rad"
+            else reader_of(hints.get(f.name)) or read_anything
+        )
         for f in dataclasses.fields(cls)
         if f.init and not f.name.startswith("_")
     }

@@ -66,18 +66,14 @@ def _check_horizon(source: Source, system: System, values: Mapping[str, Any]) ->
     if "periods" not in values and "duration" not in values:
         source.refuse(
             ("simulate",),
-            (
-                "simulate needs periods (of the load) or duration (dimensionless time), such as "
-                "duration = 50"
-            ),
+            "simulate needs periods (of the load) or duration (dimensionless time), such as "
+            "duration = 50",
         )
     if "periods" in values and system.load.period is None:
         source.refuse(
             ("simulate", "periods"),
-            (
-                "simulate.periods needs load.frequency, which is not given; give simulate.duration "
-                "instead"
-            ),
+            "simulate.periods needs load.frequency, which is not given; give simulate.duration "
+            "instead",
         )
 
 

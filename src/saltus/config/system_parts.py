@@ -62,19 +62,15 @@ def find_class(source: Source, kind: str, name: str) -> type:
             return found
         source.refuse(
             keys,
-            (
-                f'{kind}.type "{name}" is not known; {near(name, known)} (one of your own is '
-                '"file.py:Class")'
-            ),
+            f'{kind}.type "{name}" is not known; {near(name, known)} (one of your own is '
+            '"file.py:Class")',
         )
     place, _, attribute = name.rpartition(":")
     if not place.endswith(".py") and not all(part.isidentifier() for part in place.split(".")):
         source.refuse(
             keys,
-            (
-                f"{kind}.type: {show(place)} is no Python file, such as my_model.py, and no module, "
-                "such as my.module"
-            ),
+            f"{kind}.type: {show(place)} is no Python file, such as my_model.py, and no module, "
+            "such as my.module",
         )
     module = (
         _from_file(source, kind, place)
@@ -95,19 +91,15 @@ def find_class(source: Source, kind: str, name: str) -> type:
     if not (isinstance(cls, type) and issubclass(cls, wanted) and dataclasses.is_dataclass(cls)):
         source.refuse(
             keys,
-            (
-                f"{kind}.type: {attribute} in {place} must be a dataclass that inherits "
-                f"saltus.systems.{wanted.__name__}"
-            ),
+            f"{kind}.type: {attribute} in {place} must be a dataclass that inherits "
+            f"saltus.systems.{wanted.__name__}",
         )
     builtin = known.get(cls.__name__)
     if builtin is not None and builtin is not cls and builtin.__module__.startswith("saltus."):
         source.refuse(
             keys,
-            (
-                f"{kind}.type: {place} calls its class {cls.__name__}, which saltus has already; "
-                "give it another name"
-            ),
+            f"{kind}.type: {place} calls its class {cls.__name__}, which saltus has already; "
+            "give it another name",
         )
     owned: Any = cls  # narrowed above to a dataclass, which is not what `register` asks for
     register(owned)

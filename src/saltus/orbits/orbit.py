@@ -167,7 +167,9 @@ class PeriodicOrbit(Result):
 
     @property
     def impact_count(self) -> int:
-        """The number of impacts in one of its periods; of an accumulation, those that are resolved."""
+        """The number of impacts in one of its periods; of an accumulation, those that are
+        resolved.
+        """
         return int(self._phases.size)
 
     @property
@@ -362,7 +364,9 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def _has_touch(self) -> bool:
-        """Whether one of its impacts has no speed, so that its equations have no derivative there."""
+        """Whether one of its impacts has no speed, so that its equations have no derivative
+        there.
+        """
         speed = abs(self.equations.touching_speed(self.solution))
         return (
             not self.equations.passes_contact
@@ -564,9 +568,9 @@ class PeriodicOrbit(Result):
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"PeriodicOrbit({kind}period {self.period}, {self.impact_count} impacts, amplitude={self.amplitude:.9g}, "
-            f"{'stable' if self.stable else 'unstable'}, largest multiplier {self.multipliers[0]:.6g}, "
-            f"residual={self.residual:.1g})"
+            f"PeriodicOrbit({kind}period {self.period}, {self.impact_count} impacts,"
+            f" amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'}, largest"
+            f" multiplier {self.multipliers[0]:.6g}, residual={self.residual:.1g})"
         )
 
 

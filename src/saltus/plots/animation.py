@@ -125,10 +125,8 @@ def _writer(file: Path, fps: Any) -> Any:
         raise ParameterError(f"a film is a .gif, .html or .mp4, got {file.name!r}", "path")
     if kind == "ffmpeg" and not animation.FFMpegWriter.isAvailable():
         raise ParameterError(
-            (
-                "an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html "
-                "instead"
-            ),
+            "an MP4 is written by ffmpeg, which is not installed here; write a .gif or .html "
+            "instead",
             "path",
         )
     if kind == "html":
@@ -198,8 +196,8 @@ class _Film:
                 for reach in (shape.radius, -shape.radius)
             ]
         )
-        (x0, y0) = corners.min(axis=0)
-        (x1, y1) = corners.max(axis=0)
+        x0, y0 = corners.min(axis=0)
+        x1, y1 = corners.max(axis=0)
         self.loads = _Loads(motion.system.load, times, mechanism, (x0, x1, y1))
         y1 = self.loads.top
         room = 0.04 * max(x1 - x0, y1 - y0)
@@ -225,9 +223,11 @@ class _Film:
         data = self.motion.to_xarray()
         names = coordinates(data)
         looks = [
-            LINES[i]
-            if len(names) <= len(LINES)
-            else {"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", (0, (4, 1.5)))[i % 2]}
+            (
+                LINES[i]
+                if len(names) <= len(LINES)
+                else {"color": PAIRS[i // 2 % len(PAIRS)], "ls": ("-", (0, (4, 1.5)))[i % 2]}
+            )
             for i in range(len(names))
         ]
         self.lines = []

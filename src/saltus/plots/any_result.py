@@ -80,7 +80,9 @@ POINTS = ("o", "x", ".")  # the markers of borders that are single points
 def draw_overturning(
     dataset: Any, *, ax: Axes | None = None, width: float = 1.3 * LOOK.single_column
 ) -> Axes:
-    """Draw the map of `overturning_spectrum` in shades, and its borders as lines; returns the axes."""
+    """Draw the map of `overturning_spectrum` in shades, and its borders as lines; returns the
+    axes.
+    """
     own = ax is None
     ax = axes_or_new(ax, width, 0.75 * width)
     impacts = dataset["impacts"].values

@@ -102,7 +102,9 @@ def attractor_colours(numbers: Sequence[int]) -> dict[int, Any]:
 
 
 def draw_points(ax: Any, dataset: Any, i: int, **style: Any) -> None:
-    """Attractor `i` at phase 0 of the load: large marks if it is periodic, else some of its points."""
+    """Attractor `i` at phase 0 of the load: large marks if it is periodic, else some of its
+    points.
+    """
     repeats = str(dataset["attractor_kind"].values[i]) in ("rest", "periodic")
     mark = MARK | {"marker": MARKERS[i % len(MARKERS)]} if repeats else POINT
     x, y = (dataset[f"section_{name}"].values[i] for name in dataset.attrs["plane"])
@@ -110,7 +112,9 @@ def draw_points(ax: Any, dataset: Any, i: int, **style: Any) -> None:
 
 
 def name_plane(ax: Any, plane: tuple[str, str], unit: str, constant: bool) -> None:
-    """The names of the two state variables on the axes; under a `constant` load there is no phase."""
+    """The names of the two state variables on the axes; under a `constant` load there is no
+    phase.
+    """
     when = "" if constant else " at phase 0"
     ax.set_xlabel(f"${symbol(plane[0])}${when}{unit}")
     ax.set_ylabel(f"${state_symbol(plane[1], plane)}${when}{unit}")

@@ -323,7 +323,8 @@ def drawing(draw: Callable[P, R]) -> Callable[P, R]:
             asked = arguments.get("quantity")
             if isinstance(error, KeyError) and isinstance(asked, str):
                 raise ParameterError(
-                    f"quantity {shown(asked)} is not in this result; {near(asked, _drawable(dataset))}",
+                    f"quantity {shown(asked)} is not in this result;"
+                    f" {near(asked, _drawable(dataset))}",
                     "quantity",
                 ) from error
             said = " ".join(f"{type(error).__name__}: {error}".split())
@@ -377,7 +378,9 @@ def peak(names: str, quantity: str = "amplitude") -> str:
 
 
 def unit_in_brackets(variable: Any) -> str:
-    """The unit of a dataset's variable after its name, such as " (rad)"; nothing where it has none."""
+    """The unit of a dataset's variable after its name, such as " (rad)"; nothing where it has
+    none.
+    """
     unit = variable.attrs.get("units", "1")
     return "" if unit == "1" else f" ({unit})"
 
@@ -459,7 +462,9 @@ def varied(dataset: Any, dim: str) -> tuple[str, np.ndarray]:
 
 
 def _start_name(dataset: Any, name: str) -> str:
-    """The name of an initial value on an axis; a parameter or another dimension keeps its own name."""
+    """The name of an initial value on an axis; a parameter or another dimension keeps its own
+    name.
+    """
     state = name.removeprefix("start_").removeprefix("initial_")
     if state == name:
         return parameter_name(name)

@@ -62,7 +62,9 @@ def draw_plane(
 
 
 def _legend(ax: Axes, own: bool, stable: np.ndarray, separatrices: bool) -> None:
-    """A legend of the stable and unstable equilibria and the separatrices, as far as there are any."""
+    """A legend of the stable and unstable equilibria and the separatrices, as far as there are
+    any.
+    """
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.5}
     handles = [Line2D([], [], color=LOOK.stable, lw=0.7, label="motion")]
     if stable.any():
@@ -107,8 +109,8 @@ def draw_arrows(ax: Any, x: np.ndarray, v: np.ndarray, spacing: float, last: int
     """Arrow heads about every `spacing` widths of the axes along a motion up to its sample `last`,
     none outside the axes.
     """
-    (left, right) = ax.get_xlim()
-    (low, high) = ax.get_ylim()
+    left, right = ax.get_xlim()
+    low, high = ax.get_ylim()
     way = travelled(np.stack([x / (right - left), v / (high - low)], axis=1))
     for at in sorted(
         {

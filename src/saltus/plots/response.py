@@ -111,7 +111,9 @@ def draw_branches(
 
 
 def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> dict[str, Any]:
-    """The line style of motions of this stability and validity, in `weight` times the usual width."""
+    """The line style of motions of this stability and validity, in `weight` times the usual
+    width.
+    """
     style = {
         **(LOOK.stable_line if stable else LOOK.unstable_line),
         "linewidth": weight * WEIGHTS[validity],
@@ -316,8 +318,9 @@ def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
     found = {validity for branch in branches for validity in validity_of(branch)}
     meaning = {
         ModelValidity.HOLDS: "stable, unstable (model holds)",
-        ModelValidity.ASSUMPTION: " or ".join(names[ModelValidity.ASSUMPTION]).replace("_", " ")
-        + " violated",
+        ModelValidity.ASSUMPTION: (
+            " or ".join(names[ModelValidity.ASSUMPTION]).replace("_", " ") + " violated"
+        ),
         ModelValidity.LIMIT: "beyond " + " or ".join(names[ModelValidity.LIMIT]).replace("_", " "),
     }
     return [

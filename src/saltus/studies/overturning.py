@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Distance:
-    """How far the amplitude of a motion is from that of the border, by the state near the saddle."""
+    """How far the amplitude of a motion is from that of the border, by the state near the
+    saddle.
+    """
 
     residual: np.ndarray  # (1,)
     slope: Callable[[], float]
@@ -381,8 +383,8 @@ def _lies_on(point: Point, course: Course[Point, Any], border: Border) -> bool:
     if (own.saddle, own.impacts) != (point.curve.saddle, point.curve.impacts):
         return False
     places = np.array([other.place for other in course.points])
-    (a, b) = places.T[:, :-1]
-    (low, high) = places.T[:, 1:]
+    a, b = places.T[:, :-1]
+    low, high = places.T[:, 1:]
     size, rate = point.place
     share = np.divide(rate - b, high - b, out=np.full(b.shape, 0.5), where=high != b)
     there = (a + share * (low - a))[(share >= 0.0) & (share <= 1.0)]

@@ -1,4 +1,6 @@
-"""Phase portraits under a constant load: motions, the equilibria and the separatrices between them."""
+"""Phase portraits under a constant load: motions, the equilibria and the separatrices between
+them.
+"""
 
 from __future__ import annotations
 
@@ -147,10 +149,8 @@ def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: 
     ]
     if not len(states):
         raise ParameterError(
-            (
-                f"window must reach to where the system can be, got {window!r}: all of it is beyond "
-                "the contact"
-            ),
+            f"window must reach to where the system can be, got {window!r}: all of it is beyond "
+            "the contact",
             "window",
         )
     ends = [*(point.place for point in points), *area[0]]
@@ -182,10 +182,8 @@ def _states(system: System, starts: Any) -> np.ndarray:
     beyond = states[~system.model.reaches(system.model.coordinates[0], states[:, 0])]
     if len(beyond):
         raise ParameterError(
-            (
-                f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the "
-                "contact"
-            ),
+            f"starts must lie where the system can be, and {beyond[0].tolist()} is beyond the "
+            "contact",
             "starts",
         )
     return states

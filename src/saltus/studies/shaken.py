@@ -65,8 +65,8 @@ class Shaken:
         ]
         if len(varied) != 1 or not isinstance(system.load.channels[varied[0]], (Pulse, Record)):
             raise ParameterError(
-                "overturning needs a load with one pulse or record, such as ground_horizontal=HalfSine(...), besides constants; "
-                f"got {shown(system.load)}",
+                "overturning needs a load with one pulse or record, such as"
+                f" ground_horizontal=HalfSine(...), besides constants; got {shown(system.load)}",
                 "load",
             )
         signal = system.load.channels[varied[0]]
@@ -79,8 +79,9 @@ class Shaken:
         saddles = tuple(place for place in equilibria(rest, window) if place.saddle)
         if not saddles or not system.model.stops:
             raise ParameterError(
-                f"{type(system.model).__name__} cannot overturn: it has {len(saddles)} unstable equilibria in the window and "
-                f"{len(system.model.stops)} margins that stop a motion",
+                f"{type(system.model).__name__} cannot overturn: it has {len(saddles)} unstable"
+                f" equilibria in the window and {len(system.model.stops)} margins that stop a"
+                " motion",
                 "system",
             )
         return cls(system, varied[0], saddles)

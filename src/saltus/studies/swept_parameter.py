@@ -378,8 +378,8 @@ def _jumps(
     for name, run in runs.items():
         least[name] = SETTINGS.least_step * run.amplitude.max(initial=0.0)
         for i in _candidates(run):
-            (first, last) = run.values[i : i + 2].tolist()
-            (a, b) = run.amplitude[i : i + 2].tolist()
+            first, last = run.values[i : i + 2].tolist()
+            a, b = run.amplitude[i : i + 2].tolist()
             steps.append(
                 _Step(name, first, last, a, b, first, a, run.rows[i].last[0], (first, last, a, b))
             )
@@ -395,7 +395,9 @@ def _jumps(
 
 
 def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: Progress) -> None:
-    """Sweep steps again in so many parts, all of them at once, each up to its change of amplitude."""
+    """Sweep steps again in so many parts, all of them at once, each up to its change of
+    amplitude.
+    """
     ways = [
         (step, _parts(step.low, step.last, (step.last - step.first) / parts))
         for step in steps

@@ -238,7 +238,9 @@ class Digests:
                 yield self.of(value, name)
 
     def _object(self, value: Any, name: str) -> Iterator[bytes]:
-        """The pieces of any other object: of saltus's own its table, else what pickle would keep."""
+        """The pieces of any other object: of saltus's own its table, else what pickle would
+        keep.
+        """
         kind = type(value)
         yield self.of(kind, name)
         own = kind.__module__.startswith("saltus.")

@@ -297,10 +297,8 @@ def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path |
         )
     if not callable(progress):
         raise ParameterError(
-            (
-                "progress must be a function of the fraction done and of what is being done, got "
-                f"{progress!r}"
-            ),
+            "progress must be a function of the fraction done and of what is being done, got "
+            f"{progress!r}",
             "progress",
         )
     if store is not None and not isinstance(store, str | Path):

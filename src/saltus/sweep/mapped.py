@@ -202,7 +202,10 @@ def _first_answer(
             return _arrays(answer, point)
     point, first = raised[0]
     where = ", ".join(f"{name} {shown(value)}" for name, value in point.items())
-    sentence = f"the function raised at each of the {len(raised)} points: {type(first).__name__}: {first} at the first, {where}"
+    sentence = (
+        f"the function raised at each of the {len(raised)} points: {type(first).__name__}: {first}"
+        f" at the first, {where}"
+    )
     raise SweepError(sentence) from first
 
 
@@ -335,8 +338,9 @@ def _sent(function: Callable[..., Any], far: bool) -> Any:
         from cloudpickle import dumps
     except ImportError:
         raise ParameterError(
-            "the function stands in a notebook or inside of another one, where other processes cannot find it: install "
-            "cloudpickle, put the function into a file and import it, or leave workers out",
+            "the function stands in a notebook or inside of another one, where other processes"
+            " cannot find it: install cloudpickle, put the function into a file and import it, or"
+            " leave workers out",
             "function",
         ) from None
     return dumps(function)

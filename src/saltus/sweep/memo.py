@@ -179,8 +179,9 @@ class Memo:
                 write_durably(file, content, flush=False)
             except OSError as error:
                 raise SweepError(
-                    f"{file} cannot be written ({(error.strerror or str(error)).lower()}); what was computed before is kept: "
-                    "when that is put right, run the same again and it goes on from there"
+                    f"{file} cannot be written ({(error.strerror or str(error)).lower()}); what was"
+                    " computed before is kept: when that is put right, run the same again and it"
+                    " goes on from there"
                 ) from error
         self._keep(name, inputs, columns)
 

@@ -60,10 +60,8 @@ class Variable:
             ) from None
         if dtype.kind not in "biufc" or dtype.itemsize > (16 if dtype.kind == "c" else 8):
             raise ParameterError(
-                (
-                    "dtype must be boolean, integer, real or complex, of up to 64 bits a part, got "
-                    f"{self.dtype!r}"
-                ),
+                "dtype must be boolean, integer, real or complex, of up to 64 bits a part, got "
+                f"{self.dtype!r}",
                 "dtype",
             )
         try:
@@ -173,10 +171,8 @@ class Plan:
             object.__setattr__(self, name, value)
         if self.chunks.total > MOST_CHUNKS:
             raise ParameterError(
-                (
-                    f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the "
-                    "most"
-                ),
+                f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the "
+                "most",
                 "chunk",
             )
 
@@ -235,7 +231,9 @@ class Plan:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The attributes of the dataset: the plan's own, and the plan itself as a string of JSON."""
+        """The attributes of the dataset: the plan's own, and the plan itself as a string of
+        JSON.
+        """
         return {**self.attrs, "plan": one_line(self.describe())}
 
     def describe(self) -> dict[str, Any]:
@@ -272,7 +270,9 @@ def _check_name(name: Any, what: str) -> None:
 
 
 def axis_values(name: Any, values: Any) -> np.ndarray:
-    """The values of an axis of a plan, which are refused unless they are finite numbers in a list."""
+    """The values of an axis of a plan, which are refused unless they are finite numbers in a
+    list.
+    """
     _check_name(name, "an axis")
     array = np.array(values)
     if (

@@ -94,8 +94,9 @@ class Store:
                     array[cut] = values[name]
         except OSError as error:
             raise SweepError(
-                f"chunk {'/'.join(map(str, index))} cannot be written to {self.path} ({reason(error)}); the chunks before it "
-                "are kept: when that is put right, run the same again and it goes on from there"
+                f"chunk {'/'.join(map(str, index))} cannot be written to {self.path}"
+                f" ({reason(error)}); the chunks before it are kept: when that is put right, run"
+                " the same again and it goes on from there"
             ) from error
 
     def drop(self, index: Index) -> None:
@@ -174,7 +175,8 @@ def check_store(plan: Plan, path: Path) -> None:
         if differ:
             more = f"; and {len(differ) - 3} more" if len(differ) > 3 else ""
             raise ParameterError(
-                f"{path} is the store of another plan: {'; '.join(f'{each:.90}' for each in differ[:3])}{more}; {BEGIN_ANEW}",
+                f"{path} is the store of another plan:"
+                f" {'; '.join(f'{each:.90}' for each in differ[:3])}{more}; {BEGIN_ANEW}",
                 "store",
             )
     elif path.is_file() or (path.is_dir() and any(path.iterdir())):
@@ -299,7 +301,8 @@ def open_store(path: Path | str, *, partial: bool = False) -> xarray.Dataset:
         raise SweepError(f"{damage(found)}; run the sweep again, and it is computed anew")
     if not (found.complete or partial):
         raise SweepError(
-            f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it, or give partial=True"
+            f"{path} has {found.done} of {found.total} chunks; run the sweep again to complete it,"
+            " or give partial=True"
         )
     try:
         return _dataset(_zarr_store(Path(path)))

@@ -221,10 +221,8 @@ def read_plan(path: Path) -> dict[str, Any]:
         ) from None
     if damaged:
         raise ParameterError(
-            (
-                f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin "
-                "anew"
-            ),
+            f"{path / damaged[0]} is damaged; run the sweep again, or remove the store and begin "
+            "anew",
             "path",
         )
     _check_codecs(path, group)

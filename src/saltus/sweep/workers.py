@@ -98,15 +98,17 @@ class _Worker:
             self.connection.send((plan.function, plan.arguments, plan.block(index)))
 
     def receive(self) -> Any:
-        """The outcome that the process has sent; if it has died, a failure with the known reason."""
+        """The outcome that the process has sent; if it has died, a failure with the known
+        reason.
+        """
         try:
             outcome = self.connection.recv()
         except (EOFError, OSError):
             self.process.join()
             if not self.ready:
                 raise SweepError(
-                    f"a worker process ended with exit code {self.process.exitcode} before it could compute; in a script, "
-                    'call the sweep below `if __name__ == "__main__":`'
+                    f"a worker process ended with exit code {self.process.exitcode} before it could"
+                    ' compute; in a script, call the sweep below `if __name__ == "__main__":`'
                 ) from None
             self.dead = True
             return Raised(_death(self.process.exitcode or 0))
@@ -198,7 +200,8 @@ def on_cluster(plan: Computation, queue: deque[Index], address: str) -> Iterator
             raise_if_interrupted()
     except OSError as error:
         raise SweepError(
-            f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same again to go on"
+            f"the Dask scheduler at {address} has gone away ({_first_line(error)}); run the same"
+            " again to go on"
         ) from error
     finally:
         with contextlib.suppress(Exception):
@@ -216,14 +219,16 @@ def _connect(address: str) -> Any:
         client = Client(address, timeout=CLUSTER.patience, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SweepError(
-            f"no Dask scheduler answers at {address} ({_first_line(error)}); is it running, and reachable?"
+            f"no Dask scheduler answers at {address} ({_first_line(error)}); is it running, and"
+            " reachable?"
         ) from error
     try:
         client.wait_for_workers(1, timeout=CLUSTER.patience)
     except TimeoutError:
         client.close(timeout=1)
         raise SweepError(
-            f"the Dask scheduler at {address} has no workers; start some with `dask worker {address}`"
+            f"the Dask scheduler at {address} has no workers; start some with `dask worker"
+            f" {address}`"
         ) from None
     return client
 

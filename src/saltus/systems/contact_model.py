@@ -582,7 +582,7 @@ def _add_frictions(
     contacts.
     """
     names = model.coordinates
-    (normals, slides, free) = given
+    normals, slides, free = given
     late = dict[int, None]()
     rates = v if len(names) > 1 else [v]
     for friction, normal, s in zip(model.frictions, normals, slides, strict=False):
@@ -693,10 +693,8 @@ def normal_forces(model: Any, t: Any, q: Any, v: Any, load: Any) -> tuple[Any, .
         kind = type(model).__name__
         count = len(model.frictions)
         raise ParameterError(
-            (
-                f"{kind}.normal_forces must return {count} value(s), one for each friction, got "
-                f"{given!r}"
-            ),
+            f"{kind}.normal_forces must return {count} value(s), one for each friction, got "
+            f"{given!r}",
             "model",
         )
     return tuple(given)

@@ -94,10 +94,8 @@ def drawing_of(system: System, position: Any) -> tuple[Shape, ...]:
     if not model.moving:
         names = ", ".join(model.coordinates)
         raise ParameterError(
-            (
-                f"{type(model).__name__} has {names} of first order, which move nothing: give it a "
-                "`drawing`"
-            ),
+            f"{type(model).__name__} has {names} of first order, which move nothing: give it a "
+            "`drawing`",
             "system",
         )
     draw = next((draw for kind, draw in DRAWN.items() if isinstance(model, kind)), _masses)

@@ -138,10 +138,8 @@ def from_sympy(
     forces = list(force) if isinstance(force, (Sequence, sympy.MatrixBase)) else [force]
     if rows.shape != (count, count) or len(forces) != count:
         raise ParameterError(
-            (
-                f"{count} coordinates need a mass matrix of {count} rows and {count} forces, got "
-                f"{rows.shape} and {len(forces)}"
-            ),
+            f"{count} coordinates need a mass matrix of {count} rows and {count} forces, got "
+            f"{rows.shape} and {len(forces)}",
             "force",
         )
     made = _Equations(
@@ -207,10 +205,8 @@ def _read_method(equations: Any) -> tuple[Any, Any, Any, Any]:
         speeds, rates = (list(equations.u), kinematics()) if kinematics else ([], {})
     except (AttributeError, ValueError, TypeError) as error:
         raise ParameterError(
-            (
-                "equations must be a LagrangesMethod or a KanesMethod whose equations are formed, "
-                f"got {shown(equations)} ({error})"
-            ),
+            "equations must be a LagrangesMethod or a KanesMethod whose equations are formed, "
+            f"got {shown(equations)} ({error})",
             "equations",
         ) from None
     if any(rate != speed for rate, speed in zip(rates.values(), speeds, strict=False)):
@@ -268,10 +264,8 @@ def _class_of(made: _Equations) -> Any:
         return _CLASSES[repr(made)]
     if made.name in MODELS:
         raise ParameterError(
-            (
-                f"there is a model {shown(made.name)} with other equations already; give this one "
-                "another name"
-            ),
+            f"there is a model {shown(made.name)} with other equations already; give this one "
+            "another name",
             "name",
         )
     if not re.fullmatch(r"[A-Za-z]\w*", made.name):

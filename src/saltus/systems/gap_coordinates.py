@@ -119,7 +119,9 @@ class InGapCoordinates(ContactModel):
 
     @property
     def stops(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Those of the model as it was given, and where functions that stand for coordinates turn."""
+        """Those of the model as it was given, and where functions that stand for coordinates
+        turn.
+        """
         return (*super().stops, *(name + TURNS for _, name in self.gap_places.stands))
 
     def gap_sums(self) -> tuple[list[list[Any]], list[dict[str, Any]], list[dict[str, Any]]]:
@@ -280,10 +282,8 @@ class InGapCoordinates(ContactModel):
             # rounding grows without bound beside the turn
             if not np.all(np.abs(back - there) <= 1e-6 * (units[0] or 1.0)):
                 raise ParameterError(
-                    (
-                        f"a state lies beyond where {name}{TURNS}, as its {name}{INVERSE} leads "
-                        "elsewhere"
-                    ),
+                    f"a state lies beyond where {name}{TURNS}, as its {name}{INVERSE} leads "
+                    "elsewhere",
                     name,
                 )
         terms = (
@@ -361,7 +361,9 @@ class InGapCoordinates(ContactModel):
         return as_given(found)
 
     def _of_sums(self, t: Any, theta: Any, velocity: Any, load: Any) -> list[tuple[Any, Any, Any]]:
-        """For each dependent sum s its rounding B q + n - s, its rate B q' + n', and B q_0'' + n''."""
+        """For each dependent sum s its rounding B q + n - s, its rate B q' + n', and B q_0'' +
+        n''.
+        """
         if not self.dependent:
             return []
         first = len(self.coordinates) - self.dependent
@@ -402,7 +404,7 @@ class InGapCoordinates(ContactModel):
         """
         first = len(self.coordinates) - self.dependent
         found = state.copy()
-        (q, v) = np.split(found, 2)
+        q, v = np.split(found, 2)
         at = dict[int, Any]()
         q[first:], v[first:] = self._sums_and_rates(t, load, found)
         for place in held:
@@ -530,10 +532,8 @@ def in_gap_coordinates(model: Any) -> Any:
         name for name in (*vars(InGapCoordinates), "own_class") if name not in dir(ContactModel)
     } & {*dir(kind)}:
         raise ParameterError(
-            (
-                f"{kind.__name__} has a part named {min(taken)}, as its coordinates of gaps do: "
-                "rename it"
-            ),
+            f"{kind.__name__} has a part named {min(taken)}, as its coordinates of gaps do: "
+            "rename it",
             "model",
         )
     made = object.__new__(_class_in(kind, places))  # its numbers have been checked
@@ -597,10 +597,8 @@ def _check_dependent(model: InGapCoordinates) -> None:
                 largest = max(largest, abs(term))
             if math.isfinite(left) and abs(left) <= CLOSED_BELOW * largest:
                 raise ParameterError(
-                    (
-                        f"the contact {contact.name!r} closes where "
-                        f"{' and '.join(c.name for c in others)} do, and only there: "
-                    )
+                    f"the contact {contact.name!r} closes where "
+                    f"{' and '.join(c.name for c in others)} do, and only there: "
                     + ("leave it out" if sign > 0.0 else "they leave no room between them"),
                     "model",
                 )

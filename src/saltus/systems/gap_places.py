@@ -202,13 +202,15 @@ def _no_place(part: Part, parts: Sequence[Part], reads: dict[str, tuple[int, ...
     what = f"the {type(part).__name__.lower()} {part.name!r} keeps {kept}"
     if names:
         return (
-            f"{what}, and needs a coordinate of its own, with a constant coefficient and read by none of its functions: let it "
-            f"keep a coordinate where its gap is 0, or, if {names[0]} is of one coordinate alone, give the model "
-            f"{names[0]}{INVERSE}(value), the coordinate at which {names[0]} has this value"
+            f"{what}, and needs a coordinate of its own, with a constant coefficient and read by"
+            " none of its functions: let it keep a coordinate where its gap is 0, or, if"
+            f" {names[0]} is of one coordinate alone, give the model {names[0]}{INVERSE}(value),"
+            f" the coordinate at which {names[0]} has this value"
         )
     return (
-        f"{what}, which follows from what {others} keep, up to a displacement: beside frictions, and in a Structure, each sum "
-        "must be a coordinate of its own; leave one out, or give sums that are the same the same coefficients"
+        f"{what}, which follows from what {others} keep, up to a displacement: beside frictions,"
+        " and in a Structure, each sum must be a coordinate of its own; leave one out, or give"
+        " sums that are the same the same coefficients"
     )
 
 
@@ -226,7 +228,9 @@ def _called(contact: Part) -> str:
 
 
 def inverse(rows: list[list[Any]], order: Sequence[int], one: Any = 1.0) -> list[list[Any]]:
-    """The inverse of a matrix whose rows are those of the unit matrix, except for those in `order`."""
+    """The inverse of a matrix whose rows are those of the unit matrix, except for those in
+    `order`.
+    """
     size = len(rows)
     left = [list(row) for row in rows]
     right = [[one * (i == j) for j in range(size)] for i in range(size)]

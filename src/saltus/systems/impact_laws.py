@@ -63,8 +63,8 @@ class ImpactLaw:
         """
         if type(self).velocity_after is ImpactLaw.velocity_after:
             raise ParameterError(
-                f"{type(self).__name__} has no velocity_after, which a {type(model).__name__} with its one contact needs; give "
-                "VelocityReduction(e=...)",
+                f"{type(self).__name__} has no velocity_after, which a {type(model).__name__} with"
+                " its one contact needs; give VelocityReduction(e=...)",
                 "impact",
             )
 
@@ -80,7 +80,8 @@ class ImpactLaw:
             A law that has no meaning for several contacts.
         """
         raise ParameterError(
-            f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give NewtonImpact(e=...)",
+            f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give"
+            " NewtonImpact(e=...)",
             "impact",
         )
 
@@ -299,7 +300,9 @@ class NewtonImpact(ImpactLaw):
     def velocity_after(
         self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
     ) -> Any:
-        """e v- at a wall, whose reset turns its sign, and g v- at a contact that the motion passes."""
+        """e v- at a wall, whose reset turns its sign, and g v- at a contact that the motion
+        passes.
+        """
         (e,) = self.e if isinstance(self.e, Factors) else (self.e,)
         return (e if len(model.sides) == 1 else self.transfer) * velocity
 
@@ -313,8 +316,9 @@ class NewtonImpact(ImpactLaw):
             )
         if len(model.sides) == 2 and values[0] != 0.0:
             raise ParameterError(
-                f"a {type(model).__name__} passes its contact and does not bounce there, so that impact.e must be 0, got "
-                f"{values[0]:g}; VelocityReduction(e=...) and NewtonImpact(transfer=...) say how much speed passes",
+                f"a {type(model).__name__} passes its contact and does not bounce there, so that"
+                f" impact.e must be 0, got {values[0]:g}; VelocityReduction(e=...) and"
+                " NewtonImpact(transfer=...) say how much speed passes",
                 "impact.e",
             )
 
@@ -372,7 +376,8 @@ class PoissonImpact(NewtonImpact):
     def check_one_contact(self, model: OneContactModel) -> None:
         """Refuse: with one contact NewtonImpact is the same."""
         raise ParameterError(
-            f"a {type(model).__name__} has one contact without friction, where NewtonImpact is the same",
+            f"a {type(model).__name__} has one contact without friction, where NewtonImpact is the"
+            " same",
             "impact",
         )
 
@@ -380,8 +385,8 @@ class PoissonImpact(NewtonImpact):
         """The ratios on the diagonal, for a model with frictions in its contacts."""
         if not model.rubs_in_contacts:
             raise ParameterError(
-                f"PoissonImpact is followed where contacts have friction, and those of {type(model).__name__} have none: give "
-                "NewtonImpact(e=...)",
+                "PoissonImpact is followed where contacts have friction, and those of"
+                f" {type(model).__name__} have none: give NewtonImpact(e=...)",
                 "impact",
             )
         return NewtonImpact.restitution_matrix(self, model)
@@ -498,9 +503,10 @@ def check_paradox(model: ContactModel) -> None:
                     if s
                 )
                 raise ParameterError(
-                    f"while {slip} slides, a contact of {type(model).__name__} has no reaction or several (Painleve's paradox): "
-                    f"1 + s mu m_nt / m_tt must be positive and is {share:.6g}, with the mass matrix m of what is free; choose a "
-                    "smaller coefficient",
+                    f"while {slip} slides, a contact of {type(model).__name__} has no reaction or"
+                    " several (Painleve's paradox): 1 + s mu m_nt / m_tt must be positive and is"
+                    f" {share:.6g}, with the mass matrix m of what is free; choose a smaller"
+                    " coefficient",
                     "model",
                 )
 

@@ -204,7 +204,9 @@ def reversed_load(load: Load, *endings: str) -> Load:
 
 
 class Sides(dict[str, Any]):
-    """The sides of a model's surfaces, +1 or -1, by their names: `sides.stop` or `sides["stop"]`."""
+    """The sides of a model's surfaces, +1 or -1, by their names: `sides.stop` or
+    `sides["stop"]`.
+    """
 
     def __getattr__(self, name: str) -> Any:
         if name not in self:

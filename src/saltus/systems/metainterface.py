@@ -110,8 +110,8 @@ class Metainterface(LayeredCell, OneContactModel):
             settle_numbers(self, "smoothing", above=0.0)
             if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):
                 raise ParameterError(
-                    "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0, dissipation_ratio 1); "
-                    "drop it to compute the exact motion of unequal ones",
+                    "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0,"
+                    " dissipation_ratio 1); drop it to compute the exact motion of unequal ones",
                     "smoothing",
                 )
 
@@ -122,7 +122,8 @@ class Metainterface(LayeredCell, OneContactModel):
         for name in ("lower_horizontal", "lower_vertical"):
             if self.smoothing is not None and not vanishes(load.channels.get(name, Constant(0.0))):
                 raise ParameterError(
-                    f"load.{name} cannot act with smoothing, which is for symmetric systems; drop one of them",
+                    f"load.{name} cannot act with smoothing, which is for symmetric systems; drop"
+                    " one of them",
                     f"load.{name}",
                 )
 

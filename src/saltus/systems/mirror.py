@@ -1,4 +1,6 @@
-"""The mirror symmetry of a system: declared by its model and checked, or found from its equations."""
+"""The mirror symmetry of a system: declared by its model and checked, or found from its
+equations.
+"""
 
 from __future__ import annotations
 
@@ -506,7 +508,7 @@ def _check_declared(system: System, mirrored: System, side: int) -> None:
         The error names the class of the model.
     """
     model: Any = system.model
-    (t, distance, v) = PROBE
+    t, distance, v = PROBE
     count = len(model.coordinates)
     places = [model.coordinates.index(name) for name in model.images]
     if count == 1:
@@ -548,8 +550,9 @@ def _check_declared(system: System, mirrored: System, side: int) -> None:
         pairs += zip(one, model.reset(t, -inward, -side, mirrored.load, system.impact), strict=True)
     if any(abs(float(a) + float(b)) > DECLARED_ROUNDING * (1.0 + abs(float(a))) for a, b in pairs):
         raise ParameterError(
-            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of coordinate, velocity and side "
-            "turned, the load that it returns does not turn the sign of the acceleration; return None where there is none"
+            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of"
+            " coordinate, velocity and side turned, the load that it returns does not turn the"
+            " sign of the acceleration; return None where there is none"
         )
 
 

@@ -254,8 +254,10 @@ class Model:
         name = type(self).__name__
         several = len(self.coordinates) > 1
         raise ParameterError(
-            f"{name} defines no kinetic_energy, which this needs: add kinetic_energy(self, t, theta, velocity, side, load), such "
-            f"as return {'0.5 * sum(v**2 for v in velocity)' if several else '0.5 * velocity**2'} where the mass is 1",
+            f"{name} defines no kinetic_energy, which this needs: add kinetic_energy(self, t,"
+            " theta, velocity, side, load), such as return"
+            f" {'0.5 * sum(v**2 for v in velocity)' if several else '0.5 * velocity**2'} where the"
+            " mass is 1",
             "model",
         )
 
@@ -442,7 +444,8 @@ class OneContactModel(Model):
             The mode that the impact ends.
         """
         raise ParameterError(
-            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be used with it",
+            f"{type(self).__name__} defines no inelastic_factor, so InelasticImpact() cannot be"
+            " used with it",
             "impact",
         )
 
@@ -459,19 +462,22 @@ def check_one_contact(model: OneContactModel | type[OneContactModel]) -> None:
         return
     if sides not in ((1, -1), (1,), ()):
         raise ParameterError(
-            f"{name}.sides must be (1, -1) for a motion that passes the contact, (1,) for a wall or () for none, got {sides!r}",
+            f"{name}.sides must be (1, -1) for a motion that passes the contact, (1,) for a wall or"
+            f" () for none, got {sides!r}",
             "model",
         )
     if sides and len(model.coordinates) != 1:
         raise ParameterError(
-            f"{name} has one contact and the coordinates {', '.join(model.coordinates)}, which must be one; a model of several "
-            "coordinates is a saltus.Model if it has no contact, or a saltus.ContactModel",
+            f"{name} has one contact and the coordinates {', '.join(model.coordinates)}, which must"
+            " be one; a model of several coordinates is a saltus.Model if it has no contact, or a"
+            " saltus.ContactModel",
             "model",
         )
     if sides == (1,) and getattr(model.reset, "__func__", model.reset) is OneContactModel.reset:
         raise ParameterError(
-            f"{name} has one side, so an impact must turn the motion round: define reset(self, t, velocity, side, load, impact), "
-            "such as return side, -impact.velocity_after(self, t, velocity, side, side, load)",
+            f"{name} has one side, so an impact must turn the motion round: define reset(self, t,"
+            " velocity, side, load, impact), such as return side, -impact.velocity_after(self, t,"
+            " velocity, side, side, load)",
             "model",
         )
 
@@ -521,7 +527,8 @@ class Jet(np.lib.mixins.NDArrayOperatorsMixin):
         slopes = SLOPES.get(ufunc.__name__)
         if method != "__call__" or kwargs or slopes is None:
             raise TraceError(
-                f"np.{ufunc.__name__} of coordinates has no derivative here; known are {', '.join(SLOPES)}"
+                f"np.{ufunc.__name__} of coordinates has no derivative here; known are"
+                f" {', '.join(SLOPES)}"
             )
         jets = [x if isinstance(x, Jet) else Jet(x, 0.0, 0.0) for x in inputs]
         values = [x.value for x in jets]

@@ -129,8 +129,8 @@ def _check_class(kind: type[Model]) -> None:
         ]
         if given and not issubclass(kind, base):
             raise ParameterError(
-                f"{kind.__name__} defines {given[0]}, so its base class must be saltus.{base.__name__}, not "
-                f"{kind.__mro__[1].__name__}",
+                f"{kind.__name__} defines {given[0]}, so its base class must be"
+                f" saltus.{base.__name__}, not {kind.__mro__[1].__name__}",
                 "model",
             )
     if issubclass(kind, ContactModel):
@@ -160,16 +160,16 @@ def _check_fields(kind: type[Model]) -> None:
     }
     if lost := sorted(given - fields.keys()):
         raise ParameterError(
-            f"{kind.__name__} is no dataclass, so {', '.join(lost)} would be no parameter: write @dataclass(frozen=True, "
-            f"kw_only=True) above class {kind.__name__}",
+            f"{kind.__name__} is no dataclass, so {', '.join(lost)} would be no parameter: write"
+            f" @dataclass(frozen=True, kw_only=True) above class {kind.__name__}",
             "model",
         )
     for base in (Model, OneContactModel, ContactModel):
         for name in fields:
             if isinstance(vars(base).get(name), FunctionType):
                 raise ParameterError(
-                    f"{kind.__name__} has a number named {name}, which is the name of a method of saltus.{base.__name__}: "
-                    f"rename it, such as {name}_size",
+                    f"{kind.__name__} has a number named {name}, which is the name of a method of"
+                    f" saltus.{base.__name__}: rename it, such as {name}_size",
                     f"model.{name}",
                 )
 
@@ -196,13 +196,14 @@ def _check_first_order(model: Model) -> None:
     given = model.first_order
     if isinstance(given, str) or given != names[len(names) - len(given) :]:
         raise ParameterError(
-            f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)}, such as ({names[-1]!r},), "
-            f"got {shown(given)}",
+            f"{kind}.first_order must be a tuple of the last of the coordinates {', '.join(names)},"
+            f" such as ({names[-1]!r},), got {shown(given)}",
             "model",
         )
     if given and model.sides:
         raise ParameterError(
-            f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a contact",
+            f"{names[0]} of {kind} is of first order, so it has no velocity with which to hit a"
+            " contact",
             "model",
         )
     jumps = isinstance(model, ContactModel) and model.jumps
@@ -224,13 +225,14 @@ def _check_first_order(model: Model) -> None:
         if held and not (isinstance(part, Surface) and len(terms) == 1):
             what = type(part).__name__.lower()
             raise ParameterError(
-                f"the {what} {part.name!r} of {kind} holds {held[0]}, which is of first order and has no velocity that could "
-                "stop; a surface may have one such coordinate alone",
+                f"the {what} {part.name!r} of {kind} holds {held[0]}, which is of first order and"
+                " has no velocity that could stop; a surface may have one such coordinate alone",
                 "model",
             )
     if jumps and isinstance(model, InGapCoordinates) and any(model.gap_sums()[1]):
         raise ParameterError(
-            f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave it out",
+            f"{kind} has a wall that moves, at which after_impact is not told its velocity: leave"
+            " it out",
             "model",
         )
 
@@ -241,7 +243,7 @@ def _check_rates(model: Model) -> None:
     """
     size = len(model.coordinates)
     moving = len(model.moving)
-    (t, q, v) = PROBE
+    t, q, v = PROBE
     load = DeclaredLoad(Load(frequency=1.0), model)
 
     def is_known(method: str, unknown: float) -> bool:
@@ -277,15 +279,16 @@ def _check_rates(model: Model) -> None:
         if found is not None and (len(found) if _is_row(found) else 1) != wanted:
             names = ", ".join(model.first_order)
             raise ParameterError(
-                f"{type(model).__name__}.after_impact must return {wanted} value(s), of {names}, got {shown(found)}",
+                f"{type(model).__name__}.after_impact must return {wanted} value(s), of {names},"
+                f" got {shown(found)}",
                 "model",
             )
     for method in methods:
         if is_known(method, v) and not is_known(method, math.nan):
             names = " or ".join(model.first_order)
             raise ParameterError(
-                f"{type(model).__name__}.{method} reads the velocity of {names}, which is of first order: its velocity is what "
-                "the model returns for it, so take the terms of that",
+                f"{type(model).__name__}.{method} reads the velocity of {names}, which is of first"
+                " order: its velocity is what the model returns for it, so take the terms of that",
                 "model",
             )
 
@@ -313,7 +316,8 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
             )
         if abs(at) > MODEL_ROUNDING * abs(rate):
             raise ParameterError(
-                f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side}; give both",
+                f"{name}.gap must be 0 at {name}.contact = {point:g}, got {at:g} on side {side};"
+                " give both",
                 "model",
             )
         # a slow impact: a law may have no meaning for fast ones
@@ -324,8 +328,9 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
         following, after = answer
         if rates.get(int(following), 0.0) * after < 0.0:
             raise ParameterError(
-                f"{name}.reset sends the motion beyond the contact: on side {side} the velocity {before:g} becomes "
-                f"{float(after):g} on side {int(following)}; velocities are rates of the coordinate, and "
+                f"{name}.reset sends the motion beyond the contact: on side {side} the velocity"
+                f" {before:g} becomes {float(after):g} on side {int(following)}; velocities are"
+                " rates of the coordinate, and "
                 + (
                     "a bounce turns the sign of what impact.velocity_after returns"
                     if following == side
@@ -365,7 +370,8 @@ def check_contact_model(model: ContactModel) -> bool:
     names = [*(part.name for part in parts), *(friction.name for friction in frictions)]
     if len(set(names)) < len(names):
         raise ParameterError(
-            f"contacts, frictions and surfaces of {kind} must have names of their own, got {', '.join(names)}",
+            f"contacts, frictions and surfaces of {kind} must have names of their own, got"
+            f" {', '.join(names)}",
             "model",
         )
     for contact in parts:
@@ -383,7 +389,8 @@ def check_contact_model(model: ContactModel) -> bool:
                 and not (a.sign != b.sign and b.gap(a.position) > 0.0)
             ):
                 raise ParameterError(
-                    f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them",
+                    f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between"
+                    " them",
                     "model",
                 )
     _check_frictions(model)
@@ -395,7 +402,9 @@ def check_contact_model(model: ContactModel) -> bool:
 
 
 def _check_frictions(model: ContactModel) -> None:
-    """Refuse frictions on coordinates that they cannot hold, or with coefficients without meaning."""
+    """Refuse frictions on coordinates that they cannot hold, or with coefficients without
+    meaning.
+    """
     kind = type(model).__name__
     taken = list[Any]()
     pressed = [friction.contact for friction in model.frictions]
@@ -421,7 +430,8 @@ def _check_frictions(model: ContactModel) -> None:
             )
         if friction.contact is not None and pressed.count(friction.contact) > 1:
             raise ParameterError(
-                f"{where} is in the contact {friction.contact!r}, as another one is: one is followed",
+                f"{where} is in the contact {friction.contact!r}, as another one is: one is"
+                " followed",
                 "model",
             )
         for other in (c for c in model.contacts if c.name == friction.contact):
@@ -440,7 +450,9 @@ def _check_frictions(model: ContactModel) -> None:
 
 
 def _check_mass(model: ContactModel) -> None:
-    """Refuse a mass matrix of another size than the coordinates have, or one that is not symmetric."""
+    """Refuse a mass matrix of another size than the coordinates have, or one that is not
+    symmetric.
+    """
     names = model.coordinates
     kind = type(model)
     size = len(names)
@@ -487,7 +499,8 @@ def _check_mass(model: ContactModel) -> None:
         ):
             jumping = ", ".join(model.first_order)
             raise ParameterError(
-                f"{kind.__name__}.mass_matrix depends on {jumping}, which jumps at impacts: leave one out",
+                f"{kind.__name__}.mass_matrix depends on {jumping}, which jumps at impacts: leave"
+                " one out",
                 "model",
             )
     for i, j in itertools.combinations(range(size), 2):
@@ -498,8 +511,8 @@ def _check_mass(model: ContactModel) -> None:
         a, b = float(a), float(b)
         if abs(a - b) > MODEL_ROUNDING * max(abs(a), abs(b)):
             raise ParameterError(
-                f"{kind.__name__}.mass_matrix must be symmetric, got {a:g} for {names[i]}, {names[j]} and {b:g} for "
-                f"{names[j]}, {names[i]}",
+                f"{kind.__name__}.mass_matrix must be symmetric, got {a:g} for {names[i]},"
+                f" {names[j]} and {b:g} for {names[j]}, {names[i]}",
                 "model",
             )
 
@@ -511,7 +524,10 @@ def _size_of(found: Any) -> str:
     rows = {len(row) if _is_row(row) else 0 for row in found}
     if rows == {0}:
         return f"{len(found)} number{'s' * (len(found) != 1)}"
-    return f"{len(found)} row{'s' * (len(found) != 1)} of {' and '.join(map(str, sorted(rows)))} number{'s' * (rows != {1})}"
+    return (
+        f"{len(found)} row{'s' * (len(found) != 1)} of {' and '.join(map(str, sorted(rows)))}"
+        f" number{'s' * (rows != {1})}"
+    )
 
 
 def _is_row(found: Any) -> bool:
@@ -527,7 +543,8 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
     where = f"the {type(contact).__name__.lower()} {contact.name!r} of {type(model).__name__}"
     if not isinstance(given, Mapping) or not given:
         raise ParameterError(
-            f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}}, got {shown(given)}",
+            f"{where} must be given a coordinate, or a dictionary such as {{'y': 1.0, 'x': -1.0}},"
+            f" got {shown(given)}",
             "model",
         )
     grounds = [channel for channel in model.channels if channel.startswith("ground")]
@@ -539,17 +556,22 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
         )
         if name not in (*names, *grounds) and not own:
             known = ", ".join((*names, *grounds))
-            reason = " (a wall moves with a channel whose name begins with ground, as those are displacements)"
+            reason = (
+                " (a wall moves with a channel whose name begins with ground, as those are"
+                " displacements)"
+            )
             no_function = f" and no function {name}(q) of {type(model).__name__}"
             raise ParameterError(
-                f"{_named(contact)} {shown(name)}, none of {known}{reason if name in model.channels else no_function}",
+                f"{_named(contact)} {shown(name)}, none of"
+                f" {known}{reason if name in model.channels else no_function}",
                 "model",
             )
         if own and hasattr(model, name + INVERSE):
             _check_inverse(model, name)
         if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor != 0.0):
             raise ParameterError(
-                f"{where} must have coefficients that are numbers other than 0, got {shown(factor)} of {name}",
+                f"{where} must have coefficients that are numbers other than 0, got {shown(factor)}"
+                f" of {name}",
                 "model",
             )
     if all(name in grounds for name in given):
@@ -558,7 +580,8 @@ def _check_sum(model: ContactModel, contact: Part) -> None:
         )
     if type(model).acceleration is not ContactModel.acceleration:
         raise ParameterError(
-            f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force, not acceleration",
+            f"{_named(contact)} a sum of coordinates, so {type(model).__name__} must define force,"
+            " not acceleration",
             "model",
         )
 
@@ -574,7 +597,10 @@ def _check_inverse(model: ContactModel, name: str) -> None:
             else _asked(model, name, as_given([Jet(found, 1.0)] * len(model.coordinates)))
         )
         if again is not None and (again.first < 0.0 or abs(again.value - value) > MODEL_ROUNDING):
-            what = f"{type(model).__name__}.{name}{INVERSE} must give the coordinate at which {name} has a value"
+            what = (
+                f"{type(model).__name__}.{name}{INVERSE} must give the coordinate at which {name}"
+                " has a value"
+            )
             raise ParameterError(
                 f"{what}, where {name} rises with it, and gives {found:g} for {float(value):g}",
                 "model",
@@ -600,7 +626,7 @@ def _probe(model: Model) -> None:
     sizes than its coordinates.
     """
     size = len(model.coordinates)
-    (t, q, v) = PROBE
+    t, q, v = PROBE
     load = DeclaredLoad(Load(frequency=1.0), model)
     state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
     single = all(isinstance(each.coordinate, str) for each in getattr(model, "surfaces", ()))
@@ -614,7 +640,8 @@ def _probe(model: Model) -> None:
             wanted = "a number" if size == 1 else f"{size} numbers"
             names = ", ".join(model.coordinates)
             raise ParameterError(
-                f"{type(model).__name__}.force must return {wanted}, for {names}, got {_size_of(pushed)}",
+                f"{type(model).__name__}.force must return {wanted}, for {names}, got"
+                f" {_size_of(pushed)}",
                 "model",
             )
     for side in model.every_side:
@@ -622,7 +649,8 @@ def _probe(model: Model) -> None:
         count = len(found) if isinstance(found, (tuple, list)) else 1
         if found is not None and count != size:
             raise ParameterError(
-                f"{type(model).__name__}.acceleration must return {size} value(s), got {shown(found)}",
+                f"{type(model).__name__}.acceleration must return {size} value(s), got"
+                f" {shown(found)}",
                 "model",
             )
 

@@ -1,4 +1,6 @@
-"""Oscillators on a spring: at a wall, between two stops, as an impact pair, and on a moving belt."""
+"""Oscillators on a spring: at a wall, between two stops, as an impact pair, and on a moving
+belt.
+"""
 
 from __future__ import annotations
 

@@ -32,7 +32,8 @@ def parameter_table(system: System, parameters: Any) -> dict[str, Any]:
         return {}
     if not isinstance(parameters, Mapping):
         raise ParameterError(
-            f"parameters must be arrays by dotted path, such as {{'load.frequency': ...}}, got {parameters!r}",
+            "parameters must be arrays by dotted path, such as {'load.frequency': ...}, got"
+            f" {parameters!r}",
             "parameters",
         )
     known = [path for path, _ in numbers(system)]
@@ -79,7 +80,9 @@ def distinct_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray
 
 
 def _chosen(rows: np.ndarray) -> Iterable[int]:
-    """The rows to be checked: all, or if they are many, those with extreme values and some others."""
+    """The rows to be checked: all, or if they are many, those with extreme values and some
+    others.
+    """
     if len(rows) <= MOST_CHECKED:
         return range(len(rows))
     even = np.linspace(0, len(rows) - 1, MOST_CHECKED).astype(int)
@@ -128,7 +131,8 @@ def broadcast_arrays(
     many = [name for name, a in plain.items() if a.ndim]
     if named and many:
         raise ParameterError(
-            f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays, not both"
+            f"{min(named)} has named dimensions and {many[0]} has not; give DataArrays or arrays,"
+            " not both"
         )
     if named:
         _check_together(
@@ -144,8 +148,8 @@ def broadcast_arrays(
     except ValueError:
         shapes = ", ".join(f"{name} {plain[name].shape}" for name in many)
         raise ParameterError(
-            f"the arrays do not broadcast together: {shapes}; for each with each, name their dimensions: "
-            f"{many[0]}=xr.DataArray(values, dims={many[0]!r})",
+            f"the arrays do not broadcast together: {shapes}; for each with each, name their"
+            f" dimensions: {many[0]}=xr.DataArray(values, dims={many[0]!r})",
             "parameters",
         ) from None
     _check_together(next(iter(many), "parameters"), shape)
@@ -172,8 +176,8 @@ def _aligned(named: dict[str, Any]) -> dict[str, Any]:
         together = xarray.broadcast(*xarray.align(*named.values(), join="exact"))
     except ValueError:
         raise ParameterError(
-            f"the DataArrays ({', '.join(named)}) have dimensions of the same name with other lengths or coordinates; "
-            "give such dimensions different names"
+            f"the DataArrays ({', '.join(named)}) have dimensions of the same name with other"
+            " lengths or coordinates; give such dimensions different names"
         ) from None
     return dict(zip(named, together, strict=True))
 

@@ -27,7 +27,9 @@ def in_other_units(
     unit: float,
     factor: float,
 ) -> Pulse:
-    """The pulse with its times and rates converted by the unit of time, and `factor` times as high."""
+    """The pulse with its times and rates converted by the unit of time, and `factor` times as
+    high.
+    """
     of = {"time": by_time, "rate": by_rate}
     fields = {
         f.name: of[f.metadata["converts"]]

@@ -37,7 +37,10 @@ GRAVITY = 9.80665  # m/s^2, the standard value, of which the g of a record is a 
 # bytes that a character of a record takes, about, while it is read: as text, in lines, in pairs of
 # numbers
 RECORD_MEMORY = 20
-WANTED = "saltus reads AT2, VT2 and DT2 (PEER), V2 (CSMIP, COSMOS), and text with two columns, time and value"
+WANTED = (
+    "saltus reads AT2, VT2 and DT2 (PEER), V2 (CSMIP, COSMOS), and text with two columns, time and"
+    " value"
+)
 # the most letters of a word among samples: numbers of a line may touch, longer ones are no numbers
 LONGEST_CELL = 400
 # the most lines before the samples of a PEER file: there are four, and some programs write more
@@ -181,7 +184,8 @@ class RecordFile:
                 ]
         if not fitting:
             self.refuse(
-                f"line {at + 1} has {count} samples in about {span:g} s, and no step in the headings above fits that"
+                f"line {at + 1} has {count} samples in about {span:g} s, and no step in the"
+                " headings above fits that"
             )
         return fitting[0]
 
@@ -232,13 +236,15 @@ class RecordFile:
             if row is None:
                 if rows or headed:
                     self.refuse(
-                        f"line {number} must be two finite numbers, got {_quoted(line.strip())}; {WANTED}"
+                        f"line {number} must be two finite numbers, got {_quoted(line.strip())};"
+                        f" {WANTED}"
                     )
                 headed = True
                 continue
             if rows and row[0] <= rows[-1][0]:
                 self.refuse(
-                    f"times must increase, but line {number} has {row[0]:g} after {rows[-1][0]:g}; sort the file"
+                    f"times must increase, but line {number} has {row[0]:g} after {rows[-1][0]:g};"
+                    " sort the file"
                 )
             rows.append(row)
         time, value = np.array(rows, dtype=float).reshape(-1, 2).T
@@ -270,7 +276,8 @@ def read_record(
     said = dict.fromkeys(name for name in (quantity, unit and unit[0], found.quantity) if name)
     if len(said) > 1:
         file.refuse(
-            f"the samples are said to be both {' and '.join(said)}; give the quantity and the units that they have"
+            f"the samples are said to be both {' and '.join(said)}; give the quantity and the units"
+            " that they have"
         )
     value = found.value * (unit[1] if unit else 1.0)
     if baseline is not None and value.size:
@@ -382,7 +389,10 @@ class ConstantNumbers:
     def packed(self) -> str:
         """Its numbers as a text, exactly; `ConstantNumbers` reads it."""
         size = "x".join(map(str, self.array.shape))
-        return f"{PACKED}{size} {base64.b64encode(zlib.compress(self.array.astype('<f8').tobytes())).decode()}"
+        return (
+            f"{PACKED}{size}"
+            f" {base64.b64encode(zlib.compress(self.array.astype('<f8').tobytes())).decode()}"
+        )
 
 
 def read_array(given: Any, name: str) -> np.ndarray:
@@ -455,13 +465,14 @@ def check_matrices(given: Mapping[str, np.ndarray]) -> None:
         if name != "damping" and np.abs(a - a.T).max() > 1e-9 * np.abs(a).max():
             i, j = np.unravel_index(np.abs(a - a.T).argmax(), a.shape)
             raise ParameterError(
-                f"{name} must be symmetric, got {a[i, j]:g} in row {i}, column {j} and {a[j, i]:g} in row {j}, column {i}",
+                f"{name} must be symmetric, got {a[i, j]:g} in row {i}, column {j} and {a[j, i]:g}"
+                f" in row {j}, column {i}",
                 name,
             )
     if len(mass) > LIMITS.coordinates:
         raise ParameterError(
-            f"mass must have at most {LIMITS.coordinates} rows, got {len(mass)}: reduce the structure first, such as by the "
-            "method of Craig and Bampton",
+            f"mass must have at most {LIMITS.coordinates} rows, got {len(mass)}: reduce the"
+            " structure first, such as by the method of Craig and Bampton",
             "mass",
         )
     if (least := np.linalg.eigvalsh(mass)[0]) <= 0.0:

@@ -187,6 +187,7 @@ def _check_resets(system: System, backward: System) -> None:
             )
             if back != side or not math.isclose(float(again), -before, rel_tol=1e-12):
                 raise ParameterError(
-                    f"the reset of {type(system.model).__name__} cannot be followed backward: v+ = {float(after):g} on side "
-                    f"{following} leads back to side {back} with {float(-again):g}, not to side {side} with {before:g}"
+                    f"the reset of {type(system.model).__name__} cannot be followed backward: v+ ="
+                    f" {float(after):g} on side {following} leads back to side {back} with"
+                    f" {float(-again):g}, not to side {side} with {before:g}"
                 )

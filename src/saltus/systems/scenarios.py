@@ -140,14 +140,16 @@ def name_impact(
             else "no layer that is closed moves towards its contact"
         )
         raise ParameterError(
-            f"not an impact of Table 1: {which}, at angles {before.theta} with velocities {before.velocity}"
+            f"not an impact of Table 1: {which}, at angles {before.theta} with velocities"
+            f" {before.velocity}"
         )
     s = closing.index(True)
     j = 1 - s
     for i in (0, 1):
         if abs(after.theta[i]) <= tolerance and _opening(after, i) < -speed:
             raise ParameterError(
-                f"layer {i + 1} would close further after the impact, with velocity {after.velocity[i]!r}"
+                f"layer {i + 1} would close further after the impact, with velocity"
+                f" {after.velocity[i]!r}"
             )
     other_open = abs(before.theta[j]) > tolerance or _opening(before, j) > speed
     if other_open and model is not None:
@@ -202,7 +204,8 @@ def _check_states(before: LayerState, after: LayerState, tolerance: float) -> No
             raise ParameterError(f"the state {name} the impact must be finite, got {state}")
         if state.theta[0] < -tolerance or state.theta[1] > tolerance:
             raise ParameterError(
-                f"the state {name} the impact needs theta_1 >= 0 and theta_2 <= 0, got {state.theta}"
+                f"the state {name} the impact needs theta_1 >= 0 and theta_2 <= 0, got"
+                f" {state.theta}"
             )
     if any(abs(a - b) > tolerance for a, b in zip(before.theta, after.theta, strict=True)):
         raise ParameterError(
@@ -219,6 +222,7 @@ def _check_balance(
     )
     if abs(impulse) > 10 * tolerance * scale:
         raise ParameterError(
-            f"layer {2 - s} is open and not hit, but its momentum changes by {impulse:.3g} (per M2 l^2 / T); "
-            "its velocity must jump by -M_js / M_jj times the jump of the impacting layer"
+            f"layer {2 - s} is open and not hit, but its momentum changes by {impulse:.3g} (per M2"
+            " l^2 / T); its velocity must jump by -M_js / M_jj times the jump of the impacting"
+            " layer"
         )

@@ -40,7 +40,9 @@ def children(node: Any) -> dict[str, Any]:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a leaf is a number of the system; switches, names and counts belong to its structure."""
+    """Whether a leaf is a number of the system; switches, names and counts belong to its
+    structure.
+    """
     return isinstance(value, (int, float)) and not isinstance(value, (bool, Count))
 
 
@@ -307,10 +309,8 @@ def from_dict(kind: str, data: Any) -> Any:
     fields = dict(data)
     if "type" not in fields:
         raise ParameterError(
-            (
-                f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or "
-                "'VelocityReduction'"
-            ),
+            f"{kind}.type is missing: it names the {kind}, such as 'Metainterface' or "
+            "'VelocityReduction'",
             kind,
         )
     name = fields.pop("type")

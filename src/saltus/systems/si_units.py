@@ -104,7 +104,10 @@ def _notice_milliseconds(load: Load) -> None:
                 and term.time.size > 100
                 and term.time[-1] - term.time[0] >= term.time.size
             ):
-                text = f"the samples of {term!r} are seconds apart, as times are in seconds; divide those in milliseconds by 1000"
+                text = (
+                    f"the samples of {term!r} are seconds apart, as times are in seconds; divide"
+                    " those in milliseconds by 1000"
+                )
                 warnings.warn(text, UserWarning, stacklevel=2)
 
 
@@ -169,8 +172,8 @@ class PhysicalCell(Physical):
         settle_numbers(self, "lower_mass", "upper_damping", "lower_damping", at_least=0.0)
         if self.upper_damping == 0.0 and self.lower_damping != 0.0:
             raise ParameterError(
-                f"lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 / C2 has no value; "
-                "give the upper hinge a small damping",
+                f"lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 /"
+                " C2 has no value; give the upper hinge a small damping",
                 "lower_damping",
             )
 
@@ -240,12 +243,13 @@ class PhysicalCell(Physical):
         """
         return {
             "damping": self.upper_damping * self.units["time"] / (self.upper_mass * self.length**2),
-            "stiffness_ratio": (self.lower_stiffness or self.upper_stiffness)
-            / self.upper_stiffness,
+            "stiffness_ratio": (
+                (self.lower_stiffness or self.upper_stiffness) / self.upper_stiffness
+            ),
             "mass_ratio": self.lower_mass / self.upper_mass,
-            "dissipation_ratio": (self.lower_damping or 0.0) / self.upper_damping
-            if self.upper_damping
-            else 1.0,
+            "dissipation_ratio": (
+                (self.lower_damping or 0.0) / self.upper_damping if self.upper_damping else 1.0
+            ),
         }
 
     def metainterface(self, beta0: float) -> Metainterface:

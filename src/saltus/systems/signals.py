@@ -272,37 +272,29 @@ class Record(Signal):
         least = 4 if self._curve == "spline" else 2
         if time.size < least:
             raise ParameterError(
-                (
-                    f"{where}: a record of {self.quantity} needs at least {least} samples, got "
-                    f"{time.size}"
-                ),
+                f"{where}: a record of {self.quantity} needs at least {least} samples, got "
+                f"{time.size}",
                 "time",
             )
         if not (np.isfinite(time).all() and np.isfinite(value).all()):
             bad = int(np.argmin(np.isfinite(time) & np.isfinite(value)))
             raise ParameterError(
-                (
-                    f"{where}: sample {bad} is not a finite number (time {time[bad]}, value "
-                    f"{value[bad]})"
-                ),
+                f"{where}: sample {bad} is not a finite number (time {time[bad]}, value "
+                f"{value[bad]})",
                 "value",
             )
         largest = max(np.abs(time).max(), np.abs(value).max())
         if largest > LIMITS.value:
             raise ParameterError(
-                (
-                    f"{where}: times and values must be at most {LIMITS.value:g} in size, got "
-                    f"{largest:g}"
-                ),
+                f"{where}: times and values must be at most {LIMITS.value:g} in size, got "
+                f"{largest:g}",
                 "time",
             )
         if not (np.diff(time) > 0).all():
             bad = int(np.argmin(np.diff(time) > 0)) + 1
             raise ParameterError(
-                (
-                    f"{where}: times must increase, but sample {bad} has {time[bad]:g} after "
-                    f"{time[bad - 1]:g}; sort the file"
-                ),
+                f"{where}: times must increase, but sample {bad} has {time[bad]:g} after "
+                f"{time[bad - 1]:g}; sort the file",
                 "time",
             )
         with np.errstate(over="ignore"):
@@ -310,10 +302,8 @@ class Record(Signal):
         if not (steep <= LIMITS.value).all():
             bad = int(np.argmax(steep))
             raise ParameterError(
-                (
-                    f"{where}: samples {bad} and {bad + 1} are too near in time, "
-                    f"{np.diff(time)[bad]:g} apart"
-                ),
+                f"{where}: samples {bad} and {bad + 1} are too near in time, "
+                f"{np.diff(time)[bad]:g} apart",
                 "time",
             )
         time.setflags(write=False)
@@ -445,7 +435,9 @@ class Record(Signal):
 
     @cached_property
     def polynomials(self) -> tuple[Any, Any, Any]:
-        """The value and its first two derivatives as SciPy piecewise polynomials, `scale` left out."""
+        """The value and its first two derivatives as SciPy piecewise polynomials, `scale` left
+        out.
+        """
         from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
         if self._curve != "linear":
@@ -567,10 +559,8 @@ class Pulse(Signal):
     def __post_init__(self) -> None:
         if self.quantity not in self.quantities:
             raise ParameterError(
-                (
-                    f"quantity of a {type(self).__name__} must be one of "
-                    f"{', '.join(self.quantities)}, got {self.quantity!r}"
-                ),
+                f"quantity of a {type(self).__name__} must be one of "
+                f"{', '.join(self.quantities)}, got {self.quantity!r}",
                 "quantity",
             )
         settle_numbers(self, "amplitude", "start")
@@ -582,10 +572,8 @@ class Pulse(Signal):
         settle_numbers(self, *positive, above=0.0)
         if not (math.isfinite(self.length) and self.start + self.length > self.start):
             raise ParameterError(
-                (
-                    f"a {type(self).__name__} of the duration {self.length:g} does not end after its "
-                    "start"
-                ),
+                f"a {type(self).__name__} of the duration {self.length:g} does not end after its "
+                "start",
                 positive[0],
             )
 

@@ -259,14 +259,17 @@ def check_window(window: Any, system: System) -> Window:
                 if moving == names
                 else f"the velocities of {', '.join(moving) or 'none'}"
             )
-            meant = f"{len(names) + len(moving)} pairs (least, largest), of {', '.join(names)}, then of {whose},"
+            meant = (
+                f"{len(names) + len(moving)} pairs (least, largest), of {', '.join(names)}, then of"
+                f" {whose},"
+            )
         raise ParameterError(f"window must be {meant}, got {shown(window)}", "window")
     for contact in (each for each in system.model.contacts if each.coordinate in names):
         low, high = bounds[names.index(contact.coordinate)]
         if max(contact.gap(low), contact.gap(high)) < 0.0:
             raise ParameterError(
-                f"window must reach to where {contact.coordinate} can be, and all of ({low:g}, {high:g}) is beyond the contact "
-                f"{contact.name} at {contact.position:g}",
+                f"window must reach to where {contact.coordinate} can be, and all of ({low:g},"
+                f" {high:g}) is beyond the contact {contact.name} at {contact.position:g}",
                 "window",
             )
     return Window(map(tuple, bounds.tolist()))
@@ -538,8 +541,8 @@ def _held(system: System, states: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
         position = float(contact.position)
-        (low, high) = bounds[place]
-        (slowest, fastest) = bounds[len(names) + place]
+        low, high = bounds[place]
+        slowest, fastest = bounds[len(names) + place]
         if low <= position <= high and slowest <= 0.0 <= fastest:
             reached.setdefault(place, []).append(position)
     count = len(normal_of(system, 0))

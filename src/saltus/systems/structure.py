@@ -423,7 +423,9 @@ class Structure(ContactModel):
         return rows[0][0] if own.size == 1 else rows
 
     def force(self, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
-        """The forces on the local displacements and on the modes, without reactions and frictions."""
+        """The forces on the local displacements and on the modes, without reactions and
+        frictions.
+        """
         own = Equations(self)
         q, v = (list(x) if own.size > 1 else [x] for x in (theta, velocity))
         m = own.local
@@ -506,10 +508,8 @@ class Structure(ContactModel):
         given = np.asarray(of, dtype=float)
         if given.shape[:1] != (len(self.names),):
             raise ParameterError(
-                (
-                    f"displacements takes {len(self.names)} coordinates along the first axis, got "
-                    f"{shown(of)}"
-                ),
+                f"displacements takes {len(self.names)} coordinates along the first axis, got "
+                f"{shown(of)}",
                 "of",
             )
         return np.asarray(vars(self)["_modes"].basis @ given)
@@ -557,10 +557,8 @@ def _matrix(given: Any, name: str) -> Any:
     """A matrix that was given, or None for a damping that was not."""
     if given is None and name != "damping":
         raise ParameterError(
-            (
-                f"{name} is missing: a structure is given by its mass and its stiffness, or by a "
-                "file of them"
-            ),
+            f"{name} is missing: a structure is given by its mass and its stiffness, or by a "
+            "file of them",
             name,
         )
     return (
@@ -577,10 +575,8 @@ def _names_of(given: Any, size: int) -> tuple[str, ...]:
     names = tuple(given) or tuple(f"x{i}" for i in range(size))
     if len(names) != size or len(set(names)) < size:
         raise ParameterError(
-            (
-                f"names must be {size} different names, one for each row of the mass, got "
-                f"{shown(given)}"
-            ),
+            f"names must be {size} different names, one for each row of the mass, got "
+            f"{shown(given)}",
             "names",
         )
     for name in names:
@@ -597,10 +593,8 @@ def _check_name(name: Any, where: str) -> None:
         and not name.startswith(MODE)
     ):
         raise ParameterError(
-            (
-                f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not "
-                f"{MODE}1"
-            ),
+            f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not "
+            f"{MODE}1",
             where,
         )
 
@@ -621,10 +615,8 @@ def _vector(given: Any, names: tuple[str, ...], where: str) -> Any:
     values = read_array(given, where)
     if values.shape != (len(names),):
         raise ParameterError(
-            (
-                f"{where} must have {len(names)} numbers, one for each row of the mass, got "
-                f"{shown(given)}"
-            ),
+            f"{where} must have {len(names)} numbers, one for each row of the mass, got "
+            f"{shown(given)}",
             where,
         )
     return RowNumbers(values.tolist())
@@ -662,10 +654,8 @@ def _part(
         known = [each.name for each in fields(kind)]
         if unknown := [name for name in part if name not in known]:
             raise ParameterError(
-                (
-                    f"{field}: {kind.__name__} has no {shown(unknown[0])}; "
-                    f"{near(str(unknown[0]), known)}"
-                ),
+                f"{field}: {kind.__name__} has no {shown(unknown[0])}; "
+                f"{near(str(unknown[0]), known)}",
                 field,
             )
         if "name" not in part or "coordinate" not in part:

@@ -123,7 +123,7 @@ class System:
         """
         if changes is not None and not isinstance(changes, Mapping):
             raise ParameterError(
-                f"changes must be a dict of parts by their paths, as {{'load.frequency': 1.1}}, "
+                "changes must be a dict of parts by their paths, as {'load.frequency': 1.1}, "
                 f"got {shown(changes)}",
                 "changes",
             )
@@ -403,8 +403,9 @@ def _check_parts(system: System) -> None:
         )
     if not isinstance(system.impact, ImpactLaw):
         raise ParameterError(
-            "impact must be an ImpactLaw: VelocityReduction(e) where a motion passes the contact, NewtonImpact(e) where it "
-            f"bounces, EnergyRestitution(...) or InelasticImpact(); got {shown(system.impact)}",
+            "impact must be an ImpactLaw: VelocityReduction(e) where a motion passes the contact,"
+            " NewtonImpact(e) where it bounces, EnergyRestitution(...) or InelasticImpact(); got"
+            f" {shown(system.impact)}",
             "impact",
         )
 
@@ -469,8 +470,8 @@ def check_system(
     names = system.model.coordinates
     if inner is not system and not sums:
         raise ParameterError(
-            f"{asking} works in coordinates that contacts hold one by one: give it system.in_gap_coordinates, which has "
-            f"{', '.join(inner.model.coordinates)}",
+            f"{asking} works in coordinates that contacts hold one by one: give it"
+            f" system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
             "system",
         )
     if coordinates is not None and (len(names) != coordinates or system.model.first_order):
@@ -489,6 +490,7 @@ def check_system(
             ]
         )
         raise ParameterError(
-            f"{asking} is for models with one contact so far, and {type(system.model).__name__} has {parts}; use simulate",
+            f"{asking} is for models with one contact so far, and {type(system.model).__name__} has"
+            f" {parts}; use simulate",
             "system",
         )

@@ -76,7 +76,9 @@ class TwoLayer(LayeredCell, ContactModel):
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """The contact of the lower layer, theta_1 >= 0, and that of the upper layer, theta_2 <= 0."""
+        """The contact of the lower layer, theta_1 >= 0, and that of the upper layer, theta_2 <=
+        0.
+        """
         return CONTACTS
 
     @property

@@ -97,7 +97,9 @@ class UnitCell:
 
     @property
     def base(self) -> float:
-        """Length of the horizontal edges, sin(alpha0 + beta0) / sin(alpha0), by the law of sines."""
+        """Length of the horizontal edges, sin(alpha0 + beta0) / sin(alpha0), by the law of
+        sines.
+        """
         return math.sin(self.alpha0 + self.beta0) / math.sin(self.alpha0)
 
     @property
@@ -139,10 +141,8 @@ class UnitCell:
         """
         if n != 1:
             raise ParameterError(
-                (
-                    "only n = 1 of the line conditions can be reached before the kinematic limit, "
-                    f"got n = {n!r}"
-                ),
+                "only n = 1 of the line conditions can be reached before the kinematic limit, "
+                f"got n = {n!r}",
                 "n",
             )
         return self.line_limit
@@ -350,10 +350,8 @@ class UnitCell:
         if np.any(size > self.kinematic_limit + ANGLE_ROUNDING):
             worst = float(np.max(size))
             raise ParameterError(
-                (
-                    "abs(theta) must not pass the kinematic limit 2 (pi - beta0) = "
-                    f"{self.kinematic_limit:.6g} rad, got {worst!r}"
-                ),
+                "abs(theta) must not pass the kinematic limit 2 (pi - beta0) = "
+                f"{self.kinematic_limit:.6g} rad, got {worst!r}",
                 "theta",
             )
         return np.maximum(2 * np.sin(self.beta0 + size / 2) * np.sin(size / 2), 0.0)
@@ -362,10 +360,8 @@ class UnitCell:
         if not np.all(np.abs(phi) <= self.max_misalignment + ANGLE_ROUNDING):
             worst = float(np.max(np.abs(phi)))
             raise ParameterError(
-                (
-                    f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got "
-                    f"{worst!r}"
-                ),
+                f"abs(phi) must lie in [0, {self.max_misalignment:.6g}] rad in this cell, got "
+                f"{worst!r}",
                 "phi",
             )
 

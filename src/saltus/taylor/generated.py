@@ -387,7 +387,9 @@ def object_code(text: str, is_long: bool = False) -> bytes:
 
 
 def _optimise(module: Any, machine: Any) -> None:
-    """LLVM's own passes of level 3; no vectoriser, as the text has vectors where they are worth it."""
+    """LLVM's own passes of level 3; no vectoriser, as the text has vectors where they are worth
+    it.
+    """
     if hasattr(binding, "create_pass_builder"):
         builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(3))
         builder.getModulePassManager().run(module, builder)

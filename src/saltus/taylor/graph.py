@@ -41,16 +41,18 @@ LEAVES = (
 RECORD_WIDTH = 5
 
 ALLOWED = (
-    f"+ - * /, powers, NumPy's {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the "
-    "coordinate (the sign of the coordinate is `side`)"
+    "+ - * /, powers, NumPy's"
+    f" {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the"
+    " coordinate (the sign of the coordinate is `side`)"
 )
 BRANCH = (
-    "only an impact law may compare: where the equations change at a contact, the model is a OneContactModel, whose `side` "
-    "stands for the branch, as in -(1 + side) * x"
+    "only an impact law may compare: where the equations change at a contact, the model is a"
+    " OneContactModel, whose `side` stands for the branch, as in -(1 + side) * x"
 )
 FRICTION = (
-    "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced: give the model a Friction; a "
-    "smooth one, such as -tanh(velocity / w), can be, and quadratic drag as -v * sqrt(v**2 + w**2) with a small w"
+    "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced:"
+    " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and quadratic"
+    " drag as -v * sqrt(v**2 + w**2) with a small w"
 )
 # NumPy's names, and ours
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
@@ -129,7 +131,8 @@ class Expr:
     def __abs__(self) -> Expr:
         if self.op != "coordinate":
             raise TraceError(
-                f"abs of an expression that is not a coordinate cannot be traced; {_what_is_allowed(self)}"
+                "abs of an expression that is not a coordinate cannot be traced;"
+                f" {_what_is_allowed(self)}"
             )
         return Expr("side") * self
 
@@ -148,12 +151,14 @@ class Expr:
     def __bool__(self) -> bool:
         hint = FRICTION if uses_velocity(self) else "use `side`"
         raise TraceError(
-            f"a traced model may not branch on its state or parameters (if, and, or, min, max); {hint}"
+            "a traced model may not branch on its state or parameters (if, and, or, min, max);"
+            f" {hint}"
         )
 
     def __float__(self) -> float:
         raise TraceError(
-            f"a traced quantity has no number yet: use NumPy's functions, not math's; allowed are {ALLOWED}"
+            "a traced quantity has no number yet: use NumPy's functions, not math's; allowed are"
+            f" {ALLOWED}"
         )
 
     __int__ = __index__ = __complex__ = __float__
@@ -473,6 +478,7 @@ def check_size(traced: Any, lanes: bool = False) -> None:
             else traced.model
         )
         raise TraceError(
-            f"the equations of {what} have {nodes} operations, {loops} of them functions, products and quotients, which would "
-            f"take about {minutes:.2g} minutes to compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
+            f"the equations of {what} have {nodes} operations, {loops} of them functions, products"
+            f" and quotients, which would take about {minutes:.2g} minutes to"
+            f" compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
         )

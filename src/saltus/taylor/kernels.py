@@ -151,7 +151,9 @@ def _holds(path: Path, text: str) -> bool:
 
 
 def _execute(name: str, path: Path, text: str) -> None:
-    """Make a module of a source that is also in a file, beside which numba keeps the compiled code."""
+    """Make a module of a source that is also in a file, beside which numba keeps the compiled
+    code.
+    """
     module = ModuleType(name)
     module.__file__ = str(path)
     sys.modules[name] = module  # numba finds the functions of a cached module through here

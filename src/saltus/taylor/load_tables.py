@@ -90,7 +90,9 @@ def _edges(signal: Any, count: int) -> np.ndarray:
 
 
 def _fill_clock(table: np.ndarray, breaks: np.ndarray, pulse: Any, order: int) -> None:
-    """One row of a pulse, (n, m + 1, RECORD_WIDTH); before the first breakpoint it has not begun."""
+    """One row of a pulse, (n, m + 1, RECORD_WIDTH); before the first breakpoint it has not
+    begun.
+    """
     end = pulse.start + pulse.length
     within = (breaks >= pulse.start) & (breaks < end)
     past = breaks >= end

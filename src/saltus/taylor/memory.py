@@ -219,7 +219,7 @@ class Memory:
         coordinates.
         """
         b = self.builder
-        (op, *index) = leaf
+        op, *index = leaf
         offset = column if op == "shift" else b.mul(LONG(dof), b.add(column, LONG(1)))
         if op == "form":
             return self._sum_over_modes(index[0], offset)
@@ -295,7 +295,8 @@ class Memory:
         return time + self.leaf(("origin",)) - Vec(self.builder, anchor, self.arithmetic)
 
 
-# --- modes and columns of a tangent, whose equations are written as loops (`Loops` in `rules.py`) ---
+# --- modes and columns of a tangent, whose equations are written as loops (`Loops` in `rules.py`)
+# ---
 
 # The modes of a linear structure obey
 #

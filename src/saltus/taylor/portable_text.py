@@ -26,8 +26,9 @@ C_FUNCTIONS = {
     "pow": 2,
     "numba_nextafter": 2,
 }
-# The process that writes the text of a kernel does not optimise it, and knows neither this machine's
-# processor nor the order in which Python's sets happen to be: the text is the same on every machine.
+# The process that writes the text of a kernel does not optimise it, and knows neither this
+# machine's processor nor the order in which Python's sets happen to be: the text is the same on
+# every machine.
 WRITER = {
     "NUMBA_OPT": "0",
     "NUMBA_LLVM_REFPRUNE_PASS": "0",

@@ -318,7 +318,9 @@ def pointed_jit(signature: Any) -> Callable[[Any], Any]:
 
 
 def entry_point(function: Any) -> Callable[..., Any]:
-    """A compiled function of one signature without numba's dispatch on the types of its arguments."""
+    """A compiled function of one signature without numba's dispatch on the types of its
+    arguments.
+    """
     try:
         (result,) = function.overloads.values()
         entry: Callable[..., Any] = result.entry_point

@@ -331,7 +331,8 @@ def trace(
         != dof
     ):
         raise TraceError(
-            f"{type(system.model).__name__}.acceleration must return {dof} values, got {accelerations!r}"
+            f"{type(system.model).__name__}.acceleration must return {dof} values, got"
+            f" {accelerations!r}"
         )
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
@@ -376,8 +377,9 @@ def _check_powers(accelerations: list[Expr], edges: dict[str, Any]) -> None:
             if _known_number(substitute(node.args[0], {coordinate: place})) == 0:
                 shown = "u**0.5" if node.op == "sqrt" else "u**p, such as u**1.5,"
                 raise TraceError(
-                    f"a power {shown} has no Taylor series where u is 0, and here u is 0 at {what}: write (u**2 + d**2)**(p/2) "
-                    "with a small length d, such as (u**2 + 1e-12)**0.75 for Hertz's law of a sphere"
+                    f"a power {shown} has no Taylor series where u is 0, and here u is 0 at {what}:"
+                    " write (u**2 + d**2)**(p/2) with a small length d, such as (u**2 +"
+                    " 1e-12)**0.75 for Hertz's law of a sphere"
                 )
 
 
@@ -399,7 +401,8 @@ def _trace_contact(
     load = twin.load
     if len(q) != 1:
         raise TraceError(
-            "a model with sides must have one coordinate; give it `sides = ()` and stop at margins instead"
+            "a model with sides must have one coordinate; give it `sides = ()` and stop at margins"
+            " instead"
         )
     result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
     result.contact = combine("add", model.contact, 0.0)
@@ -420,7 +423,8 @@ def _check_gap(gap: Expr, coordinate: Expr, model: str) -> None:
     slope = differentiate(gap, coordinate)
     if _known_number(differentiate(slope, coordinate)) != 0:
         raise TraceError(
-            f"{model}.gap must be linear in the coordinate, such as side * (x - d): a model has one contact point, not two stops"
+            f"{model}.gap must be linear in the coordinate, such as side * (x - d): a model has one"
+            " contact point, not two stops"
         )
     if _known_number(slope) == 0:
         raise TraceError(f"{model}.gap must depend on the coordinate, such as side * (x - d)")
@@ -432,8 +436,8 @@ def _check_next_side(next_side: Expr, sides: tuple[int, ...], model: str) -> Non
         following = _known_number(substitute(next_side, {Expr("side"): side}))
         if following is not None and following not in sides:
             raise TraceError(
-                f"{model}.reset leads from side {side} to side {float(following):g}, and the model has the sides {sides}; "
-                "a reset returns the next side and the velocity there"
+                f"{model}.reset leads from side {side} to side {float(following):g}, and the model"
+                f" has the sides {sides}; a reset returns the next side and the velocity there"
             )
 
 
@@ -536,7 +540,10 @@ def _trace_margins(
         margins |= friction_margins(twin.model, t, q, v, twin.load, free, slides)
     for name in stop_at:
         if name not in margins:
-            message = f"{type(twin.model).__name__} has no margin {name!r} to stop at; {near(name, margins)}"
+            message = (
+                f"{type(twin.model).__name__} has no margin {name!r} to stop at;"
+                f" {near(name, margins)}"
+            )
             raise ParameterError(message, "stop_at")
         result.margins[name] = combine("add", margins[name], 0.0)
 
@@ -551,7 +558,8 @@ def _check(result: Trace) -> None:
     for node in ordered(expanded):
         if node.op == "velocity" and node.value in result.first_order_rows:
             raise TraceError(
-                f"{result.model} reads the velocity of coordinate {node.value + 1}, which is of first order"
+                f"{result.model} reads the velocity of coordinate {node.value + 1}, which is of"
+                " first order"
             )
         if node.op in POINTWISE:
             where = f"{result.model} uses {node.op} in an acceleration, a gap or a margin"
@@ -560,7 +568,8 @@ def _check(result: Trace) -> None:
         for node in ordered([result.gap]):
             if node.op in ("time", "record", "velocity"):
                 raise TraceError(
-                    f"{result.model}.gap may depend on the coordinate, the side and the parameters only"
+                    f"{result.model}.gap may depend on the coordinate, the side and the parameters"
+                    " only"
                 )
     _check_abs(result, expanded)
 
@@ -576,7 +585,8 @@ def _check_abs(result: Trace, expanded: list[Expr]) -> None:
         node in sized for node in ordered(expanded)
     ):
         raise TraceError(
-            "abs of the coordinate can be traced only where the gap is side * coordinate; write it with the gap"
+            "abs of the coordinate can be traced only where the gap is side * coordinate; write it"
+            " with the gap"
         )
 
 
@@ -595,16 +605,19 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
             system.get(str(path))  # refuses a path to a part that does not exist
             below = [name for name in known if name.startswith(f"{path}.")]
             raise ParameterError(
-                f"{path} is not a number, so there is no derivative to it; {near(str(path), below or known)}"
+                f"{path} is not a number, so there is no derivative to it;"
+                f" {near(str(path), below or known)}"
             )
         owner = system.get(path.rpartition(".")[0])
         if isinstance(owner, Pulse) and path.rpartition(".")[2] in owner.moving:
             raise ParameterError(
-                f"{path} moves the instants at which the load is not smooth, so there are no derivatives to it; take another"
+                f"{path} moves the instants at which the load is not smooth, so there are no"
+                " derivatives to it; take another"
             )
         if path.endswith(".order") and isinstance(owner, Harmonic):
             raise ParameterError(
-                f"{path} is a whole number, so there is no derivative to it; choose another parameter"
+                f"{path} is a whole number, so there is no derivative to it; choose another"
+                " parameter"
             )
     if len(set(paths)) < len(paths):
         raise ParameterError(f"each parameter may be named once, got {paths!r}")

@@ -92,10 +92,8 @@ def peaks(system: System, theta0: float) -> Peaks:
     lower, upper = layers(system)
     if lower.damping or upper.damping:
         raise ParameterError(
-            (
-                "peak ratios are for undamped motion; set model.damping to 0, got "
-                f"{system.get('model.damping')!r}"
-            ),
+            "peak ratios are for undamped motion; set model.damping to 0, got "
+            f"{system.get('model.damping')!r}",
             "model.damping",
         )
     here, there = (lower, upper) if theta0 > 0 else (upper, lower)
@@ -140,10 +138,8 @@ def turning_point(layer: Layer, energy: float) -> float:
                 )
             )
     raise ParameterError(
-        (
-            f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; "
-            "start lower"
-        ),
+        f"the motion passes the kinematic limit abs(theta) = {layer.kinematic_limit:.6g} rad; "
+        "start lower",
         "theta0",
     )
 
@@ -299,10 +295,8 @@ def _fall_speed(layer: Layer, peak: float) -> float:
         )
     if peak > layer.kinematic_limit:
         raise ParameterError(
-            (
-                f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, "
-                f"got {peak!r}"
-            ),
+            f"abs(theta0) must lie in (0, {layer.kinematic_limit:.6g}] rad, the kinematic limit, "
+            f"got {peak!r}",
             "theta0",
         )
     start = float(layer.potential(peak))

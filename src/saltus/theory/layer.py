@@ -222,10 +222,8 @@ def constant_loads(system: System) -> dict[str, float]:
     for name, signal in system.load.channels.items():
         if not isinstance(signal, Constant):
             raise ParameterError(
-                (
-                    f"this closed form is for constant loads, but load.{name} varies in time; give "
-                    "it as a number"
-                ),
+                f"this closed form is for constant loads, but load.{name} varies in time; give "
+                "it as a number",
                 f"load.{name}",
             )
     return {
@@ -314,10 +312,8 @@ def total_energy(
     if side is None:
         if lower.mass != upper.mass and np.any((theta == 0) & (velocity != 0)):
             raise ParameterError(
-                (
-                    "side must be given where theta is 0, since the layers' masses differ; it says "
-                    "which one moves"
-                ),
+                "side must be given where theta is 0, since the layers' masses differ; it says "
+                "which one moves",
                 "side",
             )
         side = np.where(theta < 0, -1, 1)

@@ -123,10 +123,8 @@ class LinearMotion:
         tau = np.asarray(tau, dtype=float)
         if np.any((tau < 0) | (tau > self.end)):
             raise ParameterError(
-                (
-                    f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for "
-                    "more impacts"
-                ),
+                f"tau must lie in [0, {self.end:.6g}], where this motion was computed; ask for "
+                "more impacts",
                 "tau",
             )
         theta = np.empty_like(tau)
@@ -206,10 +204,8 @@ def _arc(layer: Layer, start: float, velocity: float) -> Arc:
     vib = vibration(layer)
     if vib.damping_ratio >= 1:
         raise ParameterError(
-            (
-                "the damping must be subcritical (mu < 1) for vibrations, got mu = "
-                f"{vib.damping_ratio:.6g}"
-            ),
+            "the damping must be subcritical (mu < 1) for vibrations, got mu = "
+            f"{vib.damping_ratio:.6g}",
             "model.damping",
         )
     decay = vib.damping_ratio * vib.frequency

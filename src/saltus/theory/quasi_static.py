@@ -54,19 +54,15 @@ def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> 
     vertical = numbers("vertical", vertical)
     if np.any(vertical * math.cos(beta0) > 0):
         raise ParameterError(
-            (
-                "V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = "
-                f"{vertical!r}"
-            ),
+            "V cos(beta0) must not be above 0, or theta = 0 is unstable for every H; got V = "
+            f"{vertical!r}",
             "vertical",
         )
     least = vertical**2 - swing**2
     if np.any(least < 0):
         raise ParameterError(
-            (
-                "swing must be at most abs(V), or theta = 0 is lost without a horizontal load; got "
-                f"{swing!r}"
-            ),
+            "swing must be at most abs(V), or theta = 0 is lost without a horizontal load; got "
+            f"{swing!r}",
             "swing",
         )
     return np.abs(np.sqrt(least) / math.tan(beta0))[()]
@@ -195,10 +191,8 @@ def fold_horizontal(beta0: float, vertical: Numbers) -> Any:
     if np.any(vertical > -math.sin(beta0)):
         largest = -math.sin(beta0)
         raise ParameterError(
-            (
-                f"a fold needs V <= -sin(beta0) = {largest:.6g}, above which Hcr is the border; got "
-                f"V = {vertical!r}"
-            ),
+            f"a fold needs V <= -sin(beta0) = {largest:.6g}, above which Hcr is the border; got "
+            f"V = {vertical!r}",
             "vertical",
         )
     low = np.zeros_like(vertical)
@@ -317,10 +311,8 @@ def equivalent_angle(beta0: float, ground_amplitude: Numbers) -> Any:
     largest = 1 + math.cos(beta0)
     if not np.all((amplitude >= 0) & (amplitude <= largest)):
         raise ParameterError(
-            (
-                f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got "
-                f"{ground_amplitude!r}"
-            ),
+            f"zetahat must lie in [0, {largest:.6g}], that is 1 + cos(beta0), got "
+            f"{ground_amplitude!r}",
             "ground_amplitude",
         )
     return (np.arccos(np.maximum(math.cos(beta0) - amplitude, -1.0)) - beta0)[()]

@@ -183,10 +183,8 @@ def velocity_factor(
     )
     if math.isnan(after):
         raise ParameterError(
-            (
-                f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from "
-                f"theta' = {velocity!r}"
-            ),
+            f"no velocity of the same sign keeps r = {r!r} of the energy at tau = {tau!r} from "
+            f"theta' = {velocity!r}",
             "r",
         )
     return after / velocity

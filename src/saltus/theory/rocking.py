@@ -199,10 +199,8 @@ def housner_restitution(alpha: float) -> float:
     factor = 1 - 1.5 * math.sin(alpha) ** 2
     if factor <= 0:
         raise ParameterError(
-            (
-                f"alpha must be below {math.asin(math.sqrt(2 / 3)):.6g} rad for the block to rock "
-                f"on, got {alpha!r}"
-            ),
+            f"alpha must be below {math.asin(math.sqrt(2 / 3)):.6g} rad for the block to rock "
+            f"on, got {alpha!r}",
             "alpha",
         )
     return factor**2
@@ -213,10 +211,8 @@ def _amplitude(theta0: Any, alpha: float) -> Any:
     size = np.abs(numbers("theta0", theta0))
     if not np.all(size < alpha):
         raise ParameterError(
-            (
-                f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got "
-                f"{theta0!r}"
-            ),
+            f"abs(theta0) must be below alpha = {alpha:.6g} rad, or the block overturns; got "
+            f"{theta0!r}",
             "theta0",
         )
     return size

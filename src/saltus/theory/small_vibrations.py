@@ -77,10 +77,8 @@ def vibration(layer: Layer) -> Vibration:
     if kappa <= 0:
         name = "lower" if layer.side > 0 else "upper"
         raise ParameterError(
-            (
-                f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = "
-                f"{kappa:.6g} must be above 0"
-            ),
+            f"the {name} layer does not vibrate: its linear stiffness k + V sin(beta0) = "
+            f"{kappa:.6g} must be above 0",
             "load.vertical",
         )
     frequency = math.sqrt(kappa / layer.mass)
@@ -123,10 +121,8 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     if closing <= MOMENT_ROUNDING:
         if closing < -MOMENT_ROUNDING or kappa <= 0:
             raise ParameterError(
-                (
-                    "no vibration about theta = 0, stable only for V cos(beta0) below 0, got "
-                    f"{-closing:.6g}"
-                ),
+                "no vibration about theta = 0, stable only for V cos(beta0) below 0, got "
+                f"{-closing:.6g}",
                 "vertical",
             )
         period = np.full_like(size, 2 * math.pi / math.sqrt(kappa))
@@ -134,10 +130,8 @@ def linear_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     stretch = kappa * size / closing  # the argument of arccos is 1 / (1 + stretch)
     if np.any(stretch <= -1):
         raise ParameterError(
-            (
-                f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
-                "motion diverges"
-            ),
+            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
+            "motion diverges",
             "theta0",
         )
     tangent = np.sqrt(np.abs(stretch) * (2 + stretch))
@@ -216,19 +210,15 @@ def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
     kappa = 1 + vertical
     if closing <= 0 or kappa == 0:
         raise ParameterError(
-            (
-                "this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = "
-                f"{vertical!r}"
-            ),
+            "this expansion needs V (pi/2 - beta0) below 0 and V other than -1, got V = "
+            f"{vertical!r}",
             "vertical",
         )
     stretch = kappa * np.abs(numbers("theta0", theta0)) / closing
     if np.any(stretch <= -1):
         raise ParameterError(
-            (
-                f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
-                "motion diverges"
-            ),
+            f"abs(theta0) must be below the saddle at {closing / -kappa:.6g} rad: beyond it the "
+            "motion diverges",
             "theta0",
         )
     angle = (
@@ -381,10 +371,8 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
         )
     if any(name.startswith("lower_") for name in load.channels):
         raise ParameterError(
-            (
-                "the pendulum takes forces on the upper mass only; drop load.lower_horizontal and "
-                "load.lower_vertical"
-            ),
+            "the pendulum takes forces on the upper mass only; drop load.lower_horizontal and "
+            "load.lower_vertical",
             "load",
         )
     across = load.horizontal(tau) - load.ground_horizontal.acceleration(tau)

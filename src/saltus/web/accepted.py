@@ -153,7 +153,9 @@ class _NumberBounds:
         )
 
     def _follow(self, bound: dict[str, Any]) -> None:
-        """Find out whether another number of the system is the bound: then the bound moves with it."""
+        """Find out whether another number of the system is the bound: then the bound moves with
+        it.
+        """
         for path, value in numbers(self.system, given=True):
             if (
                 path == self.path

@@ -102,7 +102,9 @@ class Linker:
         return self._places[number, index]
 
     def _pointer(self, number: int, index: int) -> int:
-        """The place of a function in the table; the first one stays empty, as 0 points to nothing."""
+        """The place of a function in the table; the first one stays empty, as 0 points to
+        nothing.
+        """
         self._reach(number, index)
         return self._table.setdefault((number, index), len(self._table) + 1)
 

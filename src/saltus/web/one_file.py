@@ -96,11 +96,15 @@ def _wrapped(path: Path, source: str) -> str:
     )
     if re.search(r"^import\b|^export (?:default|\{|\*)", body, re.MULTILINE):
         raise ValueError(
-            f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations can be joined"
+            f"{path.name}: only `import {{ names }} from './module.js'` and exported declarations"
+            " can be joined"
         )
     names = EXPORT.findall(body)
     body = re.sub(r"^export (?!\{)", "", body, flags=re.MULTILINE)
-    return f"const module_{path.stem} = (() => {{\n{body.strip()}\nreturn {{{', '.join(names)}}};\n}})();"
+    return (
+        f"const module_{path.stem} = (() => {{\n{body.strip()}\nreturn"
+        f" {{{', '.join(names)}}};\n}})();"
+    )
 
 
 def _packed(content: bytes) -> str:
@@ -113,8 +117,9 @@ def _policy(script: str, style: str) -> str:
     """
     own = {name: _hash(text) for name, text in (("script", script), ("style", style))}
     return (
-        f"default-src 'none'; script-src {own['script']} blob: 'wasm-unsafe-eval'; style-src {own['style']}; worker-src blob:; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src {own['script']} blob: 'wasm-unsafe-eval'; style-src"
+        f" {own['style']}; worker-src blob:; img-src data: blob:; base-uri 'none'; form-action"
+        " 'none'"
     )
 
 

@@ -62,7 +62,9 @@ def results_as_json(results: Iterable[Any], system: System) -> list[dict[str, An
 
 
 def _joined(entries: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Results of which branches along one parameter, with the same other numbers, are one diagram."""
+    """Results of which branches along one parameter, with the same other numbers, are one
+    diagram.
+    """
     diagrams: dict[str, dict[str, Any]] = {}
     for entry in entries:
         others = {
@@ -155,7 +157,9 @@ def _single_branch(branch: Any) -> dict[str, Any]:
 
 
 def _branch(branch: Any) -> dict[str, Any]:
-    """One branch: each orbit with the state from which it starts, its multipliers and its evidence."""
+    """One branch: each orbit with the state from which it starts, its multipliers and its
+    evidence.
+    """
     orbits = orbits_of(branch)
     starts = [orbit.start() for orbit in orbits]
     coordinates = orbits[0].system.model.coordinates
@@ -257,9 +261,11 @@ def _basins(data: Any) -> dict[str, Any]:
         "y": _listed(data[y].values),
         "cells": [[int(each) - 1 for each in row] for row in label],
         "attractors": attractors,
-        "curves": [_points("boundary", True, data, [f"boundary_{x}", f"boundary_{y}"])]
-        if f"boundary_{x}" in data
-        else [],
+        "curves": (
+            [_points("boundary", True, data, [f"boundary_{x}", f"boundary_{y}"])]
+            if f"boundary_{x}" in data
+            else []
+        ),
     }
 
 

@@ -70,10 +70,11 @@ def tally(claims: Iterable[Claim]) -> str:
     paper = total.paper
     ours = total.ours
     return (
-        f"{paper.total()} statements of the paper: as printed {paper[ClaimVerdict.AS_PRINTED]}, "
-        f"corrected by an erratum {paper[ClaimVerdict.CORRECTED]}, undecided {paper[ClaimVerdict.UNDECIDED]}, "
-        f"not checked {paper[ClaimVerdict.NOT_CHECKED]}, in disagreement {paper[ClaimVerdict.DISAGREES]}. "
-        f"Checks of our own that hold: {ours[ClaimVerdict.HOLDS]} of {ours.total()}."
+        f"{paper.total()} statements of the paper: as printed {paper[ClaimVerdict.AS_PRINTED]},"
+        f" corrected by an erratum {paper[ClaimVerdict.CORRECTED]}, undecided"
+        f" {paper[ClaimVerdict.UNDECIDED]}, not checked {paper[ClaimVerdict.NOT_CHECKED]}, in"
+        f" disagreement {paper[ClaimVerdict.DISAGREES]}. Checks of our own that hold:"
+        f" {ours[ClaimVerdict.HOLDS]} of {ours.total()}."
     )
 
 

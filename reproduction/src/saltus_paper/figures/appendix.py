@@ -1,4 +1,6 @@
-"""Appendix A: the free rocking block, its periods, and the energy at an impact on a moving ground."""
+"""Appendix A: the free rocking block, its periods, and the energy at an impact on a moving
+ground.
+"""
 
 from __future__ import annotations
 

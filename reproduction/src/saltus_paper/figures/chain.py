@@ -252,7 +252,9 @@ def settled_cells(couplings: Sequence[float]) -> Any:
 
 
 def both_open(motion: Any) -> float:
-    """The share of the time and the cells with both layers open, in the last periods of a motion."""
+    """The share of the time and the cells with both layers open, in the last periods of a
+    motion.
+    """
     times = motion.time - PERIOD * SETTINGS.read * np.linspace(1, 0, 50 * SETTINGS.read + 1)
     return float(
         (motion.at(np.minimum(times, motion.time))[0].reshape(CELLS, 2, -1) != 0.0)

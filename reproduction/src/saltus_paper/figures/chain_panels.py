@@ -165,7 +165,9 @@ def _least(ax: Any, least: Any, modes: Any) -> None:
 
 
 def _checks(ax: Any, traces: Any) -> None:
-    """Traces of the waves' maps from a motion of eight cells, over those from the equations of one."""
+    """Traces of the waves' maps from a motion of eight cells, over those from the equations of
+    one.
+    """
     expected = traces["expected"].values
     found = traces["found"].values
     ends = [math.floor(expected.min() * 2) / 2, math.ceil(expected.max() * 2) / 2]

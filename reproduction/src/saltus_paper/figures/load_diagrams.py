@@ -121,7 +121,9 @@ def undeformed(system: Any, critical: float) -> Any:
 
 @styled
 def _draw(data: Any, frequencies: Mapping[str, float], zoomed: float) -> Any:
-    """A row for each frequency; beside each panel its part up to the amplitude `zoomed`, about Hcr."""
+    """A row for each frequency; beside each panel its part up to the amplitude `zoomed`, about
+    Hcr.
+    """
     panels = {name: tree for name, tree in data.children.items() if name in frequencies}
     figure = new_figure(LOOK.double_column, 25.0 + 75.0 * len(panels))
     axes = figure.subplots(len(panels), 2, squeeze=False, width_ratios=[2.6, 1])

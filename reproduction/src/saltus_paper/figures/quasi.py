@@ -58,7 +58,9 @@ def _panel(name: str, window: tuple[float, float], **options: Any) -> Any:
 
 @styled
 def draw(data: Any) -> Any:
-    """For each load the angle at phase 0 of every motion, and its largest exponent with its error."""
+    """For each load the angle at phase 0 of every motion, and its largest exponent with its
+    error.
+    """
     figure = new_figure(LOOK.double_column, 120.0)
     axes = figure.subplots(2, len(data.children), squeeze=False, sharex="col", height_ratios=[3, 2])
     for column, (name, tree) in zip(axes.T, data.children.items(), strict=True):

@@ -36,7 +36,9 @@ ENOUGH = 400.0  # B from which all stable motions must be confirmed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkSettings:
-    """The motion for which the work of an integrator is counted, and the values over which it is."""
+    """The motion for which the work of an integrator is counted, and the values over which it
+    is.
+    """
 
     # The number of forcing periods: enough impacts for their number not to matter.
     periods: int = 20

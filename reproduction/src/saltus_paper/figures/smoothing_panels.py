@@ -138,7 +138,9 @@ def _draw_errors(ax: Any, features: Any) -> None:
 
 
 def _draw_work(ax: Any, work: Any) -> None:
-    """Errors over evaluations: one line for each B, and the exact equation from impact to impact."""
+    """Errors over evaluations: one line for each B, and the exact equation from impact to
+    impact.
+    """
     for sharpness, evaluations, error in zip(
         work["sharpness"].values, work["evaluations"].values, work["error"].values, strict=True
     ):

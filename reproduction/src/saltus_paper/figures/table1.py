@@ -159,10 +159,16 @@ def table(data: Any) -> str:
     lines = [
         "# Table 1: impact scenarios",
         "",
-        "s is the impacting layer, j the other one; angles are continuous, so that the cases differ in velocities (erratum 16). "
-        "The example is an impact on the lower layer at β₀ = 80°, m = 0.",
+        (
+            "s is the impacting layer, j the other one; angles are continuous, so that the cases"
+            " differ in velocities (erratum 16). The example is an impact on the lower layer at β₀"
+            " = 80°, m = 0."
+        ),
         "",
-        "| deformed before | before | deformed after | after | scenario | example: (θ₁', θ₂') before → after |",
+        (
+            "| deformed before | before | deformed after | after | scenario | example: (θ₁', θ₂')"
+            " before → after |"
+        ),
         "|---|---|---|---|---|---|",
     ]
     for i in range(rows.sizes["row"]):

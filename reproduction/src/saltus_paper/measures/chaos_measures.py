@@ -299,7 +299,9 @@ def two_regions(panels: Panels) -> Measured:
 
 
 def _regions(spectrum: Any) -> list[dict[str, float]]:
-    """The bands of chaos, those that are closer together than `CRITERIA.apart` of the range joined."""
+    """The bands of chaos, those that are closer together than `CRITERIA.apart` of the range
+    joined.
+    """
     low, high = (float(bound) for bound in spectrum.attrs["bounds"])
     regions: list[dict[str, float]] = []
     for band in sorted(bands_of(spectrum), key=lambda band: band["low"]):

@@ -60,7 +60,9 @@ def chart_cells(panel: Any) -> ChartCells:
 
 
 def lost(panel: Any) -> float:
-    """The share of the quasi-static monostable domain in which dynamics adds a motion beside rest."""
+    """The share of the quasi-static monostable domain in which dynamics adds a motion beside
+    rest.
+    """
     cells = chart_cells(panel)
     return float((cells.static & ~cells.only_rest).sum() / max(cells.static.sum(), 1))
 
@@ -82,7 +84,9 @@ def outside(panel: Any) -> float:
 
 
 def onset(panel: Any, vertical: np.ndarray) -> np.ndarray:
-    """The least Hhat at V on the folds of the first motion, from the exact curves; NaN without one."""
+    """The least Hhat at V on the folds of the first motion, from the exact curves; NaN without
+    one.
+    """
     least = np.full(len(vertical), np.nan)
     for curve in border_curves(panel):
         motion = (int(curve.attrs["period"]), int(curve.attrs["impact_count"]))

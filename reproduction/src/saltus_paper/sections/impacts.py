@@ -216,7 +216,9 @@ def _without_root() -> dict[str, float]:
 
 
 def _inelastic(rng: np.random.Generator) -> dict[str, float]:
-    """The restitution of errata 25 against the momentum balance of both layers solved numerically."""
+    """The restitution of errata 25 against the momentum balance of both layers solved
+    numerically.
+    """
     worst = 0.0
     for beta0, m in zip(
         rng.uniform(np.pi / 4 + 0.01, 3 * np.pi / 4 - 0.01, 50), rng.uniform(0, 2, 50), strict=True

@@ -258,8 +258,9 @@ def _distances(grid: np.ndarray, given: Iterable[int] | None) -> np.ndarray:
         or 4 * reach[-1] > min(grid.shape)
     ):
         raise ParameterError(
-            f"the exponent needs at least three distances, whole numbers of cells up to a quarter of the grid {grid.shape}; "
-            f"got {reach.tolist()}: take a finer grid, 64 cells a side or more",
+            "the exponent needs at least three distances, whole numbers of cells up to a quarter"
+            f" of the grid {grid.shape}; got {reach.tolist()}: take a finer grid, 64 cells a side"
+            " or more",
             "distances",
         )
     return reach.astype(int)
@@ -354,8 +355,9 @@ class Wada(Result):
     def resolution(self) -> str:
         """The resolution of the test, in a sentence."""
         return (
-            f"a boundary cell meets all {len(self.labels)} basins if each has a cell within {int(self.radii[-1])} cells of it: "
-            "basins that part there on a finer scale look like Wada ones, and threads finer than a cell are not seen"
+            f"a boundary cell meets all {len(self.labels)} basins if each has a cell within"
+            f" {int(self.radii[-1])} cells of it: basins that part there on a finer scale look like"
+            " Wada ones, and threads finer than a cell are not seen"
         )
 
 
@@ -415,7 +417,8 @@ def _labels(labels: Any) -> np.ndarray:
         grid = np.empty((0, 0), dtype=int)
     if grid.ndim not in (1, 2) or not grid.size or not np.array_equal(array, grid):
         raise ParameterError(
-            f"labels must be whole numbers over one or two dimensions, got an array of shape {np.shape(labels)}",
+            "labels must be whole numbers over one or two dimensions, got an array of shape"
+            f" {np.shape(labels)}",
             "labels",
         )
     return grid

@@ -256,7 +256,8 @@ def _check(
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     if found is not None and found.system != system:
         raise ParameterError(
-            "found holds the attractors of another system; leave it out, or compute it for this one",
+            "found holds the attractors of another system; leave it out, or compute it for"
+            " this one",
             "found",
         )
     if curves:
@@ -425,7 +426,8 @@ def _check_curves(system: System, grid: Grid) -> None:
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         if len(values) < 2:
             raise ParameterError(
-                f"{name} must be at least two numbers where the curves between basins are asked for",
+                f"{name} must be at least two numbers where the curves between basins are"
+                " asked for",
                 name,
             )
     reversed_system(system)
@@ -482,7 +484,8 @@ def _grid(
     chosen = names[: len(names) - len(system.model.first_order)]
     if len(chosen) < 2:
         raise ParameterError(
-            f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane has two",
+            f"{type(system.model).__name__} has the state variable {chosen[0]} alone, and a plane"
+            " has two",
             "system",
         )
     for name in given:
@@ -500,8 +503,8 @@ def _grid(
     )
     if len(varied) not in (0, 2):
         raise ParameterError(
-            f"two state variables of {', '.join(names)} are given as lists and the others as numbers, got lists of "
-            f"{', '.join(varied)}",
+            f"two state variables of {', '.join(names)} are given as lists and the others as"
+            f" numbers, got lists of {', '.join(varied)}",
             varied[0],
         )
     x, y = varied or state_plane(system)
@@ -530,7 +533,7 @@ def _dataset(
 ) -> xarray.Dataset:
     import xarray
 
-    (x, y) = grid.plane
+    x, y = grid.plane
     units = state_units(found.system)
     share = [float((label == member.label).mean()) for member in found]
     period = with_clock(found.system).load.period or math.nan

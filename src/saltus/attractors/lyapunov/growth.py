@@ -40,7 +40,8 @@ class LyapunovSettings:
     lossless: float = 1.0 - 1e-14  # A product of impact factors below this counts as below 1.
     # The most motions that one thread follows together: enough to make the cost of a call small.
     largest_group: int = 256
-    # Of two trajectories, in natural units: far above the error of a period, small enough for the map to be linear.
+    # Of two trajectories, in natural units: far above the error of a period, small enough for the
+    # map to be linear.
     distance: float = 1e-7
     # The error of the exponent from two trajectories that their own numerical errors cause.
     accuracy: float = 1e-5
@@ -77,7 +78,9 @@ def weights(count: int) -> np.ndarray:
 
 
 def average(series: np.ndarray) -> np.ndarray:
-    """The weighted average along the first axis, (periods, ...) -> (...); -inf where an entry is."""
+    """The weighted average along the first axis, (periods, ...) -> (...); -inf where an entry
+    is.
+    """
     lost = np.isneginf(series).any(axis=0)
     share = weights(len(series)).reshape(-1, *[1] * (series.ndim - 1))
     terms = share * np.where(np.isneginf(series), 0.0, series)

@@ -250,10 +250,8 @@ def lyapunov_many(
     check_run("lyapunov_many", system, periods, transient, tol)
     if len(system.in_gap_coordinates.model.coordinates) > 1:
         raise ParameterError(
-            (
-                "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one "
-                "motion at a time"
-            ),
+            "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one "
+            "motion at a time",
             "system",
         )
     inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
@@ -313,9 +311,10 @@ class _Many:
         result = self._follow(states, periods, ("rest", "settled"))
         stop = stop_names(result).values
         going = np.isin(stop, (Stop.HORIZON, Stop.REST, Stop.SETTLED, Stop.CAPTURED))
-        return np.where(
-            going[:, None], last_states(self.system, result), np.nan
-        ), stop == Stop.CAPTURED
+        return (
+            np.where(going[:, None], last_states(self.system, result), np.nan),
+            stop == Stop.CAPTURED,
+        )
 
     def period(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Forcing periods after which motions from these states repeat themselves, 0 if they do not
@@ -377,9 +376,11 @@ def _measures(
         "error": found.error,
         "resolution": resolution(duration, unit),
         "positive": found.positive(duration[:, None], unit[:, None])[:, 0],
-        "ending": np.where(
-            rested, Ending.REST, np.where(moving, Ending.UNDECIDED, Ending.ENDED)
-        ).astype(np.int8),
+        "ending": (
+            np.where(rested, Ending.REST, np.where(moving, Ending.UNDECIDED, Ending.ENDED)).astype(
+                np.int8
+            )
+        ),
     }
 
 

@@ -33,8 +33,8 @@ from saltus.taylor import lean_jit
 # --- compiled from here on ---------------------------------------------------
 
 # If mu_s = mu_k, the acceleration with which sliding begins is 0, that is, by rounding, smaller
-# than this, in units of what presses (`note_press`). So is a margin of a friction that can only just
-# stick when its speed becomes that of the ground. In both cases the next coefficients decide.
+# than this, in units of what presses (`note_press`). So is a margin of a friction that can only
+# just stick when its speed becomes that of the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
 
 

@@ -331,8 +331,8 @@ def decide_contacts(motion):
 # Series of a lower order than usual, for a step to the next impact on the same contact.
 # In natural speeds: after a faster impact the usual order is needed to reach the next one.
 FAST_IMPACT = 0.3
-# A series of order n is assumed to be exact up to this, in natural times, times the n-th root of the
-# tolerance.
+# A series of order n is assumed to be exact up to this, in natural times, times the n-th root of
+# the tolerance.
 RADIUS = 0.5
 LEAST_ORDER = 6  # At lower orders the last coefficients may all vanish by symmetry.
 WORTH = 0.8  # A lower order is tried only below this share of the usual one.

@@ -214,7 +214,9 @@ def solver_arrays(local, count, columns, frictions, first_order):
 
 @lean_jit
 def copy_all(given, target):
-    """Copy an array into another one; numba's assignment of slices would take seconds to compile."""
+    """Copy an array into another one; numba's assignment of slices would take seconds to
+    compile.
+    """
     for i in range(given.size):
         target[i] = given[i]
 

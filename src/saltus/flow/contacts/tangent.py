@@ -99,7 +99,9 @@ def lift_rate(motion, j, i):
 
 @lean_jit
 def jump_columns(motion, hit):
-    """The columns of coordinates of first order at an impact, as `jump_first_order`, which follows."""
+    """The columns of coordinates of first order at an impact, as `jump_first_order`, which
+    follows.
+    """
     own = motion.own
     first = motion.first_order
     if first > 0 and motion.columns > 0:

@@ -92,4 +92,7 @@ def card_seen() -> str:
         found = card()
     except SaltusError as error:
         return f"none: {error}"
-    return f"{found.name}, doubles at 1/{found.slow} of its speed, {found.free_memory / 2**30:.0f} GiB free"
+    return (
+        f"{found.name}, doubles at 1/{found.slow} of its speed, {found.free_memory / 2**30:.0f} GiB"
+        " free"
+    )

@@ -16,7 +16,9 @@ from saltus.taylor import lean_jit
 
 
 class EventCode(IntEnum):
-    """The kinds of events of a motion; the generated function `tangent` takes them as an argument."""
+    """The kinds of events of a motion; the generated function `tangent` takes them as an
+    argument.
+    """
 
     IMPACT = 0
     GRAZING = 1
@@ -138,8 +140,8 @@ SAFETY = 0.9
 GAP = 0.65
 # The size of a state that is 0 and stays so, to which the error of a step is relative.
 SMALLEST = 1e-6
-# A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that the
-# acceleration is singular.
+# A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that
+# the acceleration is singular.
 SHORTEST = 1e-9
 # The tolerance of a column's series in units of tol; so the motion alone decides nearly all steps.
 ROUGHER = 100.0
@@ -164,9 +166,9 @@ TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a
 SLOW = 3.0
 LEAST_LOSS = 0.05  # The lost share counts as no smaller than this.
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
-# In natural speeds. Here the averaged law has an error of 2e-5 of the speed if the pulls of both sides
-# change by half within a unit of time, and of 1e-11 at one wall, beside impacts that were followed one
-# by one; a unit of time would have 1e4 of them.
+# In natural speeds. Here the averaged law has an error of 2e-5 of the speed if the pulls of both
+# sides change by half within a unit of time, and of 1e-11 at one wall, beside impacts that were
+# followed one by one; a unit of time would have 1e4 of them.
 CHATTER_SPEED = 4e-5
 # A gap below minus this share of the terms of its sum is no rounding, and no error of a step of the
 # tolerance 0; the tolerance comes ten times on top.

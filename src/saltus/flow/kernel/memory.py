@@ -66,7 +66,8 @@ MOTION = np.dtype(
         # many units in the last place of the time; 0 moves none
         ("nudged", _WHOLE),
         ("nudge", _REAL),
-        # how often no answer changed least, and the time at which this was first so (`choose_closed`)
+        # how often no answer changed least, and the time at which this was first so
+        # (`choose_closed`)
         ("ties", _WHOLE),
         ("tied_at", _REAL),
         ("order", _WHOLE),  # of the Taylor series
@@ -190,7 +191,9 @@ class OneContactFunctions(NamedTuple):
 
 
 class ContactsFunctions(NamedTuple):
-    """The functions of a structure with several contacts, the contacts' signs, and its eigenmodes."""
+    """The functions of a structure with several contacts, the contacts' signs, and its
+    eigenmodes.
+    """
 
     series: Any
     matrices: Any

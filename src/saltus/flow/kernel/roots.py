@@ -111,7 +111,9 @@ def variations(b, n):
 
 @jit
 def leading_sign(b, n):
-    """The sign of the first coefficient that is not zero: the sign of the polynomial just after 0."""
+    """The sign of the first coefficient that is not zero: the sign of the polynomial just after
+    0.
+    """
     for i in range(n + 1):
         if b[i] != 0.0:
             return 1 if b[i] > 0.0 else -1
@@ -302,7 +304,9 @@ def leading(coefficients, start, order, zero, size, base):
 
 @jit
 def root_between(p, n, low, high, rises):
-    """The root of p in [low, high], where its sign changes once: from minus to plus if it `rises`."""
+    """The root of p in [low, high], where its sign changes once: from minus to plus if it
+    `rises`.
+    """
     if not rises:
         return newton(p, n, low, high)
     for k in range(n + 1):  # `newton` starts where p is positive

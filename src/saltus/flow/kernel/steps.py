@@ -67,7 +67,9 @@ def state_arrays(numbers, state):
 
 @lean_jit
 def columns_at_event(motion, kind, detail, t, side):
-    """Transform the tangent's columns at an event, and put the shifts of the event into the state."""
+    """Transform the tangent's columns at an event, and put the shifts of the event into the
+    state.
+    """
     motion.tangent(kind, detail, t, motion.origin, side, motion.env, motion.piece, motion.state)
 
 

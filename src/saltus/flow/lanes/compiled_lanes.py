@@ -1,4 +1,6 @@
-"""The compiled code of the lanes: one driver for all models, and three functions of each structure."""
+"""The compiled code of the lanes: one driver for all models, and three functions of each
+structure.
+"""
 
 from __future__ import annotations
 

@@ -146,8 +146,9 @@ def simulate_many(
     inner = system.in_gap_coordinates
     if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
         raise ParameterError(
-            "extrema of many motions, and their derivatives to parameters, are those of coordinates that contacts hold one by "
-            f"one: give system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
+            "extrema of many motions, and their derivatives to parameters, are those of"
+            " coordinates that contacts hold one by one: give system.in_gap_coordinates, which has"
+            f" {', '.join(inner.model.coordinates)}",
             "sample",
         )
     return to_dataset(
@@ -231,9 +232,11 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
         program=run,
         plan=plan,
         functions=functions,
-        parameters=run.env[0]
-        if run.trace.several
-        else np.array([value for _, value in numbers(system)] or [0.0]),
+        parameters=(
+            run.env[0]
+            if run.trace.several
+            else np.array([value for _, value in numbers(system)] or [0.0])
+        ),
         tol=options.tol,
         kept=kept if options.sample else 1,
         sampled=[

@@ -256,7 +256,9 @@ def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
 
 
 def _add_derivatives(writer: _Writer, result: EnsembleResult, paths: tuple[str, ...]) -> None:
-    """The derivatives of the end state to the initial one and to parameters, (..., state, column)."""
+    """The derivatives of the end state to the initial one and to parameters, (..., state,
+    column).
+    """
     states = [*writer.names, *writer.rates]
     writer.coords |= {"state": ("state", states), "column": ("column", [*states, *paths])}
     writer.add(

@@ -76,7 +76,9 @@ class Inputs:
         return substitute(system, lambda path, value: self.parameters.get(path, value))
 
     def in_gaps(self, system: System) -> Inputs:
-        """Those for `system.in_gap_coordinates`; the same object where that is the system itself."""
+        """Those for `system.in_gap_coordinates`; the same object where that is the system
+        itself.
+        """
         if (inner := system.in_gap_coordinates) is system:
             return self
         twin = self.with_numbers(inner)
@@ -146,11 +148,8 @@ def _check_names(
             what = "dimension" if name in dims else "coordinate"
             free = name.removeprefix("start_")
             raise ParameterError(
-                (
-                    f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or "
-                    "as you like"
-                )
-                + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
+                f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or "
+                "as you like" + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
             )
     own = dict(numbers(system))
     for path in (path for path in own if path in coords):

@@ -199,8 +199,8 @@ class LaneSettings(NamedTuple):
     tolerance: float
     natural_time: float  # of what moves without a forcing period, inf where the load has one
     shortest_step: float
-    # after an impact with a lower speed of the gap, in natural speeds, the end of an accumulation may
-    # be near
+    # after an impact with a lower speed of the gap, in natural speeds, the end of an accumulation
+    # may be near
     slowest_impact: float
     limits: tuple[Any, ...]  # `step_limits` of the coordinates
     column_limits: tuple[Any, ...]  # of the tangent's columns

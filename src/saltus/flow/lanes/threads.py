@@ -1,4 +1,6 @@
-"""Many trajectories on all cores: chunks of jobs are handed to threads that release Python's lock."""
+"""Many trajectories on all cores: chunks of jobs are handed to threads that release Python's
+lock.
+"""
 
 from __future__ import annotations
 

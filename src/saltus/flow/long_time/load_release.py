@@ -122,10 +122,8 @@ def load_releases(system: System) -> tuple[Release, ...]:
     check_system(system, "load_releases", several_contacts=True)
     if system.dependent:
         raise ParameterError(
-            (
-                "load_releases is for systems whose contacts can all be closed, and here gaps depend "
-                "on others"
-            ),
+            "load_releases is for systems whose contacts can all be closed, and here gaps depend "
+            "on others",
             "system",
         )
     system = system.in_gap_coordinates

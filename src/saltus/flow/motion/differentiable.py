@@ -191,10 +191,8 @@ class _StatesFunction:
         """The paths of the values, in a fixed order, checked."""
         if not isinstance(values, Mapping):
             raise ParameterError(
-                (
-                    f"values must be numbers by dotted paths, {{'model.damping': 0.1}}, got "
-                    f"{shown(values)}"
-                ),
+                "values must be numbers by dotted paths, {'model.damping': 0.1}, got "
+                f"{shown(values)}",
                 "values",
             )
         for path in values:
@@ -299,7 +297,9 @@ class _StatesFunction:
 
     @cached_property
     def _of_torch(self) -> Any:
-        """The states as a function of paths, numbers and start, with its derivatives in both modes."""
+        """The states as a function of paths, numbers and start, with its derivatives in both
+        modes.
+        """
         torch = _torch()
         whole = self
 

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 # of the time its events are moved, as by rounding. None moves none.
 NUDGE: tuple[int, float] | None = None
 # A load whose period is more times the time in which a system moves by itself acts as if it stood
-# still: the derivatives of the motion, in the load's time, would be scales without meaning, of which
-# rounding is a part (beyond some 1e10 times, reactions were lost in it).
+# still: the derivatives of the motion, in the load's time, would be scales without meaning, of
+# which rounding is a part (beyond some 1e10 times, reactions were lost in it).
 SLOW_LOAD = 1e4
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
@@ -65,7 +65,9 @@ def longest_time(system: System) -> float:
 
 
 def natural_times(system: System) -> dict[str, float | None]:
-    """What `natural_time` does, as numbers, so that a page does it for other periods of the load."""
+    """What `natural_time` does, as numbers, so that a page does it for other periods of the
+    load.
+    """
     without = time_without_period(system) if _bounces(system) else math.inf
     return {
         "without_period": without if math.isfinite(without) else None,
@@ -139,7 +141,9 @@ class KernelState:
         self.array["recorded_steps"] = self.array["recorded_events"] = 0
 
     def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
-        """The mode and the side at the start, and by which side a motion leaves that is not unique."""
+        """The mode and the side at the start, and by which side a motion leaves that is not
+        unique.
+        """
         position, speed = request.start.tolist()[:: request.start.size // 2]
         mode, side = side_of_state(
             run.structure.sizes.sides, position, speed, run.model.geometry.tolist()
@@ -148,7 +152,8 @@ class KernelState:
             model = request.system.model
             name = request.system.model.coordinates[0]
             raise ParameterError(
-                f"{name} = {position:g} lies beyond the contact at {name} = {float(model.contact):g}",
+                f"{name} = {position:g} lies beyond the contact at {name} ="
+                f" {float(model.contact):g}",
                 name,
             )
         return mode, side, request.side or 0
@@ -383,7 +388,9 @@ def joined(chunks: list[np.ndarray]) -> np.ndarray:
 
 @cache
 def no_steps(rows: int, count: int) -> StepBuffers:
-    """Buffers into which the kernel writes nothing, for motions of which only the events are kept."""
+    """Buffers into which the kernel writes nothing, for motions of which only the events are
+    kept.
+    """
     return StepBuffers(
         np.empty((8, 2), dtype=np.int64), np.empty((8, 2)), np.empty((8, rows, count))
     )
@@ -479,8 +486,9 @@ class Recorder:
             self._kept += piece.start.size
             if self._kept > MOST.steps:
                 raise MotionError(
-                    f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be kept; give times=... to keep "
-                    "the states at those times instead, or dense=False to keep the events alone"
+                    f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be"
+                    " kept; give times=... to keep the states at those times instead, or"
+                    " dense=False to keep the events alone"
                 )
             self._check_memory(piece)
             return
@@ -496,8 +504,9 @@ class Recorder:
         free = free_memory() if size > LIMITS.any_machine else np.inf
         if size > LIMITS.memory * free:
             raise MotionError(
-                f"the steps before time {piece.end:.6g} take {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are left; "
-                "give times=... to keep the states at those times instead, or dense=False to keep the events alone"
+                f"the steps before time {piece.end:.6g} take {size / 1e9:.3g} GB of memory, and"
+                f" {free / 1e9:.3g} GB are left; give times=... to keep the states at those times"
+                " instead, or dense=False to keep the events alone"
             )
 
     def _sample(self, piece: DenseOutput, stop: int) -> None:

@@ -204,9 +204,11 @@ class PortableMotion:
             "sizes": dict(zip(SIZES, map(int, structure.sizes), strict=True)),
             "constant_count": structure.constant_count + len(self.run.data),
             "data": self.run.data.tolist(),
-            "modes": behind_parameters(structure.frictions, structure.sizes.local)
-            if trace.several
-            else [],
+            "modes": (
+                behind_parameters(structure.frictions, structure.sizes.local)
+                if trace.several
+                else []
+            ),
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
             "friction_coordinates": list(trace.friction_coordinates),

@@ -28,21 +28,24 @@ if TYPE_CHECKING:
     import xarray
 
 IRREGULAR = {
-    ImpactDetail.NO_SPEED: "at time {time:.9g} a contact is reached without speed, where the motion has no derivative",
+    ImpactDetail.NO_SPEED: (
+        "at time {time:.9g} a contact is reached without speed, where the motion has no derivative"
+    ),
     ImpactDetail.APART: (
-        "at time {time:.9g} contacts close together, which motions beside this one close one after the other, so that the "
-        "motion is not continuous in what moves them apart"
+        "at time {time:.9g} contacts close together, which motions beside this one close one after"
+        " the other, so that the motion is not continuous in what moves them apart"
     ),
     ImpactDetail.ORDERED: (
-        "at time {time:.9g} contacts close together that do not act on one another, but what the motion does between two of them "
-        "depends on which comes first, so that there are only one-sided derivatives"
+        "at time {time:.9g} contacts close together that do not act on one another, but what the"
+        " motion does between two of them depends on which comes first, so that there are only"
+        " one-sided derivatives"
     ),
 }
 
 
 IN_ORDER = (
-    "at time {time:.9g} {names} change at one instant, and what the motion does depends on which comes first, so that there "
-    "are only one-sided derivatives"
+    "at time {time:.9g} {names} change at one instant, and what the motion does depends on which"
+    " comes first, so that there are only one-sided derivatives"
 )
 RUBBING = (EventCode.STICK, EventCode.SLIP, EventCode.REVERSAL)
 ONE_INSTANT = 1e-11  # events of frictions nearer than this are at one instant, in natural times
@@ -574,17 +577,24 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
         ):
             return IRREGULAR[ImpactDetail(detail)].format(time=event.time)
         if event.kind is EventKind.CHATTER:
-            return f"at time {event.time:.9g} impacts without loss became too small to be followed, and their phase is lost"
+            return (
+                f"at time {event.time:.9g} impacts without loss became too small to be followed,"
+                " and their phase is lost"
+            )
         if event.kind is EventKind.GRAZING and detail == GrazingDetail.TRIPLE:
-            return f"at time {event.time:.9g} the motion meets the contact without speed, where it has no derivative"
+            return (
+                f"at time {event.time:.9g} the motion meets the contact without speed, where it has"
+                " no derivative"
+            )
         if event.kind is EventKind.REST and detail == RestDetail.NEVER_AGAIN:
             return (
-                f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so that a motion from a state "
-                "beside it never comes to rest: there is no derivative to what moves it off the contact"
+                f"from time {event.time:.9g} on it rests at contact and impacts lose nothing, so"
+                " that a motion from a state beside it never comes to rest: there is no derivative"
+                " to what moves it off the contact"
             )
     if motion.system.model.contacts:
         return (
-            "it starts with a closed contact whose impacts lose nothing, or a reaction reaches 0 without a rate, so that motions "
-            "beside it go another way"
+            "it starts with a closed contact whose impacts lose nothing, or a reaction reaches 0"
+            " without a rate, so that motions beside it go another way"
         )
     return "the derivatives leave the range of numbers"

@@ -86,7 +86,8 @@ def clock(time: Any, length: Any, periods: float | None, duration: float | None)
     if length is None:
         if periods is not None:
             raise ParameterError(
-                "the load has no frequency, so there are no forcing periods; give duration=... instead",
+                "the load has no frequency, so there are no forcing periods; give duration=..."
+                " instead",
                 "periods",
             )
         return Clock(0, time, 0, time + span, 0.0)
@@ -264,7 +265,8 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
         or (times < start).any()
     ):
         raise ParameterError(
-            f"times must be numbers that do not decrease, from the start {start:g} on, got {given!r}",
+            f"times must be numbers that do not decrease, from the start {start:g} on, got"
+            f" {given!r}",
             "times",
         )
     return times
@@ -378,7 +380,9 @@ class Followed(NamedTuple):
 
     @property
     def columns(self) -> np.ndarray:
-        """(2 degrees of freedom, columns): of the coordinates, then of the velocities, at the end."""
+        """(2 degrees of freedom, columns): of the coordinates, then of the velocities, at the
+        end.
+        """
         return self.now.columns
 
     @property
@@ -447,15 +451,16 @@ def _advance(
             if time < checked_at + _time_scale(system, numbers) * many / MOST.rate:
                 _refuse_crushed(system, now, recorder.last_hit() if system.model.contacts else [])
                 raise MotionError(
-                    f"more than {many} impacts{_at_contacts(system, recorder)} from time {checked_at:.6g} to {time:.6g}: "
-                    f"{_why_so_many(system, recorder)}, or ask for a shorter time"
+                    f"more than {many} impacts{_at_contacts(system, recorder)} from time"
+                    f" {checked_at:.6g} to {time:.6g}: {_why_so_many(system, recorder)}, or ask for"
+                    " a shorter time"
                 )
             checked_at = time
             counted = recorder.total
         if recorder.total > MOST.events:
             raise MotionError(
-                f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask for a shorter time, or use "
-                "simulate_many, which only counts them"
+                f"more than {MOST.events} impacts before time {time:.6g}, too many to be kept; ask"
+                " for a shorter time, or use simulate_many, which only counts them"
             )
         now.with_empty_buffers()
         recorder.make_buffers()
@@ -489,8 +494,8 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
         float(matrix[i][i]) == 1.0 for i in (recorder.last_hit() if system.model.contacts else ())
     ):
         return (
-            "without a loss impacts on a contact that stays pressed never end, and with several contacts they are not averaged; "
-            "give them a loss, an e below 1"
+            "without a loss impacts on a contact that stays pressed never end, and with several"
+            " contacts they are not averaged; give them a loss, an e below 1"
         )
     return "they accumulate too slowly to be followed; raise the loss at impact"
 
@@ -537,35 +542,40 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
         if status == Status.NOT_UNIQUE and system.model.surfaces:
             names = " or ".join(repr(surface.name) for surface in system.model.surfaces)
             return (
-                f"{choice} {at}: both sides of a surface, {names}, push a start on it back to it, or both lead away from it, so "
-                "that it is not unique; start beside it"
+                f"{choice} {at}: both sides of a surface, {names}, push a start on it back to it,"
+                " or both lead away from it, so that it is not unique; start beside it"
             )
         what = choice if status == Status.NOT_UNIQUE else "the impact law has no solution"
         return f"{what} {at}: the mass matrix is not positive definite there, or all but singular"
     if status == Status.NOT_UNIQUE:
         return (
-            f"the motion from rest at contact {at} is not unique: the accelerations of both sides point away from it; "
-            "choose one with side=+1 or side=-1"
+            f"the motion from rest at contact {at} is not unique: the accelerations of both sides"
+            " point away from it; choose one with side=+1 or side=-1"
         )
     if status == Status.NO_IMPACT:
         return (
-            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity} before it: no value of the "
-            "sign that leads on meets the law (errata 26; VelocityReduction always has one), or the model's reset leads "
-            "back into the contact"
+            f"{system.impact!r} has no velocity after the impact {at} with velocity {velocity}"
+            " before it: no value of the sign that leads on meets the law (errata 26;"
+            " VelocityReduction always has one), or the model's reset leads back into the contact"
         )
     if status == Status.NOT_FINITE:
         return (
-            f"the motion leaves the range of numbers {at}; its velocity was last "
-            f"{velocity}; a number of the system may be too large, or a power or root of the model may have no Taylor series "
-            "there, such as abs(x)**1.5 at x = 0; a Hertz contact is written as (x**2 + 1e-12)**0.75 behind a Surface"
+            f"the motion leaves the range of numbers {at}; its velocity was last {velocity}; a"
+            " number of the system may be too large, or a power or root of the model may have no"
+            " Taylor series there, such as abs(x)**1.5 at x = 0; a Hertz contact is written as"
+            " (x**2 + 1e-12)**0.75 behind a Surface"
         )
     if status == Status.PASSED:
         return (
-            f"the motion passed a contact or a surface {at} without an event, which was lost in the rounding of positions "
-            "that are far from 0 beside the motion: give positions from an origin nearer to it"
+            f"the motion passed a contact or a surface {at} without an event, which was lost in the"
+            " rounding of positions that are far from 0 beside the motion: give positions from an"
+            " origin nearer to it"
         )
     if status == Status.STALLED and not system.model.singularity:
-        return f"the steps shrink to nothing {at}: the acceleration is singular there, or far too large"
+        return (
+            f"the steps shrink to nothing {at}: the acceleration is singular there, or far too"
+            " large"
+        )
     return None
 
 

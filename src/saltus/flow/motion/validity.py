@@ -177,7 +177,10 @@ class Validity:
             Its name.
         """
         share = 100 * self.gains[contact]
-        return f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a smaller transfer would not"
+        return (
+            f"may raise the kinetic energy by {share:.3g} %: v+' M v+ > v-' M v- for v+ = -E v-; a"
+            " smaller transfer would not"
+        )
 
 
 def _instants(count: int, first: float | None) -> str:
@@ -370,8 +373,8 @@ def crushed(system: System, time: float, state: np.ndarray, chosen: Sequence[int
         return ""
     names = " and ".join(repr(model.contacts[i].name) for i in chosen)
     return (
-        f"a body is crushed between the contacts {names} at time {time:.9g}, which leave it no room there: no motion leads "
-        "beyond; ask for a shorter time"
+        f"a body is crushed between the contacts {names} at time {time:.9g}, which leave it no room"
+        " there: no motion leads beyond; ask for a shorter time"
     )
 
 
@@ -404,8 +407,9 @@ def paradox(system: System, time: float, state: tuple[Any, Any]) -> str:
         if pair.min() <= 0.0:
             way = "forwards" if pair[0] < pair[1] else "backwards"
             return (
-                f"{friction.limit} at time {time:.9g}: while {friction.name} slides {way} no reaction is possible or several "
-                f"are, as 1 + s mu m_nt / m_tt must be positive and is {pair.min():.6g}, with the mass matrix m of what is free; "
-                "choose a smaller coefficient or another position"
+                f"{friction.limit} at time {time:.9g}: while {friction.name} slides {way} no"
+                " reaction is possible or several are, as 1 + s mu m_nt / m_tt must be positive"
+                f" and is {pair.min():.6g}, with the mass matrix m of what is free; choose a"
+                " smaller coefficient or another position"
             )
     return ""

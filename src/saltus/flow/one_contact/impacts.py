@@ -353,8 +353,9 @@ def impact(motion, t, before):
 
 # --- chatter: the averaged law of impacts that lose nothing ------------------
 #
-# The speeds v_s on the sides s are proportional to one speed v. The action v^2 sum v_s / abs(a_s) decays with the mean damping
-# over a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), under any load that presses both contacts. The phase is lost.
+# The speeds v_s on the sides s are proportional to one speed v. The action v^2 sum v_s / abs(a_s)
+# decays with the mean damping over a cycle, sum g_s v_s / abs(a_s) / sum v_s / abs(a_s), under any
+# load that presses both contacts. The phase is lost.
 
 
 @lean_jit

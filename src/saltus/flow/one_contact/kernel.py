@@ -267,7 +267,9 @@ def one_pass(motion, target, t_end):
 
 @jit
 def parts_of(numbers, state, env, functions, rows, buffers):
-    """The memory of a motion but for its numbers as one named tuple; there are no rows of contacts."""
+    """The memory of a motion but for its numbers as one named tuple; there are no rows of
+    contacts.
+    """
     return OneContactParts(
         state, env, env[0], env[2], functions, step_arrays(numbers), buffers[0], buffers[1]
     )

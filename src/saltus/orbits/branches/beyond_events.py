@@ -442,7 +442,9 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
 
 
 def _zero_of_line(first: tuple[float, float], second: tuple[float, float]) -> float:
-    """The zero of the straight line through two pairs (place, value); nan if the values are equal."""
+    """The zero of the straight line through two pairs (place, value); nan if the values are
+    equal.
+    """
     rise = second[1] - first[1]
     return second[0] - second[1] * (second[0] - first[0]) / rise if rise else np.nan
 

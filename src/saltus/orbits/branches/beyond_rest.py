@@ -18,7 +18,9 @@ from saltus.systems import arguments_of
 
 @dataclass(frozen=True)
 class RestSettings:
-    """How far ahead the end of a rest is looked beyond, and how the loss of a release is located."""
+    """How far ahead the end of a rest is looked beyond, and how the loss of a release is
+    located.
+    """
 
     # Shares of the parameter's value (of a third of its range where that is 0) at which orbits are
     # looked for beyond the end of a rest, tried in turn.
@@ -60,7 +62,9 @@ def last_release(point: OrbitPoint) -> SpecialPoint | None:
         return None
 
     def pull(at: float) -> float:
-        """The least of the peaks of the pull after these releases, with the parameter at a value."""
+        """The least of the peaks of the pull after these releases, with the parameter at a
+        value.
+        """
         system = equations.system_at(np.array([at]))
         turns = [(release, release.time * orbit.frequency) for release in known]
         return min(release.peak_near(system, phase - SETTINGS.behind) for release, phase in turns)

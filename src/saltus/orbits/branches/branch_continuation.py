@@ -169,7 +169,8 @@ def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float
     value = orbit.system.get(path)
     if not low <= value <= high:
         raise ParameterError(
-            f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the range",
+            f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the"
+            " range",
             "bounds",
         )
     check_along(orbit.system, path, (low, high), "bounds")
@@ -196,7 +197,8 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = PeriodicOrbit.near(equations, orbit.solution.unknowns, equations.values)
     if found is None:
         raise ParameterError(
-            f"the orbit does not solve its own equations to be continued along {path}; find it again",
+            f"the orbit does not solve its own equations to be continued along {path}; find it"
+            " again",
             "orbit",
         )
     if found.symmetric and not symmetric:
@@ -205,8 +207,8 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = half(found) or found
     if not found.isolated:
         raise ParameterError(
-            "the orbit has others beside it at the same parameters, as that of a mass which nothing holds: these are no branch; "
-            "begin with an orbit at which it is held or hit",
+            "the orbit has others beside it at the same parameters, as that of a mass which nothing"
+            " holds: these are no branch; begin with an orbit at which it is held or hit",
             "orbit",
         )
     return found, symmetric
@@ -270,7 +272,8 @@ def switch_branch(
     bounds = check_bounds(bounds)
     if special.kind not in (SpecialKind.PD, SpecialKind.BPC, SpecialKind.CH):
         raise ParameterError(
-            f"no branch begins at a {special.kind}; switch at a PD, a BPC or a CH (grazings are gone through anyway)",
+            f"no branch begins at a {special.kind}; switch at a PD, a BPC or a CH (grazings are"
+            " gone through anyway)",
             "special",
         )
     if special.kind == SpecialKind.PD:
@@ -315,7 +318,9 @@ def _doubled(point: OrbitPoint) -> OrbitPoint | None:
 
 
 def _unsymmetric(point: OrbitPoint) -> tuple[OrbitPoint | None, ...]:
-    """The symmetric orbit over its full period, and the two directions in which its halves differ."""
+    """The symmetric orbit over its full period, and the two directions in which its halves
+    differ.
+    """
     orbit = full_period(point.orbit)
     direction = point.orbit.equations.alternating(_kernel(point))
     return tuple(

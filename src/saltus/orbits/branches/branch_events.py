@@ -59,8 +59,8 @@ class BranchLimits:
     # `shrunk_impacts`.
     shrunk: float = 1e-2
     shrunk_impacts: int = 60
-    # An orbit grows without end if its amplitude exceeds this in natural units, and exceeds that of the first orbit
-    # of the branch by this factor: a thousand of the longest steps lead there.
+    # An orbit grows without end if its amplitude exceeds this in natural units, and exceeds that of
+    # the first orbit of the branch by this factor: a thousand of the longest steps lead there.
     largest: float = 1e2
     # A fold and a crossing of branches whose parameters differ by less than this are one point.
     same_fold: float = 1e-8
@@ -70,7 +70,8 @@ class BranchLimits:
     # periods of an orbit for which a motion settles beyond a change; nearly all of its multipliers
     # are 0
     settling: int = 40
-    # A gap or a speed of the first orbit beyond a rest, in natural units, that rounding leaves at 0.
+    # A gap or a speed of the first orbit beyond a rest, in natural units, that rounding leaves at
+    # 0.
     rounding: float = 1e-13
     # Distances in both directions along the parent's branch, tried in turn until they enclose its
     # special point.

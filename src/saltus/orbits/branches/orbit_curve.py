@@ -198,7 +198,9 @@ def fold(point: OrbitPoint) -> float:
 
 @lru_cache(maxsize=4)  # a point ends one step and begins the next
 def flip(point: OrbitPoint) -> float:
-    """The determinant of the equations for perturbations that change their sign each (half) period."""
+    """The determinant of the equations for perturbations that change their sign each (half)
+    period.
+    """
     equations = point.curve.equations
     return scaled_determinant(equations.in_units(point.evaluation.jacobian(-1.0)))
 

@@ -202,7 +202,8 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         """
         if path not in self.paths:
             raise ParameterError(
-                f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and {self.paths[1]!r}",
+                f"{path!r} is not a parameter of this curve; it has {self.paths[0]!r} and"
+                f" {self.paths[1]!r}",
                 "path",
             )
         return [point.orbit for point in self.solved_at(value, self.paths.index(path) - 2)]
@@ -247,12 +248,13 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
         return xarray.Dataset(data, coords={"path": list(self.paths)}, attrs=known)
 
     def __repr__(self) -> str:
-        (low, bottom) = self.parameters.min(axis=0)
-        (high, top) = self.parameters.max(axis=0)
+        low, bottom = self.parameters.min(axis=0)
+        high, top = self.parameters.max(axis=0)
         kinds = ", ".join(
             f"{s.kind} ({s.parameters[0]:.6g}, {s.parameters[1]:.6g})" for s in self.special
         )
         return (
-            f"SpecialCurve({self.kind}, {self.paths[0]} {low:.6g} to {high:.6g}, {self.paths[1]} {bottom:.6g} to {top:.6g}, "
-            f"{len(self.points)} points, special: {kinds or 'none'}; ends: {self.ends[0]} | {self.ends[1]})"
+            f"SpecialCurve({self.kind}, {self.paths[0]} {low:.6g} to {high:.6g}, {self.paths[1]}"
+            f" {bottom:.6g} to {top:.6g}, {len(self.points)} points, special: {kinds or 'none'};"
+            f" ends: {self.ends[0]} | {self.ends[1]})"
         )

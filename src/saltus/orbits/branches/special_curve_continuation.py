@@ -174,14 +174,16 @@ def continue_special(
     changes = special.kind in (SpecialKind.GR, SpecialKind.SW)
     if changes and special.orbit.equations.touched(special) is None:
         raise ParameterError(
-            "of orbits with friction, surfaces, dependent gaps or impacts that die away curves are followed of LP, PD, BPC "
-            f"and NS, not of {special.kind} so far; continue an orbit at several values of the second parameter instead",
+            "of orbits with friction, surfaces, dependent gaps or impacts that die away curves are"
+            f" followed of LP, PD, BPC and NS, not of {special.kind} so far; continue an orbit at"
+            " several values of the second parameter instead",
             "special",
         )
     if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
         raise ParameterError(
-            "this GR is no singularity, as neither the velocity nor the acceleration changes at the contact: nothing begins or "
-            "ends there, and no curve of such points is followed; choose an LP, PD or BPC",
+            "this GR is no singularity, as neither the velocity nor the acceleration changes at the"
+            " contact: nothing begins or ends there, and no curve of such points is followed;"
+            " choose an LP, PD or BPC",
             "special",
         )
     first_path = special.orbit.equations.paths[0]
@@ -189,7 +191,8 @@ def continue_special(
     check_system(system, "continue_special", several_contacts=True)
     if path == first_path:
         raise ParameterError(
-            f"the branch already runs along {path}; name another parameter to follow its {special.kind} in",
+            f"the branch already runs along {path}; name another parameter to follow its"
+            f" {special.kind} in",
             "path",
         )
     check_path(system, path)
@@ -221,7 +224,8 @@ def _limits(
     for (low, high), inside, name in zip(limits, (own, value), ("first", "second"), strict=True):
         if not low <= inside <= high:
             raise ParameterError(
-                f"the special point has {inside:g} as its {name} parameter, outside ({low:g}, {high:g}); widen it"
+                f"the special point has {inside:g} as its {name} parameter, outside ({low:g},"
+                f" {high:g}); widen it"
             )
     return limits
 
@@ -236,8 +240,8 @@ def _start(
     exact = curve.along_condition(orbit)
     if exact is None:
         raise ParameterError(
-            f"Newton's method does not find this {special.kind} again, or the motion beside it cannot be followed; "
-            "locate it on its branch with a smaller step, or choose another"
+            f"Newton's method does not find this {special.kind} again, or the motion beside it"
+            " cannot be followed; locate it on its branch with a smaller step, or choose another"
         )
     return exact
 
@@ -309,8 +313,8 @@ def _changing(
         if number is not None and abs(known[number].value) < VANISHES:
             return orbit, witness_vanishes(orbit, scales, number)
     raise ParameterError(
-        f"at this {special.kind} two events come together, of which no curves are followed so far; continue an orbit at "
-        "several values of the second parameter instead",
+        f"at this {special.kind} two events come together, of which no curves are followed so far;"
+        " continue an orbit at several values of the second parameter instead",
         "special",
     )
 
@@ -329,8 +333,9 @@ def _defined(
     symmetric = keeps_symmetry(system, paths[0]) and keeps_symmetry(system, paths[1])
     if old.signature.symmetric and not symmetric and kind != SpecialKind.LP:
         raise ParameterError(
-            f"{paths[1]} takes away the mirror symmetry on which this {kind} rests; change it a little, follow the "
-            "branch again, and continue the special points into which this one splits"
+            f"{paths[1]} takes away the mirror symmetry on which this {kind} rests; change it a"
+            " little, follow the branch again, and continue the special points into which this one"
+            " splits"
         )
     if kind in (SpecialKind.GR, SpecialKind.SW):
         if system.model.holds_coordinates:
@@ -343,8 +348,9 @@ def _defined(
     equations = equations_of(system, old.signature, paths)
     if old.passes_contact and not equations.passes_contact:
         raise ParameterError(
-            f"{paths[1]} makes the contact a singularity, which it is not at {system.parameters[paths[1]]:g}; change it "
-            f"a little, follow the branch again, and continue the {kind} from there"
+            f"{paths[1]} makes the contact a singularity, which it is not at"
+            f" {system.parameters[paths[1]]:g}; change it a little, follow the branch again, and"
+            f" continue the {kind} from there"
         )
     if kind == SpecialKind.LP and old.signature.symmetric and not symmetric:
         equations, unknowns = equations.over_full_period(unknowns)
@@ -355,7 +361,8 @@ def _defined(
         halved = half(orbit) if symmetric else None
         if halved is None:
             raise ParameterError(
-                "this BPC is a crossing of branches that no symmetry keeps: it does not persist along a curve"
+                "this BPC is a crossing of branches that no symmetry keeps: it does not persist"
+                " along a curve"
             )
         orbit = halved
     if kind == SpecialKind.NS:

@@ -38,11 +38,17 @@ class SpecialKind(StrEnum):
     GR = "GR", "grazing"
     RL = (
         "RL",
-        "a release at which the load just reaches what holds the contact closed: the excursion after it shrinks to rest",
+        (
+            "a release at which the load just reaches what holds the contact closed: the excursion"
+            " after it shrinks to rest"
+        ),
     )
     CH = (
         "CH",
-        "the impacts die away just at the instant of the next release: the rest between them has no duration",
+        (
+            "the impacts die away just at the instant of the next release: the rest between them"
+            " has no duration"
+        ),
     )
     SW = "SW", "switching: a contact's release, or its closing, appears or is lost"
     GS = (
@@ -51,11 +57,17 @@ class SpecialKind(StrEnum):
     )
     CS = (
         "CS",
-        "crossing-sliding: at a reversal of the sliding direction a phase of sticking appears or is lost",
+        (
+            "crossing-sliding: at a reversal of the sliding direction a phase of sticking appears"
+            " or is lost"
+        ),
     )
     SS = (
         "SS",
-        "switching-sliding: before a phase of sticking a reversal of the sliding direction appears or is lost",
+        (
+            "switching-sliding: before a phase of sticking a reversal of the sliding direction"
+            " appears or is lost"
+        ),
     )
     AS = "AS", "adding-sliding: within a phase of sticking a phase of sliding appears or is lost"
     CP = "CP", "cusp: two folds meet", 2
@@ -116,46 +128,69 @@ class OrbitEnd(EndReason):
     FIRST = "the first {kind}"
     UNSTABLE = "is no longer stable"
     SHRINKS = "shrinks to rest"
-    GROWS = "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance without damping"
+    GROWS = (
+        "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance"
+        " without damping"
+    )
     IMAGE = "meets its own image at a {kind}"
     GRAZES_ANOTHER = "ends at a grazing of the {detail}"
     COMES_BACK = (
-        "comes back onto itself at {parameter:.9g}: between two branches that nearly meet it has gone over "
-        "from one to the other; use a smaller step"
+        "comes back onto itself at {parameter:.9g}: between two branches that nearly meet it has"
+        " gone over from one to the other; use a smaller step"
     )
     ALONG_ITSELF = (
-        "comes back along itself: from {parameter:.9g} on its orbits are those that it has already, in the other direction; "
-        "an event that leads on in two ways, or a step that was too long, has turned it round"
+        "comes back along itself: from {parameter:.9g} on its orbits are those that it has already,"
+        " in the other direction; an event that leads on in two ways, or a step that was too long,"
+        " has turned it round"
     )
     MANY_IMPACTS = "more than {detail} impacts a period"
     ACCUMULATES = "grazings accumulate near {parameter:.9g}: {detail} impacts and more"
     REPELS = "the orbit repels too strongly to be followed: its largest multiplier is {detail}"
-    TWO_AT_ONCE = "several contacts act at one instant, or impacts at a contact begin to die away: motions beside it have other equations"
+    TWO_AT_ONCE = (
+        "several contacts act at one instant, or impacts at a contact begin to die away: motions"
+        " beside it have other equations"
+    )
     NOT_UNIQUE = (
         "an impact loses its speed while both sides push outward: the motion is not unique there"
     )
     GRAZES_INTO_REST = "the orbit shrinks to rest"
-    NO_OTHER_EVENTS = "at {parameter:.10g} the events of the motion change, and no orbits with other events continue the branch"
-    NOT_CONTINUOUS = "at {parameter:.10g} an event appears or is lost at which the motion is not continuous: neighbours end up {detail} apart"
-    TURNS = (
-        "at {parameter:.10g} the sliding in a contact stops just at an impact: beyond, it turns round before this impact, where "
-        "impacts die away before ever earlier ones, and the multipliers jump at each of them"
+    NO_OTHER_EVENTS = (
+        "at {parameter:.10g} the events of the motion change, and no orbits with other events"
+        " continue the branch"
     )
-    NO_SECTION = "at {parameter:.10g} an event comes to the phase at which the state is given, and no other phase would do"
-    STICKS = "from {parameter:.10g} on the mass sticks for good; it may then rest anywhere near that place"
+    NOT_CONTINUOUS = (
+        "at {parameter:.10g} an event appears or is lost at which the motion is not continuous:"
+        " neighbours end up {detail} apart"
+    )
+    TURNS = (
+        "at {parameter:.10g} the sliding in a contact stops just at an impact: beyond, it turns"
+        " round before this impact, where impacts die away before ever earlier ones, and the"
+        " multipliers jump at each of them"
+    )
+    NO_SECTION = (
+        "at {parameter:.10g} an event comes to the phase at which the state is given, and no other"
+        " phase would do"
+    )
+    STICKS = (
+        "from {parameter:.10g} on the mass sticks for good; it may then rest anywhere near that"
+        " place"
+    )
     NOT_ISOLATED = (
-        "from {parameter:.10g} on an orbit has others beside it at the same parameters, as that of a mass which nothing holds: "
-        "they are no branch"
+        "from {parameter:.10g} on an orbit has others beside it at the same parameters, as that of"
+        " a mass which nothing holds: they are no branch"
     )
     NO_MOTION = "the motion cannot be followed {detail} the grazing"
     NO_DIRECTION = "neither direction after the grazing leads to orbits of the system"
     MEETS_GRAZING = "meets another grazing: {kind}"
     MEETS_CHANGE = "meets another change of the orbit's events: {kind}"
     REFUSED = "the system ends there: {detail}"
-    NO_PULL = "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact open"
+    NO_PULL = (
+        "shrinks to rest at {parameter:.10g}: from there on the load no longer pulls the contact"
+        " open"
+    )
     REST_VANISHES = (
-        "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts have died away, "
-        "and what follows is a branch of its own"
+        "at {parameter:.10g} a rest has no duration left; beyond, the load pulls before the impacts"
+        " have died away, and what follows is a branch of its own"
     )
 
 
@@ -165,8 +200,8 @@ class OrbitMissed(MissedReason):
     """
 
     IMPOSSIBLE_PAIR = (
-        "{kind} near {first}: a complex pair of multipliers has the modulus {detail}, although areas of states never grow "
-        "(errata 22), so the multipliers are wrong there"
+        "{kind} near {first}: a complex pair of multipliers has the modulus {detail}, although"
+        " areas of states never grow (errata 22), so the multipliers are wrong there"
     )
 
 
@@ -216,9 +251,11 @@ class SpecialPoint(Zero):
     def __repr__(self) -> str:
         place = ", ".join(f"{value:.12g}" for value in self.parameters)
         return (
-            f"SpecialPoint(kind='{self.kind}', {'parameter' if len(self.parameters) == 1 else 'parameters'}={place}, "
-            f"amplitude={self.amplitude:.9g}, period {self.orbit.period}, {self.orbit.impact_count} impacts, "
-            f"bracket {self.evidence.bracket:.1g}{self.note and '; ' + self.note})"
+            f"SpecialPoint(kind='{self.kind}',"
+            f" {'parameter' if len(self.parameters) == 1 else 'parameters'}={place},"
+            f" amplitude={self.amplitude:.9g}, period {self.orbit.period},"
+            f" {self.orbit.impact_count} impacts, bracket"
+            f" {self.evidence.bracket:.1g}{self.note and '; ' + self.note})"
         )
 
 

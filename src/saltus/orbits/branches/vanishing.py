@@ -19,7 +19,8 @@ from saltus.orbits.signature import TOLERANCES
 # Steps of the central differences, in natural units and as a share of the parameters' scales: their
 # error is its square plus rounding divided by it.
 SHIFT = 1e-5
-# A pair of multipliers whose modulus differs from 1 by more than this is not the one of an NS nearby.
+# A pair of multipliers whose modulus differs from 1 by more than this is not the one of an NS
+# nearby.
 NEAR_CIRCLE = 0.5
 Quantity = Callable[[Solution], float | None]
 

@@ -64,7 +64,8 @@ from saltus.taylor import FREQUENCY
 # power of the time with which the gap grows after an impact with e = 0; after a release it is
 # `AFTER_RELEASE`
 AFTER_IMPACT = 2
-# An opened gap below this share of the natural length is rounding, at the instant at which it opens.
+# An opened gap below this share of the natural length is rounding, at the instant at which it
+# opens.
 GAP_AT_REST = 1e-13
 JUST_OPENED = 1e-4  # the share of the period within which such a gap may have minima by rounding
 # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a
@@ -123,8 +124,8 @@ class ContactsEvaluation(OrbitEvaluation):
         return None
 
 
-# Excursions from contacts of cells that move alike are followed down to this duration, in radians of
-# the load: there they end with a speed of some 1e-8.
+# Excursions from contacts of cells that move alike are followed down to this duration, in radians
+# of the load: there they end with a speed of some 1e-8.
 SHORTEST_EXCURSION = 1e-4
 
 
@@ -245,9 +246,11 @@ class ContactsEquations(OrbitEquations):
         rows = self.plan[: len(self.signature.events)]
         # the gap is divided by a power of the time since the contact opened without speed
         guards = [
-            natural.lengths[places[contact]] / natural.time**power
-            if kind == EventCode.IMPACT
-            else natural.forces[places[contact]]
+            (
+                natural.lengths[places[contact]] / natural.time**power
+                if kind == EventCode.IMPACT
+                else natural.forces[places[contact]]
+            )
             for kind, contact, power in zip(
                 rows[:, SegmentPlan.KIND].tolist(),
                 rows[:, SegmentPlan.CONTACT].tolist(),
@@ -621,7 +624,9 @@ class ContactsEquations(OrbitEquations):
         values: np.ndarray,
         with_extremes: bool,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """The arrays that `follow_contact_segments` fills; None where a segment cannot be followed."""
+        """The arrays that `follow_contact_segments` fills; None where a segment cannot be
+        followed.
+        """
         parameters = self._values.copy()
         parameters[self._places] = values
         numbers = self._run.structure.prepare(parameters, self._records, self._run.data)

@@ -252,10 +252,8 @@ class OrbitEquations(ABC):
     ) -> None:
         if system.load.frequency is None:
             raise ParameterError(
-                (
-                    "a load without a frequency has no forcing period, so no periodic orbits to "
-                    "find; give one"
-                ),
+                "a load without a frequency has no forcing period, so no periodic orbits to "
+                "find; give one",
                 "load.frequency",
             )
         self.given = system
@@ -554,7 +552,9 @@ class OrbitEquations(ABC):
 
     @cached_property
     def is_phase(self) -> np.ndarray:
-        """Which unknowns are phases of the load, (n,); the others are coordinates and velocities."""
+        """Which unknowns are phases of the load, (n,); the others are coordinates and
+        velocities.
+        """
         return np.zeros(self.size, dtype=bool)
 
     def stretch(self, solution: Solution) -> float:
@@ -662,7 +662,9 @@ class OrbitEquations(ABC):
         return self.with_signature(self.signature.halved())
 
     def over_full_period(self, unknowns: np.ndarray) -> tuple[Self, np.ndarray]:
-        """The equations of the full period of a symmetric orbit, and the orbit's unknowns in them."""
+        """The equations of the full period of a symmetric orbit, and the orbit's unknowns in
+        them.
+        """
         return self.with_signature(self.signature.over_full_period(self.images)), self.repeated(
             unknowns
         )

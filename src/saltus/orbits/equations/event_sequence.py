@@ -58,7 +58,9 @@ class OrbitEvent(NamedTuple):
 
 @dataclass(frozen=True)
 class EventSequence:
-    """The events of an orbit from its section on, and how near it is to an orbit with other events."""
+    """The events of an orbit from its section on, and how near it is to an orbit with other
+    events.
+    """
 
     events: tuple[OrbitEvent, ...]
     times: tuple[float, ...]

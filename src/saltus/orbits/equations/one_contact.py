@@ -412,7 +412,9 @@ class OneContactEquations(OrbitEquations):
         )
 
     def _segments(self, unknowns: np.ndarray, later: np.ndarray, frequency: float) -> Segments:
-        """The segments between the impacts, the last one up to the first impact of the next period."""
+        """The segments between the impacts, the last one up to the first impact of the next
+        period.
+        """
         n = len(self.signature.sides)
         if not n:
             spans = np.array([[0.0, self.closing / frequency, 0.0]])
@@ -469,7 +471,7 @@ class OneContactEquations(OrbitEquations):
         the speeds `following`.
         """
         spans = segments.spans
-        (ends, columns, extremes, rates) = followed
+        ends, columns, extremes, rates = followed
         n = len(spans)
         count = len(self.paths)
         sign = rates[self._rate_of]

@@ -142,9 +142,9 @@ def find_orbit(
         if q is not None:
             return _polish(base, state, q, passed, progress)
     raise MotionError(
-        f"the motion has not settled on a periodic orbit of up to {period or max_period} forcing periods after {passed}: it is "
-        "chaotic, slow to settle or longer; try another start, max_period=..., or settle=0 with period=... for an unstable orbit "
-        "near the start"
+        f"the motion has not settled on a periodic orbit of up to {period or max_period} forcing"
+        f" periods after {passed}: it is chaotic, slow to settle or longer; try another start,"
+        " max_period=..., or settle=0 with period=... for an unstable orbit near the start"
     )
 
 
@@ -184,7 +184,8 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
     """
     if motion.limit is not None:
         raise MotionError(
-            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0: no orbit there"
+            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0:"
+            " no orbit there"
         )
     if motion.side != 0 and motion.phase_known:
         return
@@ -195,19 +196,20 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
     released = bool(load_releases(system))
     if not motion.phase_known and not released:
         raise MotionError(
-            f"the motion from {start} settles on the undeformed state, which is no orbit to follow: its impacts lose nothing "
-            f"and get ever smaller without end; {farther}"
+            f"the motion from {start} settles on the undeformed state, which is no orbit to follow:"
+            f" its impacts lose nothing and get ever smaller without end; {farther}"
         )
     if not motion.phase_known:
         raise MotionError(
-            f"the impacts of the motion from {start} lose nothing and become too small to be followed before the load pulls "
-            "again, so its phase is lost and no orbit can be read from it; give the impacts a loss (an e below 1), so that it "
-            "rests until the load pulls, which is an orbit, or take a higher frequency"
+            f"the impacts of the motion from {start} lose nothing and become too small to be"
+            " followed before the load pulls again, so its phase is lost and no orbit can be read"
+            " from it; give the impacts a loss (an e below 1), so that it rests until the load"
+            " pulls, which is an orbit, or take a higher frequency"
         )
     if not released:
         raise MotionError(
-            f"the motion from {start} comes to rest at contact for good, as the load never pulls it off: it settles on the "
-            f"undeformed state, which is no orbit to follow; {farther}"
+            f"the motion from {start} comes to rest at contact for good, as the load never pulls it"
+            f" off: it settles on the undeformed state, which is no orbit to follow; {farther}"
         )
 
 

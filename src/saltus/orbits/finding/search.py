@@ -165,8 +165,9 @@ class Search(Result):
         kinds = sorted({orbit.period for orbit in self.orbits})
         stable = sum(orbit.stable for orbit in self.orbits)
         return (
-            f"Search({len(self.orbits)} orbits, {stable} of them stable, of periods {kinds}; from {self.starts} states in "
-            f"{tuple(self.window)} at each of {len(self.values)} values of {self.path}, seed {self.seed})"
+            f"Search({len(self.orbits)} orbits, {stable} of them stable, of periods {kinds}; from"
+            f" {self.starts} states in {tuple(self.window)} at each of {len(self.values)} values of"
+            f" {self.path}, seed {self.seed})"
         )
 
 

@@ -1,4 +1,6 @@
-"""The proof of a branch: pieces on which, box by box, exactly one orbit lies on a connected curve."""
+"""The proof of a branch: pieces on which, box by box, exactly one orbit lies on a connected
+curve.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +82,9 @@ class ProvedPiece:
 
     @property
     def turns(self) -> list[int]:
-        """The signs of d parameter / ds along it, without repetition and without undecided boxes."""
+        """The signs of d parameter / ds along it, without repetition and without undecided
+        boxes.
+        """
         signs = [box.turn for box in self.boxes if box.turn]
         return [sign for i, sign in enumerate(signs) if i == 0 or sign != signs[i - 1]]
 
@@ -187,9 +191,9 @@ def _of_piece(piece: ProvedPiece, path: str) -> str:
     stable = sum(box.stable is True for box in piece.boxes)
     folds = len(piece.turns) - 1
     told = (
-        f"Points {piece.ends[0]} to {piece.ends[1]} lie on one connected curve of orbits, each alone "
-        f"in one of {len(piece.boxes)} boxes, with open contacts, at {path} between "
-        f"{rounded_down(low, 9)} and {rounded_up(high, 9)}"
+        f"Points {piece.ends[0]} to {piece.ends[1]} lie on one connected curve of orbits, each"
+        f" alone in one of {len(piece.boxes)} boxes, with open contacts, at {path} between"
+        f" {rounded_down(low, 9)} and {rounded_up(high, 9)}"
     )
     if folds > 0:
         told += f", which turns round at least {folds} time{'s' * (folds > 1)}"
@@ -212,9 +216,13 @@ def prove_branch(
     reasons: list[str] = []
     left = most_boxes
     special = tuple(
-        replace(point, evidence=replace(point.evidence, proof=prove_special(point, radii, steps)))
-        if point.kind in MEANINGS
-        else point
+        (
+            replace(
+                point, evidence=replace(point.evidence, proof=prove_special(point, radii, steps))
+            )
+            if point.kind in MEANINGS
+            else point
+        )
         for point in branch.special
     )
     for first, last in _runs(points) if most_boxes else ():

@@ -43,7 +43,8 @@ def certificate_of(proof: OrbitProof) -> dict[str, Any]:
         raise ParameterError(f"there is no certificate, as nothing is proved: {proof.reason}")
     if proof.made is not None and proof.made.rests:
         raise ParameterError(
-            "there is no certificate of an orbit with rests yet; proof.check() repeats its inclusions"
+            "there is no certificate of an orbit with rests yet; proof.check() repeats its"
+            " inclusions"
         )
     return {
         "format": FORMAT,

@@ -39,8 +39,10 @@ if TYPE_CHECKING:
 
 ASSUMPTIONS = (
     "doubles are rounded to nearest (IEEE 754); fused multiply-adds are allowed",
-    "the C library's sin, cos, exp, log, sinh, cosh, tanh, atan and pow are right within 3 units in "
-    "the last place",
+    (
+        "the C library's sin, cos, exp, log, sinh, cosh, tanh, atan and pow are right within 3"
+        " units in the last place"
+    ),
     "a product of matrices is a sum of products in some order",
     "the traced graph is the model, with its literal numbers as doubles",
 )
@@ -151,8 +153,10 @@ class OrbitProof(Result):
         told = [
             f"{system} has a periodic orbit that closes {closing}"
             + (f", with impacts at {impacts}." if impacts else ", without impacts."),
-            "No other orbit of this signature lies, at its impacts and at the nodes between them, "
-            f"within {within(self.unique_within)} of it.",
+            (
+                "No other orbit of this signature lies, at its impacts and at the nodes between"
+                f" them, within {within(self.unique_within)} of it."
+            ),
             "Its contact is open between the impacts." if impacts else "Its contact stays open.",
             *self._rests_in_words(),
             _of_stability(self.stable, self.moduli),
@@ -167,8 +171,8 @@ class OrbitProof(Result):
     def _rests_in_words(self) -> list[str]:
         """A sentence for each rest."""
         return [
-            f"Infinitely many further impacts are over by t = {rounded_up(float(end), 9)}; then its "
-            f"contact is closed until t = {rounded_ball(*map(float, release))}."
+            f"Infinitely many further impacts are over by t = {rounded_up(float(end), 9)}; then its"
+            f" contact is closed until t = {rounded_ball(*map(float, release))}."
             for end, release in zip(self.rests_by, self.releases, strict=True)
         ]
 
@@ -306,8 +310,8 @@ def _refutation(shooting: Shooting, zero: ProvedZero, made: OrbitSegments) -> st
     farthest = int(far.argmax())
     if far[farthest] > limit:
         return (
-            f"the orbit as given does not solve the equations: the {shooting.names[farthest]} of the "
-            f"one that does lies more than {rounded_down(float(away[farthest]), 2)} away"
+            f"the orbit as given does not solve the equations: the {shooting.names[farthest]} of"
+            f" the one that does lies more than {rounded_down(float(away[farthest]), 2)} away"
         )
     events = zero.box[:count].reshape(-1, shooting.event_size)
     if made.free_time and bool((events[:, 1].high < 0.0).any()):

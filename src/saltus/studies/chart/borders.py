@@ -357,7 +357,9 @@ def with_borders(
 
 
 class _BorderSearch:
-    """The search for borders: the chart, to which motions are added, and the borders found so far."""
+    """The search for borders: the chart, to which motions are added, and the borders found so
+    far.
+    """
 
     def __init__(
         self, request: ChartRequest, work: BorderComputations, chart: xarray.Dataset

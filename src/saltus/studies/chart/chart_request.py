@@ -222,8 +222,8 @@ class ChartRequest:
                 "1",
                 (),
                 (
-                    "starts that neither rest nor repeat themselves, or are ended by a limit of the "
-                    "model"
+                    "starts that neither rest nor repeat themselves, or are ended by a limit of the"
+                    " model"
                 ),
             ),
             ("outcome", "i1", "1", (), "what there is in the cell"),

@@ -166,7 +166,9 @@ def has_alike(
 
 
 def distinct(motions: np.ndarray) -> np.ndarray:
-    """The motions of each cell without duplicates and mirror images, by cell and falling amplitude."""
+    """The motions of each cell without duplicates and mirror images, by cell and falling
+    amplitude.
+    """
     motions = by_cell(motions)
     fresh = np.ones(len(motions), dtype=bool)
     for step in range(1, int(np.bincount(motions["cell"]).max(initial=0))):

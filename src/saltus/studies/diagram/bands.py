@@ -30,7 +30,10 @@ class EdgeKind(StrEnum):
     BOUND = "bound", "the range of the study ends"
     CASCADE = (
         "cascade",
-        "period doublings accumulate: beyond, the motion has 2^k times the period of an orbit that doubles",
+        (
+            "period doublings accumulate: beyond, the motion has 2^k times the period of an orbit"
+            " that doubles"
+        ),
     )
     FOLD = "fold", "a stable orbit ends in a fold: chaos begins with intermittency"
     GRAZING = "grazing", "a stable orbit touches the contact"
@@ -477,7 +480,9 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
 
 
 def band_origins(branches: Sequence[Branch]) -> list[BandOrigin]:
-    """The special points of branches at which narrow bands may begin, as `BandSearch` takes them."""
+    """The special points of branches at which narrow bands may begin, as `BandSearch` takes
+    them.
+    """
     return [
         BandOrigin(
             str(special.kind), special.parameter, tuple(special.orbit.section_state.tolist())

@@ -227,7 +227,9 @@ def _least_speed(system: System) -> float:
 
 
 def _seen(orbit: PeriodicOrbit) -> np.ndarray:
-    """The quantities by which motions and orbits are compared: the extrema and the slowest impact."""
+    """The quantities by which motions and orbits are compared: the extrema and the slowest
+    impact.
+    """
     least = _least_speed(orbit.system)
     return np.array(
         [

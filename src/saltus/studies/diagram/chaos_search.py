@@ -414,7 +414,9 @@ class BandSearch(SearchedRange):
         return [run for run in runs if run]
 
     def _stretches(self, run: list[SearchedValue]) -> list[list[SearchedValue]]:
-        """The parts of a band whose values are judged together, with about equal numbers of values."""
+        """The parts of a band whose values are judged together, with about equal numbers of
+        values.
+        """
         count = 1 + int((run[-1].value - run[0].value) / (self.settings.every * self.span))
         return [
             part.tolist()

@@ -477,10 +477,8 @@ def _values(bounds: tuple[float, float], values: Iterable[float] | None, count: 
     outside = grid[~((grid >= bounds[0]) & (grid <= bounds[1]))]
     if outside.size:
         raise ParameterError(
-            (
-                f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds "
-                "or leave it out"
-            ),
+            f"values must lie within the bounds {bounds}, got {outside[0]:g}; widen the bounds "
+            "or leave it out",
             "values",
         )
     return np.unique(grid)

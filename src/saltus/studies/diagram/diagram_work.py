@@ -278,7 +278,9 @@ class DiagramWork:
     def branches_of(
         self, requests: Sequence[Request], progress: Progress = silent
     ) -> list[list[Branch]]:
-        """The branches of each request; those that the store lacks are computed at the same time."""
+        """The branches of each request; those that the store lacks are computed at the same
+        time.
+        """
         if self.memo is None:
             return [request.branches(self.path, progress) for request in requests]
         found = self.memo.results(kinds()["branches"], [request.to_json() for request in requests])

@@ -235,7 +235,9 @@ def _is_slow(motions: SimulatedMotions) -> np.ndarray:
 
 
 class BranchAssignment(NumberedSentence):
-    """Whether a simulated periodic motion lies on a branch, or why not; its `str` is the sentence."""
+    """Whether a simulated periodic motion lies on a branch, or why not; its `str` is the
+    sentence.
+    """
 
     OPEN = 0, "it has not been looked at"
     ON_BRANCH = 1, "it lies on a stable part of a branch"
