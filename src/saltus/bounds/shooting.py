@@ -372,7 +372,7 @@ class Shooting:
         for i in range(self.event_count):
             count = max(1, int(np.ceil((times[i + 1] - times[i]) / longest)))
             nodes = np.linspace(times[i], times[i + 1], count + 1)[1:-1]
-            states = [ball.middle for ball in self.follow(i, Ball(guess[i]), nodes)]
+            states = [ball.middle for ball in self.follow(i, Ball(guess[i]), nodes, guessed=True)]
             width = 2 * self.dof
             places = [len(unknowns) + width * k for k in range(len(nodes))]
             for state in states:
@@ -405,10 +405,12 @@ class Shooting:
         event: Ball,
         nodes: Sequence[float] | np.ndarray,
         parameter: Ball | None = None,
+        guessed: bool = False,
     ) -> list[Ball]:
         """Balls of the states at some times after event i, one step after another.
 
-        They grow with the number of steps; their middles are a guess of the states.
+        They grow with the number of steps; if they are `guessed`, each step starts from the middle
+        of the last one alone, and they contain nothing.
         """
         group = self._groups[i]
         known = self._parameters_at(parameter)
@@ -422,6 +424,8 @@ class Shooting:
         for node in nodes:
             taken = Steps(group.bare, self.settings.order, known, time, node - time, state)
             state = taken.ends[:, :, :2]
+            if guessed:
+                state = Ball(state.middle)
             time = Ball(np.array([node]))
             result.append(state.transposed.reshape(width))
         return result
