@@ -1,6 +1,6 @@
 """The natural units of a system scale with the units of its user, and depend on nothing else."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -121,3 +121,45 @@ def test_friction_gives_a_length_where_nothing_else_does():
     assert (units.length, units.time) == pytest.approx((0.2, 1.0))
     doubled = replace(belt, kinetic=0.4, static=0.6)
     assert natural_units(saltus.System(model=doubled)).length == pytest.approx(0.4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtWall(saltus.ContactModel):
+    """An oscillator at a wall."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[saltus.Contact, ...]] = (
+        saltus.Contact(name="wall", coordinate="x", sign=-1, position=1.0),
+    )
+
+    def force(self, t, q, velocity, load):
+        return load.force(t) - 0.1 * velocity - 4.0 * q
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithSurface(AtWall):
+    """The same with a surface across which nothing changes."""
+
+    surfaces: ClassVar[tuple[saltus.Surface, ...]] = (
+        saltus.Surface(name="inert", coordinate="x", position=0.21),
+    )
+
+    def force(self, t, q, velocity, load, sides):
+        return load.force(t) - 0.1 * velocity - 4.0 * q
+
+
+def test_a_surface_without_effect_changes_no_unit():
+    """The stiffness is read beside a surface too: its own time is 1 / 2."""
+    one, other = (
+        natural_units(
+            saltus.System(
+                model=model,
+                load=saltus.Load(frequency=0.8, force=saltus.Harmonic(0.6)),
+                impact=saltus.NewtonImpact(e=0.8),
+            )
+        )
+        for model in (AtWall(), WithSurface())
+    )
+    assert other.own_time == pytest.approx(0.5, rel=1e-14)
+    assert (other.length, other.time, other.own_time) == (one.length, one.time, one.own_time)

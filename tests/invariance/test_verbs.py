@@ -15,9 +15,9 @@ from test_motions import differences as motion_differences
 from verb_answers import VERBS, says, steady
 
 SAME = 1e-6
-# Exponents over 64 periods beside an inert surface, whose crossings are events, differ by 1.6e-3:
-# not mended.
-SAME_BESIDE_SURFACES = 5e-3
+# Exponents of several coordinates over a finite run depend on the lengths in which their first
+# frame is measured, by the logarithm of a ratio of lengths over the run, 2 pi 64 / frequency.
+SAME_EXPONENTS = 2e-2
 KINDS = ("wall", "passing", "stops", "block", "chain", "belt", "soft", "lag", "structure")
 # Attractors are looked for from starts that are spread over a window: another coordinate spreads
 # them otherwise, and the default window is around a place that an origin moves.
@@ -62,8 +62,8 @@ def differences(verb: str, kind: str, seed: int, count: int | None = None) -> li
             found.append(f"{verb} of {other.name}: {said.discrete} and {one.discrete}")
         elif len(said.numbers) == len(one.numbers) > 0:
             apart = np.abs(np.array(said.numbers) - np.array(one.numbers)).max()
-            beside = verb == "lyapunov_spectrum" and "inert surface" in other.name
-            if not apart < (SAME_BESIDE_SURFACES if beside else SAME):
+            of_frames = verb == "lyapunov_spectrum" and recipe.size + (recipe.lag is not None) > 1
+            if not apart < (SAME_EXPONENTS if of_frames else SAME):
                 found.append(f"{verb} of {other.name}: apart by {apart:g}")
     return found
 

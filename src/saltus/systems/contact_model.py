@@ -18,7 +18,7 @@ import numpy as np
 from saltus.checks import LIMITS, number_problem
 from saltus.errors import ParameterError, shown
 from saltus.systems.load import LoadOnSides, Sides
-from saltus.systems.model import Model, ask, is_zero
+from saltus.systems.model import Jet, Model, ask, is_zero
 
 Number = Any  # a float, or a parameter of the model while its equations are traced
 
@@ -251,15 +251,19 @@ class Surface:
         _check_sign(self)
         _check_numbers(self, "position", "stiffness", "damping")
 
-    def side(self, position: Any) -> Any:
+    def side(self, position: Any, below: bool = False) -> Any:
         """s, +1 or -1, at a position q.
 
         Parameters
         ----------
         position
             The coordinate q.
+        below
+            Whether q = p itself counts as below the position; by default it counts as above.
         """
-        return self.sign * np.where(np.asarray(position) >= self.position, 1.0, -1.0)[()]
+        value = np.asarray(position.value if isinstance(position, Jet) else position)
+        above = value > self.position if below else value >= self.position
+        return self.sign * np.where(above, 1.0, -1.0)[()]
 
 
 # the largest imaginary part by which derivatives to a number of a model are taken
@@ -760,9 +764,9 @@ def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
     )
 
 
-def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
+def sides_for(model: Any, t: Any, q: Any, load: Any, below: bool = False) -> tuple[Sides, ...]:
     """The argument `sides` of a model's force, if it takes one: those that come with the load, else
-    those of the coordinates.
+    those of the coordinates. At a surface itself they are those above it, or `below` it.
     """
     if not model.surfaces:
         return ()
@@ -788,7 +792,7 @@ def sides_for(model: Any, t: Any, q: Any, load: Any) -> tuple[Sides, ...]:
             return known[surface.coordinate]
         return sum(factor * value_of(name) for name, factor in surface.coordinate.items())
 
-    return (Sides({each.name: each.side(kept(each)) for each in model.surfaces}),)
+    return (Sides({each.name: each.side(kept(each), below) for each in model.surfaces}),)
 
 
 def held_entry(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:

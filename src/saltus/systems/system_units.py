@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from saltus.systems.contact_model import mass_rows, normal_forces
-from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.contact_model import Surface, mass_rows, normal_forces, sides_for
+from saltus.systems.load import DeclaredLoad, Load, LoadOnSides
 from saltus.systems.model import Jet, each_of
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _found(system: System) -> NaturalUnits:
     quickest = 0.0
     push = np.zeros(len(model.coordinates))
     with np.errstate(all="ignore"):
-        for place, outward in _places(model):
+        for place, outward in _places(model, load, instants):
             found = _held_away(model, load, place, outward, rate, instants)
             if found is None:
                 continue
@@ -213,25 +213,33 @@ def _found(system: System) -> NaturalUnits:
     )
 
 
-def _places(model: Any) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _places(model: Any, load: Any, instants: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """The coordinates (n,) nearest to 0 at which one of its contacts or surfaces is reached; 0
     without any. And the direction (n,) in which the contact opens, 0 where both sides are free.
+
+    A surface across which nothing changes is left out.
     """
     names = model.coordinates
     if model.has_one_contact:
-        place = float(model.contact)
-        beside = place + max(1.0, abs(place))
+        at = float(model.contact)
+        beside = at + max(1.0, abs(at))
         opens = [np.sign(float(model.gap(beside, side))) for side in model.every_side]
-        yield np.array([place]), np.array([opens[0] if len(set(opens)) == 1 else 0.0])
+        yield np.array([at]), np.array([opens[0] if len(set(opens)) == 1 else 0.0])
         return
-    parts = [part for part in (*model.contacts, *model.surfaces) if _is_sum(part, names)]
-    for part in parts:
+    places = 0
+    for part in (*model.contacts, *model.surfaces):
+        if not _is_sum(part, names):
+            continue
         terms = (
             {part.coordinate: 1.0} if isinstance(part.coordinate, str) else dict(part.coordinate)
         )
         row = np.array([float(terms.get(name, 0.0)) for name in names])
-        yield row * (float(part.position) / float(row @ row)), row * getattr(part, "sign", 0.0)
-    if not parts:
+        place = row * (float(part.position) / float(row @ row))
+        if isinstance(part, Surface) and _is_inert(model, place, load, instants):
+            continue
+        places += 1
+        yield place, row * part.sign
+    if not places:
         yield np.zeros(len(names)), np.zeros(len(names))
 
 
@@ -279,13 +287,15 @@ def _held_away(
     """
     pushes = []
     for t in instants:
-        for side in model.every_side:
-            value = _acceleration(model, float(t), place.tolist(), side, load)
-            if value is not None:
-                pushes.append(value)
+        for beside in _on_both_sides(model, float(t), place, load):
+            for side in model.every_side:
+                value = _acceleration(model, float(t), place.tolist(), side, beside)
+                if value is not None:
+                    pushes.append(value)
     if not pushes:
         return None
-    slopes = _slopes(model, place, model.every_side[0], load)
+    # the mean of both sides, so that a mirror image has the same
+    slopes = np.mean(_slopes_beside(model, place, load), axis=0)
     left, sizes, right = np.linalg.svd(slopes)
     shares = np.maximum(sizes, rate**2)
     moved = np.array(pushes) @ left
@@ -318,6 +328,43 @@ def _mean(values: np.ndarray) -> np.ndarray:
     """The root of the mean squares over the first axis."""
     largest = float(np.abs(values).max(initial=0.0))
     return np.asarray(largest * np.sqrt(((values / (largest or 1.0)) ** 2).mean(axis=0)))
+
+
+def _on_both_sides(model: Any, t: float, place: np.ndarray, load: Any) -> list[Any]:
+    """The load with the sides of the surfaces at a place; twice, as the place may lie on one of
+    them.
+    """
+    if not model.surfaces:
+        return [load]
+    q = float(place[0]) if len(place) == 1 else tuple(place.tolist())
+    try:
+        both = [sides_for(model, t, q, load, below)[0] for below in (False, True)]
+    except Exception:  # a user's own code may raise anything
+        return [load]
+    return [LoadOnSides(load, sides) for sides in both]
+
+
+def _slopes_beside(model: Any, place: np.ndarray, load: Any) -> list[np.ndarray]:
+    """The slopes at a place, on each side of a surface that it lies on."""
+    return [
+        _slopes(model, place, model.every_side[0], beside)
+        for beside in _on_both_sides(model, 0.0, place, load)
+    ]
+
+
+def _is_inert(model: Any, place: np.ndarray, load: Any, instants: np.ndarray) -> bool:
+    """Whether nothing changes across the surface on which a place lies, at rest."""
+    slopes = _slopes_beside(model, place, load)
+    if not (slopes[0] == slopes[-1]).all():
+        return False
+    for t in instants:
+        above, *below = (
+            _acceleration(model, float(t), place.tolist(), model.every_side[0], beside)
+            for beside in _on_both_sides(model, float(t), place, load)
+        )
+        if above is None or any(push is None or (push != above).any() for push in below):
+            return False
+    return True
 
 
 def _acceleration(model: Any, t: float, q: list[Any], side: int, load: Any) -> np.ndarray | None:
