@@ -1,9 +1,9 @@
-"""The kinds of arguments, as their annotations say them: what a public function was given is
+"""The kinds of arguments, as their annotations state them: the arguments of a public function are
 compared with them in one place.
 
-What is true or false, as a list would be, is compared before a function begins. All else is
-compared where a function fails with an error of Python's own, so that a call takes no longer: its
-user is told which argument is of another kind.
+Truth values are compared before a function begins, as a list would pass for one. All else is
+compared where a function fails with an error of Python's own, so that a call takes no longer. The
+user then reads which argument is of another kind.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
-"""The base class of all results: a dataset, from which pictures, files and tables are made, whose
-attributes say where it comes from, and the facts of which a notebook shows."""
+"""The base class of all results: a dataset, from which pictures, files and tables are made.
+
+Its attributes say where it comes from, and a notebook shows its facts.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The phase plane under a constant load: the equilibria of any model of one coordinate, and the
 separatrices of its saddles.
 
-At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q', with the eigenvalues
+At an equilibrium (q*, 0) on a side the flow is q'' = a_q (q - q*) + a_v q'. Its eigenvalues obey
 lambda^2 - a_v lambda - a_q = 0: a saddle where a_q > 0. At the contact the system rests while the
 accelerations of all its sides push it into the contact. The stable manifolds of a saddle, which are
 tangent to (1, lambda) there, are computed by the exact backward flow.

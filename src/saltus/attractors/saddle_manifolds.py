@@ -2,7 +2,7 @@
 the curves between basins.
 
 The stroboscopic map P takes a state at phase 0 to the state a forcing period later. A saddle orbit
-of period q has q points x_i with P(x_i) = x_{i+1}, at which P^q has the multipliers mu_s, mu_u with
+of period q has q points x_i with P(x_i) = x_{i+1}. There P^q has the multipliers mu_s, mu_u with
 abs(mu_s) < 1 < abs(mu_u) and directions v_s, v_u. The stable manifold of x_0 is the union of the
 images of its fundamental segment
 

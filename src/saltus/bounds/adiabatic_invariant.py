@@ -1,11 +1,10 @@
 """A proof that small impacts decay under a varying load: a corrected adiabatic invariant falls
 along every motion.
 
-On one side the gap w obeys w'' = A(t, w, u), u = w', with the pull alpha(t) = -A(t, 0, 0) > 0 and
-the contact damping c(t) = -A_u(t, 0, 0). Let E = u^2/2 + alpha w, v = sqrt(2 E), x = u / v in [-1,
-1]; a flight runs from x = 1 to x = -1, and an impact without loss puts x back to 1 on the next
-side. Exactly, with q = alpha'/(2 alpha), b = -(q + c) and r = v^2 S the part of A beyond -alpha - c
-u,
+On one side the gap w obeys w'' = A(t, w, u), u = w'. The pull is alpha(t) = -A(t, 0, 0) > 0 and the
+contact damping c(t) = -A_u(t, 0, 0). Let E = u^2/2 + alpha w, v = sqrt(2 E), x = u / v in [-1, 1].
+A flight runs from x = 1 to x = -1, and an impact without loss puts x back to 1 on the next side.
+Exactly, with q = alpha'/(2 alpha), b = -(q + c) and r = v^2 S the part of A beyond -alpha - c u,
 
     v'/v = q + b x^2 + v x S,        x' = -alpha/v + (1 - x^2) (b x + v S).
 
@@ -15,15 +14,15 @@ Let G = sum 1/alpha over the sides of a cycle, kappa = sum (c/alpha) / G, and
     alpha h2_x = P1,
 
 where P1 is the term of order v that h1 leaves in dL/dt. With h1 = (a x + b x^3)/alpha, a = 3 q +
-G'/G + kappa, it is P1 = (e1 x + e3 x^3 + e5 x^5)/alpha, odd in x, so that h2 = 0 at both ends of a
-flight; and the h1 of both sides agree there. L is therefore continuous at an impact without loss;
-at an impact with the factor f < 1 it changes by 3 ln f + v h1 (f - 1); and in flight
+G'/G + kappa, it is P1 = (e1 x + e3 x^3 + e5 x^5)/alpha, odd in x. So h2 = 0 at both ends of a
+flight, and the h1 of both sides agree there. L is therefore continuous at an impact without loss.
+At an impact with the factor f < 1 it changes by 3 ln f + v h1 (f - 1), and in flight
 
     dL/dt <= -kappa(t) + v^2 M(t),
 
 where M bounds the terms that h2 leaves, with the exact S: interval bounds over cells of the time
 and all x, w <= v^2 / (2 alpha). ln J = 3 ln v + ln G is the adiabatic invariant, and exp(-kappa t)
-its known decay (see `flow/one_contact/impacts.py`).
+its decay (see `flow/one_contact/impacts.py`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Proofs of capture: a speed after an impact below which a motion never leaves the contact again
-and comes to rest there; and the energy that it takes to open a gap in a flight, from bounds of the
-pull."""
+"""Proofs of capture: a speed after an impact below which a motion comes to rest at the contact and
+never leaves it.
+
+Bounds of the pull give the energy that opens a gap in a flight.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Zeros of shooting equations, proved: existence, uniqueness, and the derivative of the return map.
 
 Let A be near the inverse of the Jacobian at x0, and X = x0 +- r.
-With Y = |A F(x0)| and Z = |I - A F_x(X)|, if Y + Z r < r in every component, X contains exactly one
-zero of F, it lies in x0 +- (Y + Z r), and F_x is regular on X (Krawczyk 1969; Rump, Acta Numerica
-19, 2010, section 13).
+Let Y = |A F(x0)| and Z = |I - A F_x(X)|, with Y + Z r < r in every component. Then X contains
+exactly one zero of F, it lies in x0 +- (Y + Z r), and F_x is regular on X (Krawczyk 1969; Rump,
+Acta Numerica 19, 2010, section 13).
 """
 
 from __future__ import annotations

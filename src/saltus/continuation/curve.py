@@ -1,5 +1,5 @@
-"""The interface of a curve to the loop of a continuation: its norm, its points, and the way from
-one point to the next; and its special points, with their evidence."""
+"""The interface of a curve to the loop of a continuation: its norm, its points, the steps between
+them, and its special points with their evidence."""
 
 from __future__ import annotations
 

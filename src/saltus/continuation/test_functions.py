@@ -1,6 +1,8 @@
-"""Test functions: they vanish at special points, which are located by bracketing and carry their
-evidence; and `Events`, by which a problem gives them, with changes of its equations and its own
-ends."""
+"""Test functions vanish at special points, which are located by bracketing and carry their
+evidence.
+
+By `Events` a problem defines them, with changes of its equations and its own ends.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,9 @@
-"""The energy balance of a motion: the work of each load, what damping, frictions and impacts take,
-what is stored; averages over time, at Gauss's points of its steps; and the transmissibility that
-experimenters measure."""
+"""The energy balance of a motion: the work of each load, the losses in damping, frictions and
+impacts, and the stored energy.
+
+Averages over time, at Gauss's points of its steps, and the transmissibility that experimenters
+measure are here too.
+"""
 
 from __future__ import annotations
 

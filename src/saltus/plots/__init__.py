@@ -2,8 +2,9 @@
 `style`.
 
 Nothing here computes a motion, and nothing needs a display. A function for a whole result draws
-into `ax`, or, where it has several panels, into `figure`; without one it makes a figure of its own,
-and it returns the axes. A function for a part of a picture marks the axes that it is given first.
+into `ax`, or, where it has several panels, into `figure`. Without one it makes a figure of its own,
+and it returns the axes. A function for a part of a picture marks the axes that are its first
+argument.
 """
 
 from saltus._front_door import front_door

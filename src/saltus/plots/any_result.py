@@ -1,5 +1,8 @@
-"""One function that draws any result of saltus, by its kind; and pictures of experiments: an energy
-balance, the fit of a system to a measurement, and which loads overturn a block."""
+"""One function that draws any result of saltus, by its kind.
+
+Pictures of experiments are here: an energy balance, the fit of a system to a measurement, and which
+loads overturn a block.
+"""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 and read by measures.
 
 A branch (see `branch_tables.py`) has `parameter`, `stable`, `impact_count` and quantities such as
-`amplitude` over its points, the model's margins as `margin_...`, and the `kind` of its special
-points with their places.
+`amplitude` over its points. It also has the model's margins as `margin_...`, and the `kind` of its
+special points with their places.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""The look of all pictures: the paper's conventions, colours that are also distinct in grey and for
-the colour-blind, widths; and the names of coordinates and parameters on axes, whose units are those
-of the variables in a dataset.
+"""The look of all pictures: the paper's conventions, widths, and colours that are also distinct in
+grey and for the colour-blind.
+
+Coordinates and parameters have their names on axes here; their units come from the variables in a
+dataset.
 
 Stable is a solid blue line, unstable a dashed red one, a separatrix dashed grey, a limit of the
-mechanism dash-dotted green; no two of them share both a line style and a lightness. Along a branch
+mechanism dash-dotted green. No two of them share both a line style and a lightness. Along a branch
 such a line is heavy where the model holds, thin where an assumption of the model fails, and thin
 and pale beyond a limit of the mechanism.
 """

@@ -1,5 +1,8 @@
-"""One motion: its time history and its phase portrait; the derivatives of its end by its start and
-by parameters; an ensemble of motions, and a parameter swept up and down."""
+"""One motion: its time history, its phase portrait, and the derivatives of its end by its start and
+by parameters.
+
+An ensemble of motions, and a parameter swept up and down, are drawn here too.
+"""
 
 from __future__ import annotations
 

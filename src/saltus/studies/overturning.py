@@ -2,7 +2,7 @@
 the borders.
 
 A border is a curve of amplitude over frequency on which the motion, once the load is over, ends on
-an unstable equilibrium: on the one side it overturns, on the other one it comes back. Its equation
+an unstable equilibrium. On the one side it overturns, on the other one it comes back. Its equation
 is that the state lies on the stable manifold of this saddle.
 """
 

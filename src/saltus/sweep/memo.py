@@ -1,12 +1,12 @@
-"""What a search computes, each result once: in memory, or remembered in files that are named by a
-digest of what is computed.
+"""The results of a search, each computed once: in memory, or in files that are named by a digest of
+their inputs.
 
-What a search computes next depends on what it has found, so it has no plan; but its long
-computations are pure functions of values that JSON has, and of arrays. A search that was stopped
-runs again from its beginning and finds what it had; another search in the same store finds what
-both have in common. A file holds one chunk of results, as JSON and the bytes of arrays: reading it
-makes numbers and texts, and runs nothing. It is written beside its place and moved there, and ends
-with a checksum; one that is damaged, or was made by other equations, is computed again.
+A search has no plan, as its next step depends on its results so far. But its long computations are
+pure functions of values that JSON has, and of arrays. A search that was stopped runs again from its
+beginning and finds what it had; another search in the same store finds what both have in common. A
+file holds one chunk of results, as JSON and the bytes of arrays: reading it makes numbers and
+texts, and runs nothing. It is written beside its place and moved there, and ends with a checksum;
+one that is damaged, or was made by other equations, is computed again.
 """
 
 from __future__ import annotations

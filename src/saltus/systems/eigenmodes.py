@@ -1,17 +1,17 @@
 """The motion of a structure between its events in its eigenmodes, of which those that have died out
 limit no step.
 
-While a structure keeps its contacts and the sides of its surfaces, its state obeys x' = A x + B u,
-with the inputs u: the channels of the load, 1, and the positions at which contacts hold it. In A's
-eigenvectors each coordinate y has an equation of its own,
+While the contacts of a structure and the sides of its surfaces do not change, its state obeys x' =
+A x + B u. The inputs u are the channels of the load, 1, and the positions at which contacts hold
+it. In A's eigenvectors each coordinate y has an equation of its own,
 
     y' = lambda y + f(t).
 
-Its Taylor coefficients follow forwards from its value, y_(k+1) = (lambda y_k + f_k) / (k + 1), and
-limit the step to a few 1 / abs(lambda), however small y is, as what rounding leaves of it grows as
-fast in them. But one polynomial of the same degree n obeys the equation up to the power t^n, found
-backwards: y_k = ((k + 1) y_(k+1) - f_k) / lambda from y_n = -f_n / lambda. If the real part of
-lambda is negative, a solution differs from it by at most what it does at the start and the
+Its Taylor coefficients follow forwards from its value, y_(k+1) = (lambda y_k + f_k) / (k + 1). They
+limit the step to a few 1 / abs(lambda), however small y is, as the rounding error of y grows as
+fast in them. But one polynomial of the same degree n obeys the equation up to the power t^n. It is
+computed backwards: y_k = ((k + 1) y_(k+1) - f_k) / lambda from y_n = -f_n / lambda. If the real
+part of lambda is negative, a solution differs from it by at most what it does at the start and the
 polynomial's last term. So a mode whose value is that of its polynomial to within the error that a
 step may make is followed on it.
 

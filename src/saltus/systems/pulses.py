@@ -1,6 +1,6 @@
 """The shapes of pulses, loads that begin and end.
 
-A pulse is not smooth where it begins and where it ends: these two instants are breakpoints of the
+A pulse is not smooth where it begins and where it ends. These two instants are breakpoints of the
 motion, as the samples of a record are, so that no step of an integration crosses them. In an
 ensemble each motion has its own breakpoints.
 """

@@ -1,9 +1,9 @@
 """Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a
 sum, or a pulse (whose shapes are in `pulses.py`).
 
-A signal gives its value or its first or second derivative at a time `t`: a number, an array, or the
-symbolic time with which a model is traced (an object with the methods `phase`, `record` and
-`pulse`).
+A signal returns its value or its first or second derivative at a time `t`. This is a number, an
+array, or the symbolic time with which a model is traced (an object with the methods `phase`,
+`record` and `pulse`).
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ that it states.
 Under constant loads: energies, equilibria and divergence, small vibrations and their decay, the
 piecewise-linear motion impact by impact, and the two peaks of conservative motion. Beyond them: the
 quasi-static borders, the onset at high frequency, the restitution of inelastic contact, the rocking
-block's periods, the upright pendulum, and the periodic orbits of the impact oscillator with their
-folds, period doublings and grazings. Nothing here integrates an equation of motion; arguments
+block's periods and the upright pendulum. The periodic orbits of the impact oscillator come with
+their folds, period doublings and grazings. Nothing here integrates an equation of motion; arguments
 outside the range of a formula are refused with a ParameterError.
 """
 

@@ -1,6 +1,9 @@
 """One open layer under constant loads, as a one-sided oscillator: the basis of the closed forms
-here; its energies, and the amplitudes beyond which a motion is no longer one of the real
-mechanism."""
+here.
+
+Here are its energies, and the amplitudes beyond which a motion is no longer one of the real
+mechanism.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""Small free vibrations under a constant vertical load: frequencies, period, decay by impacts; the
-upright cell, and the onset of the motion under a fast horizontal load, a closed form that the paper
-lacks (errata 28)."""
+"""Small free vibrations under a constant vertical load: frequencies, period, decay by impacts.
+
+The upright cell is here too, and the onset of the motion under a fast horizontal load, a closed
+form that the paper lacks (errata 28).
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Which values each number of a system may have, and the sentences with which Python refuses
 others: asked of Python itself.
 
-A page has no checks of its own: for every number the ends of what `System.with_` takes are found by
-trying, and the sentences of the refusals are kept with marks in the places of the numbers.
+A page has no checks of its own. For every number the ends of the range that `System.with_` takes
+are found by trying. The sentences of the refusals are stored with marks in the places of the
+numbers.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 memory of the page's engine.
 
 All of it is read from the model's own declaration and from the types with which the kernels are
-compiled, so that a user's own model has a page without a line of JavaScript.
+compiled. So a user's own model has a page without a line of JavaScript.
 """
 
 from __future__ import annotations

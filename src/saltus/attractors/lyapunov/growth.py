@@ -1,11 +1,12 @@
-"""The growth of small perturbations of many motions, and the largest exponents of groups of these,
-for the judge of chaos; and averages along a motion, each the mean of a correlated series with its
-error.
+"""The growth of small perturbations of many motions, and the largest exponents of groups of
+motions, for the judge of chaos.
+
+Averages along a motion are here too, each the mean of a correlated series with its error.
 
 Perturbations grow by derivatives (`Stretching`) or, with several contacts, as the distance of two
-motions (`Neighbours`). The derivative of a motion with several contacts must be carried through
-every event by the scalar kernel, with a column for each state variable; two motions are followed in
-lanes, also through accumulations of impacts, which is faster.
+motions (`Neighbours`). With several contacts the scalar kernel would have to carry the derivative
+through every event, with a column for each state variable. Two motions are followed in lanes, also
+through accumulations of impacts, which is faster.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""What Python and the scalar kernels share of one motion: the kernel's state, from the start to the
-end, and the records that it fills: all steps of the motion, the states at given times, or its
-events alone."""
+"""Python and the scalar kernels share the kernel's state of one motion, from the start to the end.
+
+They also share the records that the kernel fills: all steps of the motion, the states at given
+times, or its events alone.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
-"""A branch of periodic orbits along one parameter: its points, its special points and why it ends;
-the dataset that keeps it without loss, and its orbits read back from that."""
+"""A branch of periodic orbits along one parameter: its points, its special points and why it ends.
+
+Its dataset stores it without loss, and its orbits are read back from there.
+"""
 
 from __future__ import annotations
 

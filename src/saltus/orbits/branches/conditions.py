@@ -1,6 +1,7 @@
 """The additional equation that holds at special orbits only, along curves in two parameters, and
-its derivatives; and the points of codimension two along these curves, at which a second condition
-holds.
+its derivatives.
+
+At the points of codimension two along these curves a second condition holds.
 
 With the orbit's equations F(y, p) = 0 (`equations/`; J is the matrix of their derivatives to the
 unknowns y) it is one of
@@ -10,8 +11,8 @@ unknowns y) it is one of
 Period doubling PD, and symmetry breaking BPC over half a period, have the equation of LP with the J
 of perturbations that change their sign each (half) period. b and c are fixed near the null vectors
 of J; then dg = -d^T (dJ) u, where d solves the transposed system. Central differences along u give
-(dJ) u: of motions that begin at y + s u and end a period later at y + s u or, for PD and BPC, at y
-- s u.
+(dJ) u. Their motions begin at y + s u and end a period later at y + s u or, for PD and BPC, at y -
+s u.
 """
 
 from __future__ import annotations

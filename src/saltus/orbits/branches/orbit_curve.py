@@ -1,5 +1,8 @@
 """The curve of the orbits of one signature along parameters, as a problem of the room
-`continuation`, and its test functions, each of which vanishes at one kind of special point."""
+`continuation`.
+
+Each of its test functions vanishes at one kind of special point.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 """Conditions of special orbits that are a quantity of the orbit alone, with derivatives by central
-differences: a gap, a speed or a reaction of an orbit with several contacts, and the modulus of a
+differences.
+
+They are a gap, a speed or a reaction of an orbit with several contacts, and the modulus of a
 complex pair of multipliers.
 """
 

@@ -3,10 +3,10 @@
 Its events are impacts of single contacts and releases. The unknowns are the state just after the
 first event, without the coordinates that contacts then hold, and the phase of every event. The
 equations say that each event's guard (the gap of an impact, the reaction of a release) is 0 at its
-phase, and that the state after the first event of the next period is the one of the start. Between
-events the signature says which contacts are closed, whatever the signs of gaps and reactions. An
-orbit without events has the free coordinates and velocities at phase 0 as its unknowns. A symmetric
-orbit is closed after half a period by its mirror image.
+phase. They also say that the state after the first event of the next period equals the start.
+Between events the signature says which contacts are closed, whatever the signs of gaps and
+reactions. An orbit without events has the free coordinates and velocities at phase 0 as its
+unknowns. A symmetric orbit is closed after half a period by its mirror image.
 """
 
 from __future__ import annotations

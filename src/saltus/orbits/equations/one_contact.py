@@ -3,8 +3,8 @@ docs/method.md).
 
 The unknowns of an orbit with impacts are, for each impact i, its phase phi_i = Omega t_i and the
 speed v_i at which the gap closes. Segment i is the smooth motion on its side from impact i, with
-the velocity that the reset gives, to impact i+1, whatever the sign of the gap w between them; the
-last segment ends with the first impact of the next period. The equations of each segment are
+the velocity after the reset, to impact i+1, whatever the sign of the gap w between them. The last
+segment ends with the first impact of the next period. The equations of each segment are
 
     w(t_{i+1}) / (t_{i+1} - t_i) = 0,        -w'(t_{i+1}) - v_{i+1} = 0,
 

@@ -2,9 +2,9 @@
 impacts, or with dry friction.
 
 The unknowns are the state at a section, a phase of the load at which no event happens. The motion
-Phi has whatever events it has, and its derivatives are those of `sensitivities`, in which an
-accumulation of impacts is a single map with the derivatives of its end. Derivatives to coordinates
-that contacts hold at the section are 0, and so are those to the speed of a sticking coordinate.
+Phi may have any events. Its derivatives come from `sensitivities`, in which an accumulation of
+impacts is a single map with the derivatives of its end. Derivatives to coordinates that contacts
+hold at the section are 0, and so are those to the speed of a sticking coordinate.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Numbers are hexadecimal doubles, so that nothing is lost.
 An expression is a tape: a list of nodes [operation, operands...], each operand the number of an
 earlier node, and the numbers of the roots.
 A program that knows nothing of saltus can thus enclose the motion by itself and check that the
-operator of Krawczyk maps the box into its interior; `docs/check_certificate.py` does so in the
-ball arithmetic of FLINT.
+operator of Krawczyk maps the box into its interior. `docs/check_certificate.py` does so in the ball
+arithmetic of FLINT.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The exact borders of a stability chart: where its motions are born or lose their stability.
 
 If a cell has a motion that its neighbour lacks, simulation between the two cells shows what becomes
-of the motion. At the ends of motions on the longest borders, which are taken as points of one
-border where similar ones lie beside one another, the orbits are solved for, and their special
-points are followed as curves through the plane. Motions to which a neighbour's motion leads, but no
-initial state, are added to their cells.
+of the motion. Ends of motions that are similar and lie beside one another count as points of one
+border. On the longest borders the orbits are solved for, and their special points are followed as
+curves through the plane. Motions to which a neighbour's motion leads, but no initial state, are
+added to their cells.
 """
 
 from __future__ import annotations

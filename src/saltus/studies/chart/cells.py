@@ -2,7 +2,7 @@
 parameters.
 
 In every cell motions are followed from states spread over a window, then from the motions of its
-neighbours, until these add nothing new; motions that have not settled are judged.
+neighbours, until these add nothing new. Motions that have not settled are judged.
 """
 
 from __future__ import annotations

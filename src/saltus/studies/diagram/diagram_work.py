@@ -1,10 +1,10 @@
 """The long computations of a diagram's search, done in this process, or as parts that other
 processes compute and a store keeps.
 
-Each part is a pure function of its inputs, which are JSON: how motions end, the judgement of
-motions that have not settled, the branch of an orbit, and the distance of an orbit from itself
-after some of its periods. A search that runs again finds in its store what was computed before it
-was stopped.
+Each part is a pure function of its inputs, which are JSON. The parts are how motions end, the
+judgement of motions that have not settled, the branch of an orbit, and the distance of an orbit
+from itself after some of its periods. A search that runs again finds in its store what was computed
+before it was stopped.
 """
 
 from __future__ import annotations
