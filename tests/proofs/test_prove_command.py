@@ -116,3 +116,11 @@ def test_special_points_carry_their_proofs() -> None:
 def test_a_load_without_a_frequency_is_refused() -> None:
     with pytest.raises(saltus.ParameterError, match="frequency"):
         prove_orbit_of(saltus.System(model=saltus.WallOscillator()), x=0.0)
+
+
+def test_a_branch_without_special_points_is_drawn(run, tmp_path: Path) -> None:
+    """Between 1.1 and 1.2 the ball's orbit neither folds nor doubles."""
+    run(TABLE + ALONG.replace("[1.0, 1.25]", "[1.15, 1.25]"))
+    data = saltus.load(tmp_path / "out" / "prove.nc")
+    assert data.sizes["special"] == 0
+    assert (tmp_path / "out" / "prove.png").is_file()

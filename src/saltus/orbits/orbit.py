@@ -235,7 +235,10 @@ class PeriodicOrbit(Result):
 
     @property
     def rest_share(self) -> float:
-        """The share of its period for which it rests at a contact."""
+        """The share of its period for which it rests at a contact, of several at one at least."""
+        if not self.releases.size:  # it rests all the time, or never
+            closed = [event.closed for event in self.signature.events] or [self.signature.closed]
+            return float(all(closed))
         return float(self.rest_durations.sum() / self.duration)
 
     @property

@@ -254,7 +254,7 @@ def draw_fit(
 
 def draw_theorems(dataset: Any, **options: Any) -> Any:
     """Draw the answer of a study's [prove]: a branch, or an orbit; returns the axes."""
-    return (draw_branch if "special_proved" in dataset else draw_proof)(dataset, **options)
+    return (draw_branch if "box" in dataset.dims else draw_proof)(dataset, **options)
 
 
 DRAWINGS: dict[str, Callable[..., Any]] = {

@@ -54,7 +54,7 @@ from saltus.orbits.equations.contract import (
     Witness,
 )
 from saltus.orbits.equations.event_sequence import STAYS, contact_blocks, read_signature
-from saltus.orbits.equations.sampled_motion import ONE_INSTANT
+from saltus.orbits.equations.sampled_motion import ONE_INSTANT, excursions
 from saltus.orbits.proofs.contact_segments import contact_segments
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
@@ -293,6 +293,16 @@ class ContactsEquations(OrbitEquations):
         chosen = np.array([event.is_impact for event in self.signature.events], dtype=bool)
         speeds = -np.roll(solution.evaluation.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
         return self.split(solution.unknowns)[1][chosen], speeds[chosen]
+
+    def rests(self, solution: Solution) -> np.ndarray:
+        resting = [event.closed != 0 for event in self.signature.events]
+        times = self.split(solution.unknowns)[1] / self.frequency(solution.values)
+        period = self.closing / self.frequency(solution.values)
+        if self.signature.symmetric:  # the images of the events follow half a period later
+            resting = resting + resting
+            times = np.append(times, times + period)
+            period = 2.0 * period
+        return np.array(excursions(times.tolist(), resting, period)).reshape(-1, 2)
 
     def touching_speed(self, solution: Solution) -> float:
         rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (

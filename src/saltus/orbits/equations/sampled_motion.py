@@ -266,7 +266,8 @@ class ContactModes(SideModes):
     def rests(
         self, events: Sequence[Any], times: Sequence[float], period: float
     ) -> list[tuple[float, float]]:
-        return []
+        resting = [any(closed.item() for closed in self.closed(np.array(e.mode))) for e in events]
+        return excursions(times, resting, period)
 
     def gaps(self, side: np.ndarray, smooth: frozenset[int] = frozenset()) -> list[GapAlong]:
         names = self.system.model.coordinates
@@ -312,6 +313,22 @@ class ContactModes(SideModes):
                 (direction == 0) & ~np.any([*leans, np.zeros_like(direction, dtype=bool)], axis=0)
             ] * 2
         return [(closed, reactions), (sticks, stick_margins)]
+
+
+def excursions(
+    times: Sequence[float], resting: Sequence[bool], period: float
+) -> list[tuple[float, float]]:
+    """When a periodic motion leaves rest and when it comes to rest again, from the times of its
+    events and whether a contact is closed after each.
+    """
+    count = len(times)
+    pairs = []
+    for i in range(count):
+        if resting[i] or not resting[i - 1]:
+            continue
+        end = next(j for j in range(i + 1, i + count + 1) if resting[j % count])
+        pairs.append((times[i], times[end % count] + period * (end >= count)))
+    return pairs
 
 
 def modes_in(system: System) -> SideModes:

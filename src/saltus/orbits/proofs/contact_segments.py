@@ -85,7 +85,9 @@ def _refused(traced: Trace, signature: Signature) -> str | None:
     """Why an orbit cannot be enclosed; None if it can."""
     if traced.records:
         return "a load with a record or a pulse is not periodic"
-    if traced.modes is not None or traced.dof > MOST_COORDINATES:
+    if traced.modes is not None:
+        return "structures, which move in modal coordinates, are not enclosed yet"
+    if traced.dof > MOST_COORDINATES:
         return f"models of more than {MOST_COORDINATES} coordinates are not enclosed yet"
     if traced.first_order or traced.dependent:
         return "coordinates of first order and dependent gaps are not enclosed yet"
