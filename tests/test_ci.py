@@ -48,11 +48,6 @@ def test_what_a_machine_cannot_run_is_said(capfd):
     assert "Not possible on this machine: js" in capfd.readouterr().out
 
 
-def test_a_step_that_is_known_to_fail_is_named_with_its_reason(capfd):
-    assert ci.run_all([step("odd", "false", known="one test hangs on rounding")]) == 0
-    assert "Known to fail: odd, as one test hangs on rounding" in capfd.readouterr().out
-
-
 @pytest.mark.parametrize("name", ["avx2", "sse"])
 def test_commits_take_both_processors_and_all_shares_in_turn(name):
     tables = [ci.steps(number) for number in range(2 * ci.SHARES)]

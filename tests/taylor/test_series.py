@@ -88,7 +88,7 @@ class Many(Model):
 
 def with_abs(q, v, f):
     """abs, which may be taken of the coordinate of a contact only."""
-    return abs(q) * 2 + np.abs(q) * v + np.sin(abs(q) + 1.3) + np.absolute(q) ** 1.5 + f
+    return abs(q) * 2 + np.abs(q) * v + np.sin(abs(q) + 1.3) + (np.absolute(q) + 0.4) ** 1.5 + f
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -252,9 +252,9 @@ def draw_fit(
     return ax
 
 
-def draw_theorems(dataset: Any, **options: Any) -> Any:
+def draw_theorems(dataset: Any, *, ax: Axes | None = None, **options: Any) -> Any:
     """Draw the answer of a study's [prove]: a branch, or an orbit; returns the axes."""
-    return (draw_branch if "box" in dataset.dims else draw_proof)(dataset, **options)
+    return (draw_branch if "box" in dataset.dims else draw_proof)(dataset, ax=ax, **options)
 
 
 DRAWINGS: dict[str, Callable[..., Any]] = {
