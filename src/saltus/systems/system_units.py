@@ -297,6 +297,8 @@ def _held_away(
     # the mean of both sides, so that a mirror image has the same
     slopes = np.mean(_slopes_beside(model, place, load), axis=0)
     left, sizes, right = np.linalg.svd(slopes)
+    # bodies that nothing holds have a stiffness of rounding, which would put them infinitely far away
+    sizes = np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, 0.0)
     shares = np.maximum(sizes, rate**2)
     moved = np.array(pushes) @ left
     moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right

@@ -164,6 +164,9 @@ TINY = 1e-60  # a speed that stands for the limit 0, and whose square is still a
 # end of an accumulation is not looked for (`slow_share`), so that impacts are seen where nothing
 # changes their pull.
 SLOW = 3.0
+# Not below this share, that of the tolerance 1e-10: bounces that are smaller by far than the rounding
+# of where bodies are would be followed, and their order with those of other bodies is lost.
+LEAST_SHARE = 3e-5
 LEAST_LOSS = 0.05  # The lost share counts as no smaller than this.
 LOSSLESS = 1e-12  # A smaller loss of speed over two impacts is rounding.
 # In natural speeds. Here the averaged law has an error of 2e-5 of the speed if the pulls of both

@@ -14,6 +14,7 @@ from saltus.flow.kernel.layout import (
     DEFECT,
     GAP,
     INSTANT,
+    LEAST_SHARE,
     PENETRATED,
     ROUGHER,
     SAFETY,
@@ -339,7 +340,7 @@ def slow_share(motion):
 
     It has no unit, and what does not act on the impacts does not change it.
     """
-    return SLOW * math.sqrt(motion.tolerance)
+    return max(SLOW * math.sqrt(motion.tolerance), LEAST_SHARE)
 
 
 @lean_jit
@@ -366,7 +367,9 @@ def change_rate(a):
 def shortest_step(motion):
     """The step below which the acceleration counts as singular."""
     scale = time_scale(motion)
-    return SHORTEST * (scale if scale > 0.0 else motion_end(motion))
+    # an impact without a pull but for rounding takes for ever to fall
+    end = motion_end(motion)
+    return SHORTEST * (min(scale, end) if scale > 0.0 else end)
 
 
 @lean_jit

@@ -19,6 +19,7 @@ from saltus.flow.contacts.layout import FrictionColumn, solver_arrays
 from saltus.flow.kernel.compiled import Program, taylor_order
 from saltus.flow.kernel.layout import (
     CHATTER_SPEED,
+    LEAST_SHARE,
     ROUGHER,
     SERIES_LENGTH,
     SLOW,
@@ -386,7 +387,7 @@ class Lanes:
 
     def _settings(self) -> LaneSettings:
         order = lane_order(self.tol)
-        slowest = SLOW * math.sqrt(self.tol)
+        slowest = max(SLOW * math.sqrt(self.tol), LEAST_SHARE)
         if not self.program.structure.several:  # impacts of one contact may lose nothing
             slowest = max(slowest, CHATTER_SPEED)
         limits = step_limits(order, self.tol), step_limits(order, ROUGHER * self.tol)
