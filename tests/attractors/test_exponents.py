@@ -107,14 +107,17 @@ def test_on_an_orbit_they_are_the_logarithms_of_its_multipliers():
 def test_in_chaos_they_add_up_to_minus_the_damping_and_the_map_has_the_same_largest_one(
     frequency, amplitude
 ):
-    found = lyapunov_spectrum(forced(amplitude, frequency), theta=0.3, periods=200, transient=100)
+    """Both are means over a chaotic motion, and bars are about two standard errors: they differ by
+    two bars for one motion of ten thousand. Over 200 periods bars alone are a third of an exponent.
+    """
+    found = lyapunov_spectrum(forced(amplitude, frequency), theta=0.3, periods=1600, transient=100)
     assert found.values.sum() == pytest.approx(-0.1, abs=1e-8)
     assert found.sum_defect < 1e-8
     assert found.largest_condition < 1e6
     assert found.positive
-    assert found.agrees
-    # and the bars are not endless
-    assert abs(found.stroboscopic - found.values[0]) < 0.25 * found.values[0]
+    bar = math.hypot(found.errors[0], found.stroboscopic_error)
+    assert abs(found.stroboscopic - found.values[0]) < 2.0 * bar
+    assert bar < 0.25 * found.values[0]  # bars are not endless
 
 
 def test_with_unequal_layers_and_losses_they_add_up_to_the_mean_divergence():

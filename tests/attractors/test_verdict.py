@@ -195,15 +195,16 @@ def test_given_time_a_transient_is_followed_to_its_end():
 
 
 def test_a_motion_that_settles_while_its_exponents_are_taken_is_periodic_after_all():
-    """Motions of a mean life of a thousand periods in chaos, given 600 to settle; one of three at
-    least does it later.
+    """Motions of a mean life of a thousand periods in chaos, given 600 to settle. Of a dozen or more
+    that last longer, at least one does it while exponents are taken; which one, hangs on rounding.
     """
     system = forced(7.2, 4.0)
     starts, late, _ = settled_late(system, 64, 2000)
     verdicts = [
         classify(system, theta=starts[i, 0], velocity=starts[i, 1], periods=600, transient=0)
-        for i in np.flatnonzero(late > 700)[:3]
+        for i in np.flatnonzero(late > 700)
     ]
+    assert len(verdicts) >= 12
     assert {str(verdict.kind) for verdict in verdicts} <= {"periodic", "undecided"}
     after_all = [verdict for verdict in verdicts if str(verdict.kind) == "periodic"]
     assert after_all
