@@ -184,3 +184,26 @@ def test_a_search_beside_a_wall_asks_for_no_state_beyond_it(wall, frequency):
     assert any(orbit.stable for orbit in found.orbits)
     assert not all(orbit.stable for orbit in found.orbits)
     assert max(saltus.orbits.defects(list(found.orbits))) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("length", "rate"), [(1.0, 1e6), (1e6, 1e6), (1e-9, 1e6), (1e6, 1e-6), (1e-9, 1e-6)]
+)
+def test_a_branch_has_the_same_special_points_in_all_units(length, rate):
+    """Lengths in `length`, and times in 1 / `rate`: powers of ten change rounding alone."""
+
+    @cache
+    def special(length, rate):
+        system = saltus.System(
+            model=saltus.WallOscillator(stiffness=rate**2, damping=0.1 * rate, wall=length),
+            load=saltus.Load(
+                frequency=1.2 * rate, force=saltus.Harmonic(amplitude=0.5 * length * rate**2)
+            ),
+            impact=saltus.VelocityReduction(0.8),
+        )
+        orbit = saltus.find_orbit(system, x=0.0)
+        branch = saltus.continue_orbit(orbit, "load.frequency", (0.6 * rate, 3.0 * rate))
+        return {(str(point.kind), round(point.parameter / rate, 8)) for point in branch.special}
+
+    assert special(length, rate) == special(1.0, 1.0)
+    assert len(special(1.0, 1.0)) == 4

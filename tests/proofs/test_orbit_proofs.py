@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import runpy
 from dataclasses import replace
 from pathlib import Path
@@ -166,6 +167,24 @@ def test_a_theorem_holds_within_radii_of_the_numbers(
     assert (distance <= wide.impact_times[:, 1]).all()
 
 
+def test_radii_are_told_no_larger_than_they_were_proved(
+    metainterface: saltus.PeriodicOrbit,
+) -> None:
+    """The mean of the vertical load is its own image, so the mirror symmetry holds for all."""
+    radius = 1.99e-7
+    proof = saltus.prove(metainterface, radii={"load.vertical": radius})
+    assert proof.proved
+    told = proof.statement.rpartition("load.vertical within ")[2].split()[0]
+    assert mp.mpf("0.99") * radius < mp.mpf(told) <= mp.mpf(radius)
+
+
+def test_a_proof_can_be_pickled(metainterface: saltus.PeriodicOrbit) -> None:
+    proof = saltus.prove(metainterface)
+    copied = pickle.loads(pickle.dumps(proof))
+    assert copied.statement == proof.statement
+    assert copied.check()
+
+
 def test_an_orbit_that_was_moved_is_refuted(metainterface: saltus.PeriodicOrbit) -> None:
     unknowns = metainterface.solution.unknowns + 1e-9
     moved = PeriodicOrbit(
@@ -283,7 +302,11 @@ def test_what_cannot_be_proved_says_why() -> None:
     [
         ({"radii": {"model.dampin": 1e-3}}, "no number of the system"),
         ({"radii": {"model.damping": -1.0}}, "must lie in"),
+        ({"radii": {"load.horizontal.mean": 1e-9}}, "orbit is symmetric, and with another load"),
+        ({"radii": {"load.horizontal.order": 1e-9}}, "is a whole number"),
         ({"step": 0.0}, "step must lie in"),
+        ({"step": 1e-300}, "step must be at least"),
+        ({"step": 1e-3}, "step must be at least"),
         ({"order": 2}, "order"),
     ],
 )

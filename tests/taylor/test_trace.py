@@ -4,12 +4,12 @@ part of a structure.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from saltus import OneContactModel
+from saltus import Contact, ContactModel, NewtonImpact, OneContactModel
 from saltus.checks import LIMITS
 from saltus.errors import ParameterError, TraceError
 from saltus.systems import (
@@ -187,6 +187,44 @@ def test_what_has_no_taylor_series_is_refused_by_name(formula, sentence):
     with pytest.raises(TraceError) as refusal:
         traced(formula)
     assert sentence in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        lambda t, x, v, s, load: x if x == 1 else 0.0,
+        lambda t, x, v, s, load: x if x != 1 else 0.0,
+        lambda t, x, v, s, load: x if x == v else 0.0,
+        lambda t, x, v, s, load: x if x in (1, 2) else 0.0,
+        lambda t, x, v, s, load: {1: 4.0}.get(x, 1.0),
+        lambda t, x, v, s, load: 4.0 if x in {1, 2} else 1.0,
+        lambda t, x, v, s, load: np.where(x == 1, 4.0, 1.0),
+        lambda t, x, v, s, load: 3.0 * (x == 1),
+    ],
+)
+def test_comparing_a_symbol_is_refused(formula):
+    with pytest.raises(TraceError, match="may not compare its state or numbers, or look them up"):
+        traced(formula)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ByKind(ContactModel):
+    kind: int = 1
+    coordinates: ClassVar[tuple] = ("x",)
+    channels: ClassVar[tuple] = ("force",)
+
+    @property
+    def contacts(self):
+        return (Contact(name="low", coordinate="x", position=-10.0),)
+
+    def force(self, t, x, v, load):
+        return -{1: 4.0}.get(self.kind, 1.0) * x
+
+
+def test_a_number_that_chooses_the_force_of_a_contact_model_is_refused():
+    load = Load(frequency=1.0, force=Harmonic(0.0))
+    with pytest.raises(TraceError, match="may not compare its state or numbers, or look them up"):
+        System(model=ByKind(), load=load, impact=NewtonImpact(e=0.5))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,9 @@ computed twice.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -54,6 +56,10 @@ FRICTION = (
     " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and quadratic"
     " drag as -v * sqrt(v**2 + w**2) with a small w"
 )
+COMPARISON = (
+    "a traced model may not compare its state or numbers, or look them up (==, !=, in, a dict, a"
+    " set): they are symbols; what chooses between equations is a ClassVar, or two classes of model"
+)
 # NumPy's names, and ours
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
 _AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)
@@ -62,6 +68,26 @@ UFUNCS = (
     | {name: name for name in _AS_THEY_ARE}
     | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
 )
+
+
+class _UsersCode(threading.local):
+    """Whether a user's code runs in this thread, which may not compare symbols."""
+
+    runs = False
+
+
+_USERS_CODE = _UsersCode()
+
+
+@contextmanager
+def comparing_symbols(refused: bool) -> Iterator[None]:
+    """Refuse to compare symbols and to use them as keys, as in a user's code, or allow it."""
+    before = _USERS_CODE.runs
+    _USERS_CODE.runs = refused
+    try:
+        yield
+    finally:
+        _USERS_CODE.runs = before
 
 
 class Expr:
@@ -91,6 +117,9 @@ class Expr:
             # another thread may have made it in the meantime
             node = cls._shared.setdefault(key, node)
         return node
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Expr, (self.op, self.args, self.value)
 
     def __add__(self, other: Any) -> Expr:
         return combine("add", self, other)
@@ -147,6 +176,17 @@ class Expr:
 
     def __le__(self, other: Any) -> Expr:
         return combine("less_equal", self, other)
+
+    def __eq__(self, other: object) -> bool:
+        if self is not other and _USERS_CODE.runs:
+            raise TraceError(COMPARISON)
+        return self is other
+
+    def __hash__(self) -> int:
+        # a dict or set finds a number by its hash and never asks whether it is equal
+        if _USERS_CODE.runs:
+            raise TraceError(COMPARISON)
+        return id(self) >> 4
 
     def __bool__(self) -> bool:
         hint = FRICTION if uses_velocity(self) else "use `side`"

@@ -31,6 +31,7 @@ from saltus.taylor.graph import (
     as_expr,
     check_size,
     combine,
+    comparing_symbols,
     differentiate,
     number,
     ordered,
@@ -323,7 +324,7 @@ def trace(
     accelerations = (
         _trace_contacts(result, twin, t, q, v)
         if several
-        else ask(model, "acceleration", t, q, v, side, load)
+        else ask_user(model, "acceleration", t, q, v, side, load)
     )
     if (
         dof > 1
@@ -342,7 +343,7 @@ def trace(
     _trace_margins(result, twin, t, q, v, side, stop_at)
     if energy:
         result.margins["kinetic_energy"] = combine(
-            "add", ask(model, "kinetic_energy", t, q, v, side, load), 0.0
+            "add", ask_user(model, "kinetic_energy", t, q, v, side, load), 0.0
         )
     _check(result)
     if paths is not None:
@@ -404,14 +405,15 @@ def _trace_contact(
             "a model with sides must have one coordinate; give it `sides = ()` and stop at margins"
             " instead"
         )
-    result.gap = combine("add", ask(model, "gap", q[0], side), 0.0)
-    result.contact = combine("add", model.contact, 0.0)
+    result.gap = combine("add", ask_user(model, "gap", q[0], side), 0.0)
+    with comparing_symbols(refused=True):
+        result.contact = combine("add", model.contact, 0.0)
     at_contact: dict[Expr, Any] = {q[0]: result.contact, v[0]: 0.0}
     _check_gap(result.gap, q[0], type(model).__name__)
     result.gap_rate = substitute(differentiate(result.gap, q[0]), at_contact)
     result.contact_acceleration = result.gap_rate * substitute(result.acceleration[0], at_contact)
     result.contact_damping = -substitute(differentiate(result.acceleration[0], v[0]), at_contact)
-    next_side, after = ask(model, "reset", t, v[0], side, load, twin.impact)
+    next_side, after = ask_user(model, "reset", t, v[0], side, load, twin.impact)
     result.next_side = combine("add", next_side, 0.0)
     result.velocity_after = combine("add", after, 0.0)
     _check_next_side(result.next_side, twin.one_contact.sides, type(model).__name__)
@@ -455,6 +457,13 @@ def _known_number(expression: Expr) -> float | Fraction | None:
         return None
 
 
+@comparing_symbols(refused=True)
+def ask_user(model: Any, method: str, *arguments: Any) -> Any:
+    """Call a model's method with symbols, which it may not compare."""
+    return ask(model, method, *arguments)
+
+
+@comparing_symbols(refused=True)
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
     model = twin.contact_model
@@ -504,7 +513,9 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     ]
     result.positions = [combine("add", contact.position, 0.0) for contact in contacts]
     afters = [
-        ask(model, "after_impact", contact.name, q, v) for contact in contacts if result.first_order
+        ask_user(model, "after_impact", contact.name, q, v)
+        for contact in contacts
+        if result.first_order
     ]
     result.jumps = [
         combine("add", x, 0.0)
@@ -523,12 +534,17 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     return found
 
 
+@comparing_symbols(refused=True)
 def _trace_margins(
     result: Trace, twin: Any, t: LoadTime, q: Any, v: Any, side: Expr, stop_at: tuple[str, ...]
 ) -> None:
     a = tuple(Expr("acceleration", (), i) for i in range(result.dof))
     margins = (
-        dict(ask(twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load))
+        dict(
+            ask_user(
+                twin.model, "margins", t, q, v, a[0] if result.dof == 1 else a, side, twin.load
+            )
+        )
         if stop_at
         else {}
     )

@@ -60,11 +60,13 @@ APPROACH = 2
 # all)
 BEFORE = 0
 ALONG = 1
-# A slower passage gets the tangent of one with this speed: near a grazing two passages cancel, with
-# a rounding of 1e-16 / speed.
+# A slower passage gets the tangent of one with this speed, as a share of the speed that the pull at
+# the contact gives in the natural time: near a grazing two passages cancel, with a rounding of
+# 1e-16 / speed.
 SLOWEST = 1e-9
 MOST_STEPS = 100_000  # of one segment
-# a segment's duration below which the derivatives of its quotient are those of its beginning
+# a segment's duration times the forcing frequency, below which the derivatives of its quotient are
+# those of its beginning
 SHORT = 1e-6
 
 
@@ -227,7 +229,9 @@ def pass_contact(motion, t, side):
     if not inward * velocity > 0.0:
         set_state(motion, motion.geometry[Geometry.CONTACT], velocity)
         return side
-    motion.velocities[0] = inward * max(inward * velocity, SLOWEST)
+    pull = abs(motion.acceleration_series[0, 0])
+    slowest = SLOWEST * pull * motion.natural_time
+    motion.velocities[0] = inward * max(inward * velocity, slowest)
     columns_at_event(motion, EventCode.IMPACT, 0, t, side)
     set_state(motion, motion.geometry[Geometry.CONTACT], velocity)
     return -side
@@ -386,7 +390,7 @@ def impact_equations(request, followed, equations):
         duration = end - begin
         pull = 0.5 * ends[i, SegmentValue.FIRST_STATE + 5]
         column = columns[i]
-        short = abs(duration) < SHORT
+        short = abs(duration) * frequency < SHORT
         residual[i, 0], residual[i, 1] = sign * quotient, -sign * velocity - speeds[i]
         by_speed = column[2 + 1, 0] if short else column[0, 0] / duration
         by_start = (

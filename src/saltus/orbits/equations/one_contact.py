@@ -139,12 +139,12 @@ class OneContactEquations(OrbitEquations):
 
     @cached_property
     def units(self) -> Units:
-        """Phases and speeds of impacts; gaps and speeds at their ends."""
+        """Phases and speeds of impacts; at their ends gaps over durations, and speeds."""
         count = len(self.signature.sides)
         if not count:
             return super().units
-        length, speed = self.natural.state
-        return Units(np.tile([1.0, speed], count), np.tile([length, speed], count), self.is_phase)
+        _, speed = self.natural.state
+        return Units(np.tile([1.0, speed], count), np.full(2 * count, speed), self.is_phase)
 
     @cached_property
     def is_phase(self) -> np.ndarray:

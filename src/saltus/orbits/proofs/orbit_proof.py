@@ -163,7 +163,7 @@ class OrbitProof(Result):
         ]
         if self.radii:
             radii = ", ".join(
-                f"{name} within {rounded_up(radius)}" for name, radius in self.radii.items()
+                f"{name} within {rounded_down(radius)}" for name, radius in self.radii.items()
             )
             told.append(f"This holds for every {radii} of its double.")
         return " ".join(part for part in told if part)

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import overload
 
-from saltus.bounds import ShootingSettings
+from saltus.bounds import ShootingSettings, rounded_up
 from saltus.checks import check_count, check_number
-from saltus.errors import ParameterError, near, shown
+from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.special_point import SpecialPoint
+from saltus.orbits.branches.symmetry import is_symmetric
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.branch_proof import BranchProof, prove_branch
 from saltus.orbits.proofs.orbit_proof import OrbitProof, prove_orbit
 from saltus.orbits.proofs.special_proof import SpecialProof, prove_special
 from saltus.progress import Progress, silent
-from saltus.systems import System, numbers
+from saltus.systems import Harmonic, System, natural_units, numbers
+
+# The equations of a proof are solved with dense matrices: more unknowns take minutes.
+MOST_UNKNOWNS = 4000
+# By so large a share each number is moved, to see whether the mirror symmetry holds without it.
+MOVED = 0.1
 
 
 @overload
@@ -103,7 +110,9 @@ def prove(
     Raises
     ------
     ParameterError
-        A result of another kind, a path that is no number of the system, a negative radius.
+        A result of another kind, a path that is no number of the system, a negative radius, a
+        radius on a whole number or, of a symmetric orbit, on a number that breaks the symmetry, a
+        step so short that the equations have too many unknowns.
 
     Examples
     --------
@@ -120,6 +129,9 @@ def prove(
     of gravitational billiards, whose flights are parabolas.
     """
     check_proof(_system_of(result), radii, step, order, most_boxes)
+    _check_mirror(result, radii or {})
+    if step is not None:
+        _check_step(result, float(step))
     default = ShootingSettings()
     settings = ShootingSettings(
         step=default.step if step is None else float(step),
@@ -134,12 +146,16 @@ def prove(
 
 
 def _system_of(result: PeriodicOrbit | SpecialPoint | Branch) -> System:
+    return _orbits_of(result)[0].system
+
+
+def _orbits_of(result: PeriodicOrbit | SpecialPoint | Branch) -> list[PeriodicOrbit]:
     if isinstance(result, PeriodicOrbit):
-        return result.system
+        return [result]
     if isinstance(result, SpecialPoint):
-        return result.orbit.system
+        return [result.orbit]
     if isinstance(result, Branch):
-        return result.points[0].orbit.system
+        return [point.orbit for point in result.points]
     raise ParameterError(
         "prove takes a PeriodicOrbit, as from find_orbit, a SpecialPoint or a Branch, got "
         f"{shown(result)}",
@@ -169,8 +185,76 @@ def check_proof(
                 f"radii.{name}",
             )
         check_number(f"radii.{name}", radius, at_least=0.0)
+        owner, _, last = name.rpartition(".")
+        if radius and last == "order" and isinstance(system.get(owner), Harmonic):
+            raise ParameterError(
+                f"{name} is a whole number, which has no values nearby; leave it out of radii",
+                f"radii.{name}",
+            )
     if step is not None:
         check_number("step", step, above=0.0)
     if order is not None:
         check_count("order", order, at_least=4)
     check_count("most_boxes", most_boxes, at_least=0)
+
+
+def _check_mirror(
+    result: PeriodicOrbit | SpecialPoint | Branch, radii: Mapping[str, float]
+) -> None:
+    """Refuse radii under which half a period of a symmetric orbit does not stand for the other."""
+    names = [name for name, radius in radii.items() if radius]
+    symmetric = [orbit for orbit in _orbits_of(result) if orbit.symmetric] if names else []
+    if not symmetric:
+        return
+    system = symmetric[0].system
+    for name in names:
+        if not _is_symmetric_without(system, [name]):
+            raise ParameterError(
+                f"the orbit is symmetric, and with another {name} the system was not shown to have"
+                f" its mirror symmetry; leave {name} out of radii",
+                f"radii.{name}",
+            )
+    if not _is_symmetric_without(system, names):
+        raise ParameterError(
+            "the orbit is symmetric, and with other values of all numbers of radii together the"
+            " system was not shown to have its mirror symmetry; leave some of them out",
+            "radii",
+        )
+
+
+def _is_symmetric_without(system: System, names: list[str]) -> bool:
+    """Whether the system has its mirror symmetry wherever some of its numbers are moved, one more
+    than the other; what is 0 is moved by a share of the largest number."""
+    values = dict(numbers(system))
+    largest = max(abs(float(value)) for value in values.values())
+    shown = False
+    for sign in (1.0, -1.0):
+        moved = {
+            name: float(values[name]) + sign * MOVED / (1 + i) * (abs(values[name]) or largest)
+            for i, name in enumerate(names)
+        }
+        try:
+            other = system.with_(moved)
+        except SaltusError:
+            continue  # no value of this number; the other direction may be one
+        if not is_symmetric(other):
+            return False
+        shown = True
+    return shown
+
+
+def _check_step(result: PeriodicOrbit | SpecialPoint | Branch, step: float) -> None:
+    """Refuse a step with which the equations have more than MOST_UNKNOWNS unknowns."""
+    for orbit in _orbits_of(result):
+        states = 2 * len(orbit.system.model.coordinates)
+        states *= 1 if isinstance(result, PeriodicOrbit) else 2  # with the kernel vector
+        length = orbit.signature.span * 2.0 * math.pi / orbit.frequency
+        # in units of `step`
+        length /= natural_units(orbit.system).own_time
+        if states * (length / step) > MOST_UNKNOWNS:
+            least = states * length / MOST_UNKNOWNS
+            raise ParameterError(
+                f"step must be at least {rounded_up(least)} here, as shorter ones would give the"
+                f" equations more than {MOST_UNKNOWNS} unknowns, got {step:g}",
+                "step",
+            )
