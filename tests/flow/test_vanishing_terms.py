@@ -58,3 +58,14 @@ def test_odd_oscillators_keep_their_energy_from_zero_at_every_tolerance(digits, 
     energy = motion.velocity**2 / 2 + linear * motion.x**2 / 2 + motion.x**degree / degree
     assert energy == pytest.approx(0.5, abs=30 * 10.0**-digits + 2e-14)
     assert math.isfinite(motion.x)
+
+
+@pytest.mark.parametrize("digits", [9, 12])
+@pytest.mark.parametrize(("power", "degree"), [("cubic", 4), ("quintic", 6)])
+def test_odd_oscillators_keep_their_energy_when_steps_begin_near_zero(power, degree, digits):
+    """There the other coefficients are small, and do not vanish."""
+    system = System(model=Odd(**{power: 1.0}))
+    for speed in [0.7 + 0.007 * i for i in range(100)]:
+        motion = simulate(system, x=0.0, velocity=speed, duration=20.0, tol=10.0**-digits)
+        energy = motion.velocity**2 / 2 + motion.x**degree / degree
+        assert energy == pytest.approx(speed**2 / 2, abs=30 * 10.0**-digits)

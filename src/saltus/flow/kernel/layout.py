@@ -138,6 +138,8 @@ SAFETY = 0.9
 # largest difference of the log radius of convergence by the last terms and by earlier ones: 0.6 for
 # a sine
 GAP = 0.65
+# the same from one pair of terms to the next, times the order: 2 for a sine
+PAIR_GAP = 3.0
 # The size of a state that is 0 and stays so, to which the error of a step is relative.
 SMALLEST = 1e-6
 # A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that

@@ -15,6 +15,7 @@ from saltus.flow.kernel.layout import (
     GAP,
     INSTANT,
     LEAST_SHARE,
+    PAIR_GAP,
     PENETRATED,
     ROUGHER,
     SAFETY,
@@ -141,8 +142,9 @@ def growth(coefficients, first, last, size):
 def grow_faster(coefficients, first, last, size, rate):
     """Whether `growth` exceeds a rate, found without the many logarithms of it."""
     factor = math.exp(rate)
+    lowest = size * math.exp(first * rate)
     for i in range(coefficients.shape[0]):
-        bound = size * math.exp(first * rate)
+        bound = lowest
         for k in range(first, last + 1):
             if abs(coefficients[i, k]) > bound:
                 return True
@@ -155,13 +157,18 @@ def step_size(coefficients, order, size, tol):
     """The step h at which the last two terms of the series are tol, relative to `size`.
 
     By symmetry both terms may be far too small: for x'' = -x^3 from x = 0 only every fourth
-    coefficient is not 0. The growth of the series is then taken from the upper half of the
-    coefficients.
+    coefficient is not 0, and near x = 0 the others are small. The growth of the series is then
+    taken from earlier coefficients: the pair before, the one before that, or the upper half.
     """
     at_end = growth(coefficients, order, order, size)
     before_end = growth(coefficients, order - 1, order - 1, size)
     step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
-    if grow_faster(coefficients, order // 2, order - 2, size, max(at_end, before_end) + GAP):
+    largest = max(at_end, before_end)
+    for pair in range(1, 3):
+        k = order - 2 * pair
+        if grow_faster(coefficients, k - 1, k, size, largest + pair * PAIR_GAP / order):
+            step = min(step, math.log(tol) / order - growth(coefficients, k - 1, k, size))
+    if grow_faster(coefficients, order // 2, order - 2, size, largest + GAP):
         step = min(step, math.log(tol) / order - growth(coefficients, order // 2, order - 2, size))
     return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
