@@ -51,7 +51,9 @@ branch = saltus.continue_orbit(saltus.find_orbit(soft, x=0.0, y=0.0), "load.freq
 fold = max(point.parameter for point in branch.special if point.kind == "LP")
 sweep = saltus.frequency_sweep(soft, np.linspace(0.9, 1.1, 41), x=0.0, y=0.0)
 before = soft.with_({"load.frequency": 0.5 * (touched[1] + fold)})
-verdict, found = saltus.classify(before, x=0.0, y=0.0), saltus.find_attractors(before, starts=64)
+window = ((-2.0, 0.5), (-2.0, 2.0), (-2.0, 2.0), (-2.0, 2.0))
+verdict = saltus.classify(before, x=0.0, y=0.0)
+found = saltus.find_attractors(before, starts=64, window=window)
 basins = saltus.basins_of_attraction(
     before, found=found, x=np.linspace(-2, 0.5, 40), x_velocity=np.linspace(-2, 2, 40)
 )

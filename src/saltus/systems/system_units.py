@@ -294,14 +294,19 @@ def _held_away(
                     pushes.append(value)
     if not pushes:
         return None
-    # the mean of both sides, so that a mirror image has the same
-    slopes = np.mean(_slopes_beside(model, place, load), axis=0)
-    left, sizes, right = np.linalg.svd(slopes)
-    # bodies that nothing holds have a stiffness of rounding, which would put them infinitely far away
-    sizes = np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, 0.0)
-    shares = np.maximum(sizes, rate**2)
-    moved = np.array(pushes) @ left
-    moved = np.divide(moved, shares, out=np.zeros_like(moved), where=shares > 0.0) @ right
+    moved = np.zeros((len(pushes), len(place)))
+    stiffness = 0.0
+    for slopes in _slopes_beside(model, place, load):
+        left, sizes, right = np.linalg.svd(slopes)
+        # bodies that nothing holds have a stiffness of rounding, which would put them infinitely far
+        sizes = np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, 0.0)
+        stiffness = max(stiffness, float(sizes.max(initial=0.0)))
+        shares = np.maximum(sizes, rate**2)
+        along = np.array(pushes) @ left
+        along = np.divide(along, shares, out=np.zeros_like(along), where=shares > 0.0) @ right
+        # the softer side of a stop is the one through which a system moves, in its mirror image too
+        if np.linalg.norm(along) > np.linalg.norm(moved):
+            moved = along
     distance = _mean(moved)
     acceleration = _mean(np.array(pushes))
     squared = float(np.linalg.norm(acceleration)) / max(float(np.linalg.norm(distance)), TINY)
@@ -310,7 +315,7 @@ def _held_away(
     away = float(outward @ np.mean(pushes, axis=0)) > 0.0
     if np.linalg.norm(swing) > (TOLD if away else FARTHEST) * np.linalg.norm(distance):
         distance = swing
-    return Held(distance, acceleration, float(sizes.max()), math.sqrt(squared))
+    return Held(distance, acceleration, stiffness, math.sqrt(squared))
 
 
 def _masses(model: Any) -> np.ndarray:
