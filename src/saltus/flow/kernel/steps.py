@@ -373,6 +373,8 @@ def change_rate(a):
 @lean_jit
 def shortest_step(motion):
     """The step below which the acceleration counts as singular."""
+    if motion.natural_time > 0.0:
+        return SHORTEST * motion.natural_time
     scale = time_scale(motion)
     # an impact without a pull but for rounding takes for ever to fall
     end = motion_end(motion)
