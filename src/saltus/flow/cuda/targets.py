@@ -95,7 +95,7 @@ class Card:
             from cuda.bindings import driver
         except ImportError:
             raise SaltusError(
-                "motions on a card need the package cuda-bindings: pip install saltus[cuda]"
+                "motions on a card need the package cuda-bindings: pip install cuda-bindings"
             ) from None
         self._driver: Any = driver
         self._arrays: list[Any] = []
