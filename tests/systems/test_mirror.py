@@ -154,6 +154,8 @@ SYMMETRIC = {
     "two contacts of a sum": under(Absorber()),
     "rounded": under(Absorber(left=0.4 * (1 + 1e-13), right=0.4 * (1 - 1e-13))),
     "two stops, rounded": under(saltus.TwoStops(left=-1.0, right=1.0 + 1e-13)),
+    "static force, about another place": under(Absorber(static=1e-9)),
+    "mean of the load, about another place": under(Absorber(), mean=1e-9),
     "swapped": under(Swapped()),
     "smooth": under(Smooth()),
     "third harmonic": under(Smooth(), order=3),
@@ -163,9 +165,9 @@ SYMMETRIC = {
 }
 OTHER = {
     "stops": under(Absorber(left=0.41)),
-    "static force": under(Absorber(static=1e-9)),
     "even spring": under(Absorber(even=1e-6)),
-    "mean of the load": under(Absorber(), mean=1e-9),
+    "mean of the load": under(Smooth(), mean=1e-9),
+    "static force of a curved spring": under(Smooth(even=0.1)),
     "second harmonic": under(Absorber(), order=2),
     "stop of one of two": under(Swapped(second=1.1)),
     "even term": under(Smooth(even=1e-3)),

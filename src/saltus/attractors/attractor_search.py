@@ -51,6 +51,7 @@ from saltus.systems import (
     check_window,
     image_of,
     initial_states,
+    middle_of,
     natural_units,
     rest_state,
     state_of,
@@ -294,8 +295,12 @@ class KnownAttractors:
             for other in (known.target for known in self.members if known.target.dense):
                 if np.median(other.distance(states)) < other.grain:
                     return other.label
+            middle = middle_of(self.system)
+            if middle is None:
+                return None  # the extrema of which coordinate turn about which centre is not known
+            extrema = (2.0 * middle - member.highest, 2.0 * middle - member.lowest)
             evidence = f"mirror image of a {member.kind} one: {member.evidence}"
-            return self._add(member.kind, states, (-member.highest, -member.lowest), evidence)
+            return self._add(member.kind, states, extrema, evidence)
         known_label = self.label_of(states)
         if known_label is not None:
             return known_label

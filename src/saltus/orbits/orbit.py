@@ -19,7 +19,7 @@ from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, So
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result
-from saltus.systems import System, arguments_of, state_of
+from saltus.systems import System, arguments_of, middle_of, state_of
 
 if TYPE_CHECKING:
     import xarray
@@ -255,21 +255,27 @@ class PeriodicOrbit(Result):
         return self.motion().extrema
 
     @cached_property
+    def _middle(self) -> float | None:
+        """The centre of a symmetric orbit, 0 for others; None if the centres of its coordinates
+        differ."""
+        return middle_of(self.equations.system) if self.symmetric else 0.0
+
+    @cached_property
     def highest(self) -> float:
         """The largest value of the coordinate; with several coordinates, of any of them."""
-        if self._in_others:
+        if self._in_others or self._middle is None:
             return float(self._own_extrema[:, 1].max())
         top = self._extremes[:, SegmentColumn.HIGHEST].max()
         bottom = self._extremes[:, SegmentColumn.LOWEST].min()
-        return float(max(top, -bottom) if self.symmetric else top)
+        return float(max(top, 2.0 * self._middle - bottom) if self.symmetric else top)
 
     @cached_property
     def lowest(self) -> float:
         """The least value of the coordinate; with several coordinates, of any of them."""
-        if self._in_others:
+        if self._in_others or self._middle is None:
             return float(self._own_extrema[:, 0].min())
         return (
-            -self.highest
+            2.0 * self._middle - self.highest
             if self.symmetric
             else float(self._extremes[:, SegmentColumn.LOWEST].min())
         )

@@ -22,6 +22,7 @@ from .mirror import declares_mirror as declares_mirror
 from .mirror import has_half_the_period as has_half_the_period
 from .mirror import image_of as image_of
 from .mirror import is_its_image_later as is_its_image_later
+from .mirror import middle_of as middle_of
 from .mirror import mirror_of as mirror_of
 from .model import MarginKind as MarginKind
 from .model import Model as Model

@@ -5,8 +5,9 @@ equations.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.systems.contact_model import ContactModel, mass_and_force, mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import IMAGE_ROUNDING, Model
-from saltus.systems.signals import Constant, Harmonic, Signal, scaled
+from saltus.systems.signals import Constant, Harmonic, Signal, Sum, scaled
 from saltus.systems.system_units import natural_units
 
 if TYPE_CHECKING:
@@ -31,12 +32,16 @@ PROBES = 128  # states at which the equations of an image are compared
 PROBE = (0.3711, 0.2931, 0.6173)
 DECLARED_ROUNDING = 1e-9
 DECADES = 6.0  # their sizes lie so many powers of ten below and above the natural units
+# Distances from a mirror's centre are looked at down to so many powers of ten below its value.
+DIGITS = 4.0
+NEWTON_STEPS = 30  # most steps in which a mirror's centre is found
+NEWTON_SHARE = 1e-4  # of a length, by which its derivatives are differences
 
 
 @dataclass(frozen=True)
 class Mirror:
-    """A mirror symmetry, under which -q(t), with some coordinates swapped, is a motion under the
-    load `load` wherever q(t) is one of the system.
+    """A mirror symmetry, under which 2 c - q(t), with some coordinates of q swapped, is a motion
+    under the load `load` wherever q(t) is one of the system.
 
     Attributes
     ----------
@@ -46,11 +51,24 @@ class Mirror:
         For each coordinate of an image, the index of the original one whose negative it is.
     parts
         The number of the image of each contact, then of each friction, then of each surface.
+    centre
+        The mirror's centre c, a value of each coordinate; equal for coordinates that are swapped.
     """
 
     load: Load
     places: tuple[int, ...]
     parts: tuple[int, ...]
+    centre: tuple[float, ...]
+
+    @property
+    def is_about_origin(self) -> bool:
+        """Whether the centre is at 0 in all coordinates."""
+        return not any(self.centre)
+
+    @property
+    def middle(self) -> float | None:
+        """The centre of all coordinates; None where they have different ones."""
+        return self.centre[0] if len(set(self.centre)) == 1 else None
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """The images of states (..., 2 coordinates), coordinates and then velocities.
@@ -60,16 +78,29 @@ class Mirror:
         states
             The states.
         """
+        images = self.turned(states)
+        if not self.is_about_origin:
+            images[..., : len(self.centre)] += 2.0 * np.array(self.centre)
+        return images
+
+    def turned(self, directions: np.ndarray) -> np.ndarray:
+        """The images of differences of states (..., 2 coordinates).
+
+        Parameters
+        ----------
+        directions
+            The differences.
+        """
         n = len(self.places)
-        return np.asarray(-states[..., [*self.places, *(n + place for place in self.places)]])
+        return np.asarray(-directions[..., [*self.places, *(n + place for place in self.places)]])
 
 
 def mirror_of(system: System) -> Mirror | None:
     """The mirror symmetry of a system, in its own coordinates; None without one. It is found once.
 
-    A model may declare it (`Model.mirror`); else it is looked for: contacts, frictions and surfaces
-    must be images of one another, and the equations must be those of the image at many states of
-    all sizes.
+    A model may declare it (`Model.mirror`), about 0; else it is looked for, about any centre:
+    contacts, frictions and surfaces must be images of one another, and the equations must be those
+    of the image at many states of all sizes.
 
     Parameters
     ----------
@@ -83,6 +114,18 @@ def mirror_of(system: System) -> Mirror | None:
     """
     found: Mirror | None = system._remembered(mirror_of, lambda: _mirror_of(system))
     return found
+
+
+def middle_of(system: System) -> float | None:
+    """The mirror's centre of all coordinates; None without one, or where they have different ones.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    """
+    mirror = mirror_of(system)
+    return None if mirror is None else mirror.middle
 
 
 def image_of(system: System, states: np.ndarray) -> np.ndarray:
@@ -116,7 +159,7 @@ def is_its_image_later(system: System) -> bool:
     assert period is not None, "asked for a load with a frequency alone"
     if declares_mirror(inner.model):
         return True
-    same = Mirror(inner.load, mirror.places, mirror.parts)
+    same = Mirror(inner.load, mirror.places, mirror.parts, mirror.centre)
     return _moves_as_image(inner, same, 0.5 * period)
 
 
@@ -164,6 +207,7 @@ def has_half_the_period(system: System) -> bool:
 def _mirror_of(system: System) -> Mirror | None:
     model = system.model
     inner = system.in_gap_coordinates
+    origin = (0.0,) * len(model.coordinates)
     if declares_mirror(model):
         load = model.mirror(system.load)
         if load is None:
@@ -171,26 +215,27 @@ def _mirror_of(system: System) -> Mirror | None:
         places = tuple(model.coordinates.index(name) for name in model.images)
         if inner is not system:
             known = mirror_of(inner)
-            return None if known is None else Mirror(load, places, known.parts)
-        parts = _images_of_parts(system, places)
+            return None if known is None else Mirror(load, places, known.parts, origin)
+        parts = _images_of_parts(system, places, origin)
         if parts is None:
             return None
         mirrored = system.with_(load=load)
         for side in model.every_side:
             _check_declared(system, mirrored, side)
-        mirror = Mirror(load, places, parts)
+        mirror = Mirror(load, places, parts, origin)
         is_simple = not (model.surfaces or (isinstance(model, ContactModel) and model.jumps))
         return mirror if is_simple or _moves_as_image(system, mirror) else None
     if inner is not system:
         return _of_given(system, inner)
     for places in _pairings(model):
-        parts = _images_of_parts(system, places)
-        if parts is None:
-            continue
         for load in _loads(system.load):
-            mirror = Mirror(load, places, parts)
-            if _moves_as_image(system, mirror):
-                return mirror
+            for centre in _centres(system, places, load):
+                parts = _images_of_parts(system, places, centre)
+                if parts is None:
+                    continue
+                mirror = Mirror(load, places, parts, centre)
+                if _moves_as_image(system, mirror):
+                    return mirror
     return None
 
 
@@ -200,15 +245,25 @@ def _of_given(system: System, inner: System) -> Mirror | None:
     if known is None:
         return None
     n = len(system.model.coordinates)
-    gaps = np.random.default_rng(2).normal(size=2 * len(inner.model.coordinates))
-    state = np.concatenate(system.from_gaps(0.3, *np.split(gaps, 2)))
-    # the sums that follow from others are those of this state
-    gaps = np.concatenate(system.to_gaps(0.3, *np.split(state, 2)))
+    random = np.random.default_rng(2)
     twin = system.with_(load=known.load)
-    image = np.concatenate(twin.from_gaps(0.3, *np.split(known.of(gaps), 2)))
+    states = list[np.ndarray]()
+    images = list[np.ndarray]()
+    for _ in range(2):
+        gaps = random.normal(size=2 * len(inner.model.coordinates))
+        state = np.concatenate(system.from_gaps(0.3, *np.split(gaps, 2)))
+        # the sums that follow from others are those of this state
+        gaps = np.concatenate(system.to_gaps(0.3, *np.split(state, 2)))
+        states.append(state)
+        images.append(np.concatenate(twin.from_gaps(0.3, *np.split(known.of(gaps), 2))))
+    rounding = IMAGE_ROUNDING * n * np.abs([*states, *images]).max()
     for places in _pairings(system.model):
-        mirror = Mirror(known.load, places, known.parts)
-        if np.abs(image - mirror.of(state)).max() < IMAGE_ROUNDING * n * np.abs(state).max():
+        mirror = Mirror(known.load, places, known.parts, (0.0,) * n)
+        centre = 0.5 * (images[0] - mirror.turned(states[0]))[:n]
+        centre = np.where(np.abs(centre) < rounding, 0.0, centre)
+        mirror = replace(mirror, centre=tuple(centre.tolist()))
+        pairs = zip(states, images, strict=True)
+        if all(np.abs(image - mirror.of(state)).max() < rounding for state, image in pairs):
             return mirror
     return None
 
@@ -245,15 +300,19 @@ def _pairings(model: Model) -> Iterator[tuple[int, ...]]:
 
 
 def _loads(load: Load) -> Iterator[Load]:
-    """Loads under which an image may move: each channel reversed, unless it is the same half a
-    period later; then all channels reversed."""
-    kept = {name for name, signal in load.channels.items() if _has_even_orders_alone(signal)}
-    for names in [kept, set()] if kept else [kept]:
-        signals = {
-            name: signal if name in names else scaled(signal, -1.0)
-            for name, signal in load.channels.items()
-        }
-        yield Load(frequency=load.frequency, **signals)
+    """Loads under which an image may move: the load half a period later, then each channel
+    reversed unless it is the same half a period later, then all channels reversed."""
+    later = {name: _half_a_period_later(signal) for name, signal in load.channels.items()}
+    reversed_ = {name: scaled(signal, -1.0) for name, signal in load.channels.items()}
+    kept = {
+        name: signal if _has_even_orders_alone(signal) else reversed_[name]
+        for name, signal in load.channels.items()
+    }
+    tried = list[dict[str, Signal]]()
+    for signals in (later, kept, reversed_):
+        if signals not in tried:
+            tried.append(signals)
+            yield Load(frequency=load.frequency, **signals)
 
 
 def _has_even_orders_alone(signal: Signal) -> bool:
@@ -265,10 +324,121 @@ def _has_even_orders_alone(signal: Signal) -> bool:
     return bool(terms) and all(_has_even_orders_alone(term) for term in terms)
 
 
+def _half_a_period_later(signal: Signal) -> Signal:
+    """The signal half a period later; signals that are no sums of harmonics are reversed."""
+    if isinstance(signal, Constant):
+        return signal
+    if isinstance(signal, Harmonic):
+        return replace(signal, amplitude=(-1.0) ** signal.order * signal.amplitude)
+    if isinstance(signal, Sum):
+        return Sum(tuple(_half_a_period_later(term) for term in signal.terms))
+    return scaled(signal, -1.0)
+
+
+# --- the centre --------------------------------------------------------------
+
+
+def _centres(system: System, places: tuple[int, ...], load: Load) -> Iterator[tuple[float, ...]]:
+    """Centres about which a system may be its image: 0, then the middle of the contacts and
+    surfaces of each coordinate, and where others have none, the place where the forces are those
+    of the image.
+    """
+    model: Any = system.model
+    n = len(model.coordinates)
+    origin = (0.0,) * n
+    yield origin
+    if model.has_one_contact:
+        if float(model.contact):
+            yield (float(model.contact),)
+        return
+    centre, is_known = _middles(model, places)
+    if not is_known.all():
+        balanced = _balanced(system, places, load, centre, ~is_known)
+        if balanced is None:
+            return
+        centre = balanced
+    lengths = natural_units(system).lengths
+    centre = np.where(np.abs(centre) < IMAGE_ROUNDING * lengths, 0.0, centre)
+    found = tuple(float(value) for value in centre)
+    if found != origin:
+        yield found
+
+
+def _middles(model: Any, places: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The middle of all contacts, or surfaces, of each coordinate and of its image, (n,), and where
+    there is one, (n,)."""
+    n = len(places)
+    middles = np.zeros(n)
+    is_known = np.zeros(n, dtype=bool)
+    for parts in (model.surfaces, model.contacts):
+        positions = [
+            [float(part.position) for part in parts if part.coordinate == name]
+            for name in model.coordinates
+        ]
+        for i, place in enumerate(places):
+            both = positions[i] + positions[place]
+            if both:
+                middles[i] = math.fsum(both) / len(both)
+                is_known[i] = True
+    return middles, is_known
+
+
+def _balanced(
+    system: System, places: tuple[int, ...], load: Load, centre: np.ndarray, is_free: np.ndarray
+) -> np.ndarray | None:
+    """A centre about which the forces of images are images of the forces, by Newton's method in
+    the coordinates that `is_free`; None where they cannot be evaluated."""
+    model: Any = system.model
+    n = len(places)
+    units = natural_units(system)
+    random = np.random.default_rng(3)
+    period = system.load.period
+    t = random.uniform(size=PROBES) * (units.time if period is None else period)
+    q = random.normal(size=(n, PROBES)) * units.lengths[:, None]
+    v = random.normal(size=(n, PROBES)) * units.speeds[:, None]
+    own, turned = (DeclaredLoad(one, model) for one in (system.load, load))
+    order = list(places)
+    # coordinates that are swapped have one centre
+    free = [i for i in np.flatnonzero(is_free).tolist() if i <= order[i]]
+    steps = np.zeros((len(free), n))
+    for row, i in enumerate(free):
+        steps[row, [i, order[i]]] = NEWTON_SHARE * units.lengths[i]
+
+    def unbalanced(middle: np.ndarray) -> np.ndarray:
+        at = middle[:, None]
+        force = _rows(model.acceleration(t, _of(at + q), _of(v), 1, own), n)
+        image = _rows(model.acceleration(t, _of(at - q[order]), _of(-v[order]), 1, turned), n)
+        return np.asarray(force[order] + image)
+
+    try:
+        with np.errstate(all="ignore"):
+            last = math.inf
+            for _ in range(NEWTON_STEPS):
+                residual = unbalanced(centre).ravel()
+                slopes = np.array([unbalanced(centre + step).ravel() - residual for step in steps])
+                size = np.linalg.norm(slopes, axis=1)
+                if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
+                    return None
+                # a coordinate that no force depends on stays where it is
+                moved = np.linalg.lstsq(slopes.T, -residual, rcond=IMAGE_ROUNDING)[0]
+                moved = np.where(size > 0.0, moved, 0.0)
+                centre = centre + moved @ steps
+                largest = float(np.abs(moved).max(initial=0.0)) * NEWTON_SHARE
+                if largest < IMAGE_ROUNDING and largest >= 0.5 * last:
+                    break  # only rounding moves it
+                last = largest
+    # What cannot be evaluated at arrays, or is refused, has no symmetry that could be known.
+    except (SaltusError, ArithmeticError, TypeError, ValueError, IndexError):
+        return None
+    return centre if np.isfinite(centre).all() else None
+
+
 # --- contacts, frictions and surfaces ----------------------------------------
 
 
-def _images_of_parts(system: System, places: tuple[int, ...]) -> tuple[int, ...] | None:
+def _images_of_parts(
+    system: System, places: tuple[int, ...], centre: tuple[float, ...]
+) -> tuple[int, ...] | None:
     """The number of the mirror image of each contact, friction and surface; None if one has no
     image or the laws differ."""
     model: Any = system.model
@@ -300,11 +470,18 @@ def _images_of_parts(system: System, places: tuple[int, ...]) -> tuple[int, ...]
             found.append(number)
         return found
 
+    def is_mirrored(one: Any, other: Any, place: int) -> bool:
+        """Whether the positions of two parts lie in each other's place in the mirror."""
+        image = 2.0 * centre[place] - float(one.position)
+        # the image of a position at 0 has the rounding of the centre
+        size = max(lengths[place], 2.0 * abs(centre[place]) / IMAGE_ROUNDING)
+        return same(image, other.position, size)
+
     def is_image_of_contact(one: Any, other: Any, place: int) -> bool:
-        return bool(one.sign == -other.sign) and same(-one.position, other.position, lengths[place])
+        return bool(one.sign == -other.sign) and is_mirrored(one, other, place)
 
     def is_image_of_surface(one: Any, other: Any, place: int) -> bool:
-        return same(-one.position, other.position, lengths[place])
+        return is_mirrored(one, other, place)
 
     contacts = images_of(model.contacts, is_image_of_contact)
     surfaces = images_of(model.surfaces, is_image_of_surface)
@@ -369,12 +546,17 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
     random = np.random.default_rng(1)
     t, sizes, speeds = (random.uniform(size=PROBES) for _ in range(3))
     t = t * (units.time if system.load.period is None else system.load.period)
-    around = np.zeros(n)
-    if model.has_one_contact:
-        around[0] = float(model.contact)
-        if abs(around[0]) > IMAGE_ROUNDING * units.length:
-            return False  # the contact of an image is another one
-    q = random.normal(size=(n, PROBES)) * 10.0 ** (DECADES * (2.0 * sizes - 1.0))
+    around = np.array(mirror.centre)
+    if model.has_one_contact and abs(around[0] - float(model.contact)) > (
+        IMAGE_ROUNDING * max(units.length, abs(around[0]))
+    ):
+        return False  # the contact of an image is another one
+    least = -DECADES * np.ones(PROBES)
+    if not mirror.is_about_origin:
+        # distances from the centre are known up to its rounding alone
+        share = float(np.max(np.abs(around) / units.lengths))
+        least = np.maximum(least, math.log10(share) - DIGITS)
+    q = random.normal(size=(n, PROBES)) * 10.0 ** (least + (DECADES - least) * sizes)
     v = random.normal(size=(n, PROBES)) * 10.0 ** (DECADES * (2.0 * speeds - 1.0))
     q = q * units.lengths[:, None]
     v = v * units.speeds[:, None]
@@ -383,8 +565,9 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
         q = inward * np.abs(q)
     places = list(mirror.places)
     load, image_load = (DeclaredLoad(one.load, model) for one in (system, twin))
-    there = (t, _of(q), _of(v))
-    image = (t + later, _of(-q[places]), _of(-v[places]))
+    middle = around[:, None]
+    there = (t, _of(middle + q), _of(v))
+    image = (t + later, _of(middle - q[places]), _of(-v[places]))
     image_side = -side if model.sides else side
     # M and r say what M^-1 r does, which takes seconds for hundreds of coordinates
     by_force = isinstance(model, ContactModel) and not system.dependent

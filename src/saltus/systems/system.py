@@ -237,8 +237,8 @@ class System:
         return state
 
     def mirrored(self) -> System | None:
-        """The system in which -theta(t) is a motion wherever theta(t) is one in this system; None
-        without the symmetry.
+        """The system in which 2 c - theta(t) is a motion wherever theta(t) is one in this system,
+        with the mirror's centre c; None without the symmetry.
 
         With several coordinates the mirror image may swap some (`Model.images`); contacts and
         frictions must be images of one another, with the same laws.

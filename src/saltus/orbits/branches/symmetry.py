@@ -26,13 +26,15 @@ from saltus.systems import (
     System,
     check_system,
     is_its_image_later,
+    mirror_of,
+    natural_units,
 )
 
 
 @answered
 def is_symmetric(system: System) -> bool:
     """Whether the mirror image of every motion, half a forcing period later, is a motion too:
-    -theta(t + T/2) for theta(t).
+    2 c - theta(t + T/2) for theta(t), with the mirror's centre c.
 
     It is if the system has a mirror symmetry, declared by its model or found in its equations, and
     the mirrored load is the load half a period later (errata 18).
@@ -89,18 +91,30 @@ def _harmonics(signal: Signal) -> dict[int, complex] | None:
     return total
 
 
+# Rounding moves the centre of a mirror by less than this share of its value and of a length.
+CENTRE_ROUNDING = 1e-9
+
+
 def keeps_symmetry(system: System, path: str) -> bool:
-    """Whether a system is symmetric and stays so as the parameter at `path` changes."""
+    """Whether a system is symmetric and stays so, about the same centre, as the parameter at `path`
+    changes."""
     if not is_symmetric(system):
         return False
+    inner = mirror_of(system.in_gap_coordinates)
+    assert inner is not None, "a symmetric system has a mirror"
+    centre = np.array(inner.centre)
     value = float(system.get(path))
     for share in (1e-3, -1e-3):
         try:
             beside = system.with_({path: value * (1 + share) + share})
         except ParameterError:  # on one side of a limit of the parameter
             continue
-        if is_symmetric(beside):
-            return True
+        other = mirror_of(beside.in_gap_coordinates) if is_symmetric(beside) else None
+        if other is not None:
+            lengths = natural_units(system.in_gap_coordinates).lengths
+            # the parameter moves by a thousandth, and rounding moves the centre by far less
+            apart = np.abs(np.array(other.centre) - centre)
+            return bool((apart <= CENTRE_ROUNDING * (lengths + np.abs(centre))).all())
     return False
 
 

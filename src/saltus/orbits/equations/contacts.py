@@ -546,11 +546,11 @@ class ContactsEquations(OrbitEquations):
         # segment i ends with event i + 1
         before = np.roll(ends, 1, axis=0) if phases.size else state[None]
         if phases.size and self.signature.symmetric:
-            before[0] *= -1.0
+            before[0] = self.image_of(before[0])
         return contact_segments(
             self.system_at(solution.values),
             self.signature,
-            self.images,
+            self.mirror,
             phases,
             before,
             self.frequency(solution.values),
@@ -695,7 +695,7 @@ class ContactsEquations(OrbitEquations):
         after = ends[-1, last : last + 2 * own]
         if self.signature.symmetric:
             slope, after = (
-                self.image_of(slope.T).T,
+                self.turned(slope.T).T,
                 self.image_of(after),
             )
         total = np.vstack([rows, slope[free]])

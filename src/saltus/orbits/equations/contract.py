@@ -655,6 +655,11 @@ class OrbitEquations(ABC):
         assert self.mirror is not None, "asked for where the symmetry is known alone"
         return self.mirror.of(states)
 
+    def turned(self, directions: np.ndarray) -> np.ndarray:
+        """The mirror images of differences of states (..., 2 coordinates)."""
+        assert self.mirror is not None, "asked for where the symmetry is known alone"
+        return self.mirror.turned(directions)
+
     @cached_property
     def halved(self) -> Self:
         """The equations of the orbits that are their own images, over half a period: symmetric

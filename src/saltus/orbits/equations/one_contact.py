@@ -456,7 +456,7 @@ class OneContactEquations(OrbitEquations):
             parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
         here = sign * columns[:, : 2 * own, : 2 * own]
         there = -np.eye(2 * own)[None]
-        end = sign * state
+        end = self.image_of(state) if self.signature.symmetric else state.copy()
         here[:, self.following] = parameters[self.following] = end[self.following] = 0.0
         return OrbitEvaluation(end - later, here, there, parameters, ends, extremes)
 

@@ -364,7 +364,7 @@ class WholeMotionEquations(OrbitEquations):
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
-            before = self.image_of(rates) if self.signature.symmetric else rates
+            before = self.turned(rates) if self.signature.symmetric else rates
             parameters[:, self.paths.index(FREQUENCY)] -= (
                 (rates - found.state @ before) * phase / frequency**2
             )
@@ -374,9 +374,8 @@ class WholeMotionEquations(OrbitEquations):
             by_unknowns, by_parameters = self._start_slopes(unknowns, system)
             state, parameters = state @ by_unknowns, parameters + state @ by_parameters
         if self.signature.symmetric:
-            after, state, parameters = (
-                self.image_of(numbers.T).T for numbers in (after, state, parameters)
-            )
+            after = self.image_of(after)
+            state, parameters = (self.turned(numbers.T).T for numbers in (state, parameters))
         here = state[None].copy()
         there = -np.eye(len(after))[None]
         here[:, self.following] = parameters[self.following] = after[self.following] = 0.0

@@ -19,7 +19,7 @@ import numpy as np
 from saltus.bounds import Gap, Segment, Unknowns, coordinate, velocity
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments, names_of_states
 from saltus.orbits.signature import Signature
-from saltus.systems import System
+from saltus.systems import Mirror, System
 from saltus.taylor import Expr, Trace, number, substitute, trace
 
 MOST_COORDINATES = 6  # whose mass matrix is solved in symbols
@@ -28,7 +28,7 @@ MOST_COORDINATES = 6  # whose mass matrix is solved in symbols
 def contact_segments(
     system: System,
     signature: Signature,
-    images: Sequence[int],
+    mirror: Mirror | None,
     phases: np.ndarray,
     states: np.ndarray,
     frequency: float,
@@ -42,8 +42,8 @@ def contact_segments(
         The system in gap coordinates.
     signature
         The orbit's events.
-    images
-        The number of the mirror image of each contact.
+    mirror
+        The system's mirror symmetry, which a symmetric orbit needs.
     phases
         The phases of its events, (events,).
     states
@@ -60,17 +60,19 @@ def contact_segments(
     maker = _Maker(system, traced)
     names = names_of_states(system.model.coordinates)
     if not signature.events:
-        section = maker.section(signature)
+        section = maker.section(mirror if signature.symmetric else None)
         return OrbitSegments((section,), states[:1], (names,), names, free_time=False)
     events = list(signature.events)
-    last = events[0].image(images) if signature.symmetric else events[0]
+    half = mirror if signature.symmetric else None
+    last = events[0] if half is None else events[0].image(half.parts)
     segments = []
     for i, event in enumerate(events):
         closes = i == len(events) - 1
         following = last if closes else events[i + 1]
-        mirror = -1.0 if closes and signature.symmetric else 1.0
         touches = (i == touching, (i + 1) % len(events) == touching)
-        segments.append(maker.segment(event.contact, following.contact, mirror, touches))
+        segments.append(
+            maker.segment(event.contact, following.contact, half if closes else None, touches)
+        )
     guess = np.array(
         [
             maker.unknowns_of(event.contact, phase / frequency, state)
@@ -123,9 +125,11 @@ class _Maker:
         inner = [states[i] for i in self._others(held)]
         return ("time", "speed", *inner, *(states[self.dof + i] for i in self._others(held)))
 
-    def segment(self, begin: int, end: int, mirror: float, touches: tuple[bool, bool]) -> Segment:
+    def segment(
+        self, begin: int, end: int, mirror: Mirror | None, touches: tuple[bool, bool]
+    ) -> Segment:
         """The segment from an impact at contact `begin` to one at contact `end`; the unknowns of
-        the latter stand for its mirror image if `mirror` is -1, and each may be a touch.
+        the latter stand for its image in `mirror`, if there is one, and each may be a touch.
         """
         gaps = tuple(
             Gap(
@@ -140,13 +144,14 @@ class _Maker:
         start = self._start(begin, touches[0])
         return Segment(self.acceleration, start, self._end(end, mirror), gaps)
 
-    def section(self, signature: Signature) -> Segment:
-        """The segment of an orbit without events over its (half) period."""
+    def section(self, mirror: Mirror | None) -> Segment:
+        """The segment of an orbit without events over its period, or half of it to its image in
+        `mirror`."""
         width = 2 * self.dof
-        sign = -1.0 if signature.symmetric else 1.0
         start = tuple(self.fixed[j] for j in range(width))
         state = [*map(coordinate, range(self.dof)), *map(velocity, range(self.dof))]
-        end = tuple(state[j] - sign * self.fixed[j] for j in range(width))
+        closing = start if mirror is None else _image(mirror, start)
+        end = tuple(state[j] - closing[j] for j in range(width))
         gaps = tuple(
             Gap(held, float(sign), position, 0, 0)
             for held, sign, position in zip(
@@ -192,17 +197,32 @@ class _Maker:
         ]
         return _solved(rows)
 
-    def _end(self, contact: int, mirror: float) -> tuple[Expr, ...]:
+    def _end(self, contact: int, mirror: Mirror | None) -> tuple[Expr, ...]:
         """E of an impact."""
         held = self.traced.contact_coordinates[contact]
-        others = self._others(held)
         sign = float(self.traced.signs[contact])
-        positions = [coordinate(held) - self.traced.positions[contact]] * self.dof
-        velocities = [velocity(held) + sign * self.unknowns[1]] * self.dof
+        first = held if mirror is None else mirror.places[held]
+        others = self._others(first)
+        state = [number(0.0)] * (2 * self.dof)  # the held coordinate has equations of its own
         for k, i in enumerate(others):
-            positions[i] = coordinate(i) - mirror * self.unknowns[2 + k]
-            velocities[i] = velocity(i) - mirror * self.unknowns[2 + len(others) + k]
+            state[i] = self.unknowns[2 + k]
+            state[self.dof + i] = self.unknowns[2 + len(others) + k]
+        closing = tuple(state) if mirror is None else _image(mirror, tuple(state))
+        positions = [coordinate(i) - closing[i] for i in range(self.dof)]
+        velocities = [velocity(i) - closing[self.dof + i] for i in range(self.dof)]
+        positions[held] = coordinate(held) - self.traced.positions[contact]
+        velocities[held] = velocity(held) + sign * self.unknowns[1]
         return (*positions, *velocities)
+
+
+def _image(mirror: Mirror, state: tuple[Expr, ...]) -> tuple[Expr, ...]:
+    """The image of a state, coordinates and then velocities, in symbols."""
+    n = len(mirror.places)
+    positions = [
+        2.0 * centre - state[place]
+        for centre, place in zip(mirror.centre, mirror.places, strict=True)
+    ]
+    return (*positions, *(-1.0 * state[n + place] for place in mirror.places))
 
 
 def _solved(rows: list[list[Expr]]) -> list[Expr]:

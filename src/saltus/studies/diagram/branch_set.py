@@ -240,9 +240,11 @@ def _seen(orbit: PeriodicOrbit) -> np.ndarray:
     )
 
 
-def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: int) -> np.ndarray:
+def stable_motions(
+    branches: list[PlacedBranch], grid: np.ndarray, dimension: int, middle: float
+) -> np.ndarray:
     """The stable orbits of branches at the values of a grid, by interpolation, as records of a
-    chart; their states are nan.
+    chart, with extrema from the `middle` on; their states are nan.
     """
     record = motion_type(dimension)
     parts = [np.zeros(0, record)]
@@ -253,14 +255,17 @@ def stable_motions(branches: list[PlacedBranch], grid: np.ndarray, dimension: in
         part["cell"] = cells
         part["state"] = np.nan
         part["period"], part["impact_count"] = branch.columns[4:6, before]
-        part["amplitude"] = np.maximum(extrema[:, 0], -extrema[:, 1])
-        part["other"] = np.minimum(extrema[:, 0], -extrema[:, 1])
+        high, low = extrema[:, 0] - middle, middle - extrema[:, 1]
+        part["amplitude"] = np.maximum(high, low)
+        part["other"] = np.minimum(high, low)
         part["slowest"] = extrema[:, 2]
         parts.append(part)
     return np.concatenate(parts)
 
 
-def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bool) -> np.ndarray:
+def placed(
+    motions: SimulatedMotions, branches: list[PlacedBranch], middle: float | None
+) -> np.ndarray:
     """Which of the motions that repeat themselves lie on a stable part of one of the branches,
     (n,).
 
@@ -270,8 +275,9 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
         The motions that are looked for.
     branches
         The branches on which they are looked for.
-    mirrored
-        Whether a motion also lies on a branch if its mirror image does.
+    middle
+        About this place a motion also lies on a branch if its mirror image does; None if it does
+        not.
     """
     result = np.zeros(len(motions), dtype=bool)
     least = _least_speed(branches[0].branch.orbits[0].system) if branches else 0.0
@@ -287,7 +293,7 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
             for each in (rows, before)
         )
         expected, uncertain, change = branch.extrema(motions.value[rows], before)
-        apart = _apart(every[rows], expected, mirrored)
+        apart = _apart(every[rows], expected, middle)
         size = sizes[rows]
         both_stable = (branch.columns[3, before] > 0) & (branch.columns[3, before + 1] > 0)
         sure = (
@@ -301,18 +307,23 @@ def placed(motions: SimulatedMotions, branches: list[PlacedBranch], mirrored: bo
                 orbit = branch.solved(float(motions.value[rows[i]]), int(before[i]))
                 if orbit is not None and (orbit.stable or both_stable[i]):
                     result[rows[i]] = (
-                        _apart(every[rows[i]], _seen(orbit), mirrored) < PLACEMENT.same * size[i]
+                        _apart(every[rows[i]], _seen(orbit), middle) < PLACEMENT.same * size[i]
                     )
     return result
 
 
-def _apart(seen: np.ndarray, expected: np.ndarray, mirrored: bool) -> np.ndarray:
-    """The largest difference of (highest, lowest, slowest impact); with `mirrored` also to the
-    mirror image, the smaller one.
+def _apart(seen: np.ndarray, expected: np.ndarray, middle: float | None) -> np.ndarray:
+    """The largest difference of (highest, lowest, slowest impact); with a `middle` also to the
+    mirror image about it, the smaller one.
     """
     apart = np.abs(seen - expected).max(axis=-1)
-    image = np.stack([-expected[..., 1], -expected[..., 0], expected[..., 2]], axis=-1)
-    return np.asarray(np.minimum(apart, np.abs(seen - image).max(axis=-1)) if mirrored else apart)
+    if middle is None:
+        return np.asarray(apart)
+    twice = 2.0 * middle
+    image = np.stack(
+        [twice - expected[..., 1], twice - expected[..., 0], expected[..., 2]], axis=-1
+    )
+    return np.asarray(np.minimum(apart, np.abs(seen - image).max(axis=-1)))
 
 
 BRANCHING = (SpecialKind.PD, SpecialKind.BPC, SpecialKind.CH)  # at which other families begin

@@ -26,7 +26,7 @@ from saltus.studies.diagram.simulated import (
     SimulatedMotions,
     starts_at,
 )
-from saltus.systems import System, Window, within_window
+from saltus.systems import System, Window, middle_of, within_window
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class DiagramSearch:
             states.reshape(-1, self.system.dimension),
             progress,
         )
-        self.found = AttractorsFound(motions, self.max_period)
+        self.found = AttractorsFound(motions, self.max_period, self.middle)
 
     def simulated(
         self, values: np.ndarray, states: np.ndarray, progress: Progress = silent
@@ -128,9 +128,14 @@ class DiagramSearch:
         return self.work.path
 
     @cached_property
-    def mirrored(self) -> bool:
-        """Whether the mirror image of a motion is a motion too."""
-        return keeps_symmetry(self.system, self.path)
+    def middle(self) -> float:
+        """The place from which extrema are compared, so that mirror images have equal ones."""
+        return middle_of(self.system) or 0.0
+
+    @cached_property
+    def image_middle(self) -> float | None:
+        """The place about which the mirror image of a motion is a motion too; None without one."""
+        return middle_of(self.system) if keeps_symmetry(self.system, self.path) else None
 
     def follow_motions(self, progress: Progress) -> None:
         """Follow the attractors that were simulated and lie on no branch, until none is left that
@@ -168,13 +173,13 @@ class DiagramSearch:
         for first in np.unique(self.found.looked[rows]).tolist():
             some = rows[self.found.looked[rows] == first]
             there = placed(
-                self.found.motions.only(some), self.branches.placed[first:], self.mirrored
+                self.found.motions.only(some), self.branches.placed[first:], self.image_middle
             )
             self.found.assignment[some[there]] = BranchAssignment.ON_BRANCH
         self.found.looked[rows] = count
 
     def _is_placed(self, row: int, branches: list[PlacedBranch]) -> bool:
-        return bool(placed(self.found.motions.only([row]), branches, self.mirrored)[0])
+        return bool(placed(self.found.motions.only([row]), branches, self.image_middle)[0])
 
     def _is_partial(self, run: np.ndarray) -> bool:
         """Whether the orbits of a run are followed only while they are stable: those of long
@@ -286,7 +291,9 @@ class DiagramSearch:
         ended = 0
         watch = part_of(progress, 1.0, 1.0, "following motions from neighbouring values")
         for number in range(SETTINGS.rounds):
-            known = stable_motions(self.branches.placed, self.grid, self.system.dimension)
+            known = stable_motions(
+                self.branches.placed, self.grid, self.system.dimension, self.middle
+            )
             values, states = self.found.seeds(self.system, self.grid, known, since)
             more_values, more_states = self._beyond_ends(
                 self.branches.placed[ended:] if number < self.effort.jumps else []
@@ -348,13 +355,13 @@ class DiagramSearch:
         assert self.band_search is not None
         search = self.band_search
         known = len(self.found.motions)
-        begin = partial(search.begin, _without_repetition(motions))
+        begin = partial(search.begin, _without_repetition(motions, self.middle))
         self._beside(self.follow_motions, begin, part_of(progress, 0.0, 0.3))
         if more is not None:
             look = partial(search.beside_special_points, band_origins(self.branches.branches))
             self._beside(more, look, part_of(progress, 0.3, 0.4))
         # without those that the search knows already
-        later = _without_repetition(self.found.motions.only(slice(known, None)))
+        later = _without_repetition(self.found.motions.only(slice(known, None)), self.middle)
         self._take_begun()
         search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
@@ -449,9 +456,9 @@ class DiagramSearch:
         return inside
 
 
-def _without_repetition(motions: SimulatedMotions) -> SimulatedMotions:
+def _without_repetition(motions: SimulatedMotions, middle: float) -> SimulatedMotions:
     """Each attractor once, every value, and the motions that have not settled."""
-    found = AttractorsFound(motions, RECURRENCE.compiled_max_period)
+    found = AttractorsFound(motions, RECURRENCE.compiled_max_period, middle)
     kept = (
         np.unique(motions.value, return_index=True)[1],
         found.rows,

@@ -263,6 +263,7 @@ class AttractorsFound:
 
     motions: SimulatedMotions
     max_period: int  # the longest period of orbits that are followed
+    middle: float  # the place about which motions may be mirror images
     # (n,): a `BranchAssignment` for each motion, kept up to date for `rows` only
     assignment: np.ndarray = field(init=False)
     # (n,): a motion was compared with so many branches, the first ones
@@ -292,7 +293,7 @@ class AttractorsFound:
         """Find the attractors: motions at one value are on one attractor if they have the same
         period and the same extrema, or those of the mirror image."""
         rows = np.flatnonzero(self.motions.periodic)
-        table = as_chart_motions(self.motions.only(rows))
+        table = as_chart_motions(self.motions.only(rows), self.middle)
         seen = (table[name] for name in ("other", "amplitude", "slowest", "period"))
         order = np.lexsort((rows, *seen, self.motions.value[rows]))
         rows, table = rows[order], table[order]
@@ -335,7 +336,7 @@ class AttractorsFound:
         runs first.
         """
         motions = self.motions.only(rows)
-        table = as_chart_motions(motions)
+        table = as_chart_motions(motions, self.middle)
         order = np.lexsort((motions.value, table["impact_count"], table["period"]))
         alike = is_alike(table[order][1:], table[order][:-1], ALIKE.family)
         runs = np.split(rows[order], 1 + np.flatnonzero(~alike)) if len(rows) else []
@@ -360,20 +361,22 @@ class AttractorsFound:
             Only attractors that were first found by the motion of this row, or later.
         """
         rows = self.rows[np.isin(self.motions.value[self.rows], grid)]
-        mine = as_chart_motions(self.motions.only(rows))
+        mine = as_chart_motions(self.motions.only(rows), self.middle)
         mine["cell"] = np.searchsorted(grid, self.motions.value[rows])
         every = by_cell(np.concatenate([mine, known]))
         cell, states = seeds(system, by_cell(mine[rows >= since]), every, (1, len(grid)))
         return grid[cell], states
 
 
-def as_chart_motions(motions: SimulatedMotions) -> np.ndarray:
-    """The motions as records of a chart, all in cell 0, so that they are compared by the same
-    functions.
+def as_chart_motions(motions: SimulatedMotions, middle: float) -> np.ndarray:
+    """The motions as records of a chart, all in cell 0 and with extrema from the `middle` on, so
+    that they are compared by the same functions.
     """
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
-    for name in ("period", "impact_count", "amplitude", "slowest"):
+    for name in ("period", "impact_count", "slowest"):
         table[name] = getattr(motions, name)
-    table["other"] = np.minimum(motions.highest, -motions.lowest)
+    high, low = motions.highest - middle, middle - motions.lowest
+    table["amplitude"] = np.maximum(high, low)
+    table["other"] = np.minimum(high, low)
     table["state"] = motions.last
     return table
