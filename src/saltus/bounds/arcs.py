@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.bounds.balls import UP, Ball, nearly_inverse, product
+from saltus.bounds.balls import UP, Ball, product
 from saltus.bounds.krawczyk import natural_weights
 from saltus.bounds.shooting import Enclosure, Shooting
 
@@ -105,7 +105,7 @@ def arc_box(shooting: Shooting, x: np.ndarray, row: np.ndarray, half: float) -> 
         z = (Ball(np.eye(len(x))) - product(Ball(inverse), jacobian)).magnitude
         reach = (y + z @ radius * (1.0 + 1e-12)) * UP
         if (reach < radius).all():
-            turn = _turn(inverse, jacobian, tangent, unit)
+            turn = _turn(inverse, jacobian, tangent, unit, shooting.scales)
             return ArcBox(x, tangent, radius, row, half, turn, enclosure)
         if not (z @ shooting.scales / shooting.scales).max() < SETTINGS.hopeless:
             return None
@@ -123,7 +123,7 @@ def _zero_on(
         if not enclosure.proved:
             return None
         residual, jacobian = shooting.system_rows(enclosure, Ball(x))
-        nearly = nearly_inverse(jacobian.middle)
+        nearly = shooting.nearly_inverse(jacobian.middle)
         if nearly is None:
             return None
         inverse = nearly
@@ -132,15 +132,21 @@ def _zero_on(
     return x, inverse, residual
 
 
-def _turn(inverse: np.ndarray, jacobian: Ball, tangent: np.ndarray, unit: np.ndarray) -> int:
-    """The sign of d parameter / ds, from J X' = e over the box; 0 if it is not certain."""
+def _turn(
+    inverse: np.ndarray, jacobian: Ball, tangent: np.ndarray, unit: np.ndarray, scales: np.ndarray
+) -> int:
+    """The sign of d parameter / ds, from J X' = e over the box; 0 if it is not certain.
+
+    With E = |I - A J| and C = |A (e - J t)|, |X' - t| <= C + E w max(C / w) / (1 - max(E w / w))
+    for every w > 0; w are the natural scales of the unknowns.
+    """
     off = product(
         Ball(inverse), Ball(unit[:, None]) - product(jacobian, Ball(tangent[:, None]))
     ).magnitude[:, 0]
     z = (Ball(np.eye(len(unit))) - product(Ball(inverse), jacobian)).magnitude
-    rows = z.sum(axis=1) * UP
-    norm = float(rows.max())
+    rows = (z @ scales) * (1.0 + 1e-12) * UP
+    norm = float((rows / scales).max()) * UP
     if not norm < 1.0:
         return 0
-    error = (off[-1] + rows[-1] * off.max() / (1.0 - norm)) * UP
+    error = (off[-1] + rows[-1] * (float((off / scales).max()) * UP / (1.0 - norm))) * UP * UP
     return 0 if abs(tangent[-1]) <= error else int(np.sign(tangent[-1]))

@@ -83,6 +83,10 @@ class Ball:
         """The same balls in another shape."""
         return Ball(self.middle.reshape(*shape), self.radius.reshape(*shape))
 
+    def scaled(self, factors: np.ndarray) -> Ball:
+        """Times powers of two, which leave no rounding."""
+        return Ball(self.middle * factors, self.radius * factors)
+
     @property
     def transposed(self) -> Ball:
         """With the last two axes exchanged."""
@@ -165,6 +169,11 @@ def _sparse_product(left: Ball, right: Ball) -> Ball:
     if left.radius.any():
         spread = spread + left.radius @ (sizes + outer)
     return Ball(left.middle @ middle, spread * (1.0 + (n + 4) * EPS) * UP + (n + 1) * TINY)
+
+
+def powers_of_two(sizes: np.ndarray) -> np.ndarray:
+    """The powers of two nearest to some sizes, by which numbers are scaled without rounding."""
+    return np.asarray(np.exp2(np.round(np.log2(sizes))))
 
 
 def nearly_inverse(matrix: np.ndarray) -> np.ndarray | None:

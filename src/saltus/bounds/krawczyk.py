@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.bounds.balls import EPS, UP, Ball, nearly_inverse, product, solve
+from saltus.bounds.balls import EPS, UP, Ball, powers_of_two, product, solve
 from saltus.bounds.shooting import Enclosure, Shooting
 
 
@@ -149,7 +149,7 @@ def _newton(shooting: Shooting, steps: int) -> tuple[np.ndarray, np.ndarray, Bal
         residual, jacobian = shooting.system_rows(enclosure, Ball(x))
         if not enclosure.proved or not np.isfinite(jacobian.middle).all():
             return NotProved("a Taylor step at the orbit has no enclosure")
-        nearly = nearly_inverse(jacobian.middle)
+        nearly = shooting.nearly_inverse(jacobian.middle)
         if nearly is None:
             return NotProved("the equations are singular there")
         inverse = nearly
@@ -167,12 +167,7 @@ def natural_weights(shooting: Shooting, inverse: np.ndarray) -> np.ndarray:
     """How far the unknowns move, in natural scales, where every equation is off by its natural
     scale: row sums of the inverse Jacobian that depend on no units.
     """
-    nodes = shooting.scales[shooting.event_unknowns :][: 2 * shooting.dof]
-    rows = np.ones(len(inverse))
-    if len(nodes):
-        count = 2 * shooting.dof * len(shooting.steps)
-        rows[:count] = np.tile(nodes, len(shooting.steps))
-    return np.asarray(np.abs(inverse) @ rows / shooting.scales)
+    return np.asarray(np.abs(inverse) @ shooting.row_scales / shooting.scales)
 
 
 def _widest(
@@ -236,6 +231,11 @@ def only_one(
     rows = np.array([2 * d * k + j for k in range(len(shooting.steps)) for j in varied])
     pin, goal = shooting.pins[0]
     others = np.setdiff1d(np.arange(shooting.size), columns)
+    # In natural scales, so that the result depends on no units.
+    units = powers_of_two(shooting.scales[columns])
+    equations = powers_of_two(shooting.row_scales[rows])
+    scaled_pin = pin[columns] * units
+    share = float(powers_of_two(np.abs(scaled_pin).max()))
     for halving in range(settings.halvings):
         box = zero.unique.copy()
         box[others] *= 0.5**halving
@@ -243,6 +243,7 @@ def only_one(
         if not enclosure.proved:
             continue
         jacobian = shooting.system_rows(enclosure, Ball(x, box))[1][np.ix_(rows, columns)]
+        jacobian = jacobian.scaled(units / equations[:, None])
         left = np.linalg.svd(jacobian.middle)[0][:, -1]
         size = len(columns) + 1
         middle = np.zeros((size, size))
@@ -250,17 +251,20 @@ def only_one(
         middle[:-1, :-1] = jacobian.middle
         radius[:-1, :-1] = jacobian.radius
         middle[:-1, -1] = left
-        middle[-1, :-1] = pin[columns]
+        middle[-1, :-1] = scaled_pin / share
         right = np.zeros((size, 1))
-        right[-1] = goal
+        right[-1] = goal / share
         solution = solve(Ball(middle, radius), Ball(right))
-        if solution is not None and solution[:-1, 0].inside(x[columns], zero.unique[columns]):
+        if solution is None:
+            continue
+        if solution[:-1, 0].inside(x[columns] / units, zero.unique[columns] / units):
             return box
     return None
 
 
 def return_map(shooting: Shooting, enclosure: Enclosure) -> Ball | None:
-    """The derivative M of the return map of the first event's unknowns, (P, P).
+    """The derivative M of the return map of the first event's unknowns, in units near their natural
+    scales, (P, P).
 
     The equations are cut open at this event: L d = -B d_1, with B the derivatives to the start of
     the first step.
@@ -271,8 +275,10 @@ def return_map(shooting: Shooting, enclosure: Enclosure) -> Ball | None:
     Ball | None
         None where L was not shown to be regular.
     """
-    left = enclosure.open_jacobian.ball
-    right = enclosure.start_jacobian.ball
+    columns = powers_of_two(shooting.scales[: enclosure.open_jacobian.middle.shape[1]])
+    rows = powers_of_two(shooting.row_scales[: len(enclosure.open_jacobian.middle)])[:, None]
+    left = enclosure.open_jacobian.ball.scaled(columns / rows)
+    right = enclosure.start_jacobian.ball.scaled(columns[: shooting.event_size] / rows)
     solution = solve(left, right)
     return None if solution is None else -solution[: shooting.event_size]
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.bounds.balls import TWO_PI_RADIUS, Ball, product
+from saltus.bounds.balls import TWO_PI_RADIUS, Ball, nearly_inverse, powers_of_two, product
 from saltus.bounds.tape import Steps, Tape, load_balls
 from saltus.systems import System, natural_units, numbers
 from saltus.taylor import FREQUENCY, Expr, differentiate, number, substitute
@@ -315,34 +315,57 @@ class Shooting:
             self._groups.append(made[key])
         self._distinct = list(made.values())
         self._layout(guess)
+        enclosure = self.enclose(Ball(self.x0))
         for _ in range(HALVINGS):
-            if self.enclose(Ball(self.x0)).proved:
+            if enclosure.proved:
                 break
             self.settings = replace(self.settings, step=0.5 * self.settings.step)
             self._layout(guess)
+            enclosure = self.enclose(Ball(self.x0))
         nodes = sum(not step.from_event for step in self.steps)
         self.names = [name for names in event_names for name in names]
         self.names += [*state_names] * nodes + [path or ""] * (self.pins is not None)
-        self.scales = self._natural_scales()
+        self._state_scales = _largest_states(enclosure, self.dof)
+        self.scales = self._natural_scales(state_names)
 
     @property
     def size(self) -> int:
         """The number of unknowns."""
         return int(self.x0.size)
 
-    def _natural_scales(self) -> np.ndarray:
+    def _natural_scales(self, state_names: Sequence[str]) -> np.ndarray:
         """The unit of each unknown in which the sizes of boxes are measured: 1 / Omega of a time,
-        and of all others the largest modulus of their kind along the orbit.
+        and of all others the largest modulus of their kind among the unknowns, or along the motion
+        where all of them vanish.
         """
         result = np.ones(self.size)
+        along = dict(zip(state_names, self._state_scales, strict=True))
+        fastest = float(self._state_scales[self.dof :].max())
         for name in dict.fromkeys(self.names):
             places = [place for place, other in enumerate(self.names) if other == name]
             largest = float(np.abs(self.x0[places]).max())
-            result[places] = largest if largest > 0.0 else 1.0
+            result[places] = largest if largest > 0.0 else along.get(name, fastest)
         if self.free_time:
             times = range(0, self.event_unknowns, self.event_size)
             result[times] = 1.0 / self.parameters.middle[self.frequency_place]
         return result
+
+    @property
+    def row_scales(self) -> np.ndarray:
+        """The natural scale of each equation: of a motion, the largest modulus of this coordinate or
+        velocity along it; of a pin, the largest of its terms.
+        """
+        pins = [float(np.abs(row * self.scales).max()) for row, _ in self.pins or []]
+        return np.concatenate([np.tile(self._state_scales, len(self.steps)), pins])
+
+    def nearly_inverse(self, jacobian: np.ndarray) -> np.ndarray | None:
+        """A matrix near the inverse of a Jacobian with its pins, computed in natural scales, so that
+        it depends on no units; None where it is singular.
+        """
+        rows = powers_of_two(self.row_scales)
+        columns = powers_of_two(self.scales)
+        inverse = nearly_inverse(jacobian * columns / rows[:, None])
+        return None if inverse is None else inverse * columns[:, None] / rows
 
     def by_name(self, radius: np.ndarray) -> dict[str, float]:
         """The least of some radii for each kind of unknowns."""
@@ -695,6 +718,19 @@ class Shooting:
                 ):
                     return False
         return True
+
+
+def _largest_states(enclosure: Enclosure, dof: int) -> np.ndarray:
+    """The largest moduli of the coordinates and of the velocities along a motion, nearly, (2 D)."""
+    result = np.zeros(2 * dof)
+    for coefficients, length in zip(enclosure.coefficients, enclosure.lengths, strict=True):
+        sizes = np.abs(coefficients.middle)
+        orders = np.arange(sizes.shape[1])
+        powers = np.abs(length.middle) ** orders
+        positions = sizes @ powers
+        velocities = (sizes * orders)[:, 1:] @ powers[:-1]
+        result = np.fmax(result, np.concatenate([positions, velocities]))
+    return np.where((result > 0.0) & np.isfinite(result), result, 1.0)
 
 
 class _Begins:

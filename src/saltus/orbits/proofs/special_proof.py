@@ -199,7 +199,8 @@ def _singular(
     made = orbit.equations.segments_to_prove(orbit.solution)
     if isinstance(made, CannotProve):
         return made
-    kernel = _kernel(shooting_of(orbit, made, settings=steps), theta)
+    plain = shooting_of(orbit, made, settings=steps)
+    kernel = _kernel(plain, theta)
     events, size = made.guess.shape
     guess = np.concatenate([made.guess, kernel[: made.guess.size].reshape(events, size)], axis=1)
     unknowns = Unknowns(orbit.equations.system_at(orbit.solution.values), made.free_time)
@@ -219,22 +220,25 @@ def _singular(
     )
     probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
     row = np.zeros(probe.size)
+    goal = 0.0
     for i in range(events):
-        row[2 * size * i + size : 2 * size * (i + 1)] = guess[i, size:]
-    probe.pins = [(row, float(row @ row))]
+        scales = plain.scales[size * i : size * (i + 1)]
+        row[2 * size * i + size : 2 * size * (i + 1)] = guess[i, size:] / scales**2
+        goal += float(((guess[i, size:] / scales) ** 2).sum())
+    probe.pins = [(row, goal)]
     return probe
 
 
 def _kernel(plain: Shooting, theta: float) -> np.ndarray:
-    """The kernel vector of the equations that are closed with a factor `theta`; its largest entry
-    of an event is 1.
+    """The kernel vector of the equations that are closed with a factor `theta`; in natural scales
+    its largest entry of an event is 1.
     """
     enclosure = plain.enclose(Ball(plain.x0))
     matrix = enclosure.open_jacobian.middle.copy()
     width = plain.event_size
     matrix[:, :width] = theta * matrix[:, :width] + enclosure.start_jacobian.middle
-    kernel = np.linalg.svd(matrix)[2][-1]
-    return np.asarray(kernel / np.abs(kernel[: plain.event_unknowns]).max())
+    scaled = np.linalg.svd(matrix * plain.scales / plain.row_scales[:, None])[2][-1]
+    return np.asarray(plain.scales * scaled / np.abs(scaled[: plain.event_unknowns]).max())
 
 
 def _touching(
