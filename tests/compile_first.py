@@ -8,18 +8,18 @@ from functools import partial
 from saltus.flow.kernel.compiled import load_contacts_kernel, load_kernel
 from saltus.flow.kernel.orbit_segments import load_contact_segments, load_segments
 from saltus.flow.lanes.compiled_lanes import load_driver, load_helpers
-from saltus.web.objects import kernel_object
+from saltus.web.objects import kernel_code
 
 # The kernels that all models share, here and on pages, those that take longest first.
 PARTS = {
     "driver": load_driver,
     "driver for contacts": partial(load_driver, several=True),
-    "page's kernel for contacts": partial(kernel_object, True),
+    "page's kernel for contacts": partial(kernel_code, True),
     "kernel": load_kernel,
     "kernel for contacts": load_contacts_kernel,
     "segments for contacts": load_contact_segments,
     "segments": load_segments,
-    "page's kernel": partial(kernel_object, False),
+    "page's kernel": partial(kernel_code, False),
     "helpers": load_helpers,
     "helpers for contacts": partial(load_helpers, several=True),
 }

@@ -1,7 +1,7 @@
-"""Both kernels and the functions of every class of models are compiled and linked for the page, on
-every machine to the same bytes.
+"""Both kernels and the functions of every class of models are compiled for the page, on every
+machine to the same bytes.
 
-These tests need no browser and no node: what a page lacks is seen when it is linked.
+These tests need no browser and no node: what a page lacks is read from what the modules import.
 """
 
 import os
@@ -13,7 +13,6 @@ from what_works.refused import REFUSED
 import saltus
 from saltus.web import objects
 from saltus.web.description import page_parts
-from saltus.web.object_files import OF_FUNCTION, ObjectFile
 
 # What each kernel is given by a structure: nothing, as functions are places of the page's table.
 KERNELS = {"one contact": False, "several contacts": True}
@@ -23,12 +22,15 @@ OTHER_MACHINES = {
 }
 
 
+# what each module takes from the page
+SHARED = {"__linear_memory", "__indirect_function_table", "__stack_pointer"}
+
+
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_a_kernel_of_the_page_calls_nothing_that_is_not_in_it(kernel):
-    symbols = ObjectFile(objects.kernel_object(KERNELS[kernel])).symbols
-    missing = [s.name for s in symbols if s.kind == OF_FUNCTION and not s.defined]
-    assert missing == []
-    assert {"advance", "rewind", "sqrt"} <= {s.name for s in symbols if s.public}
+    imported = _imports(objects.kernel_code(KERNELS[kernel]))
+    assert imported
+    assert imported <= SHARED
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,32 +41,64 @@ def test_every_class_of_models_has_a_page_or_is_refused_in_one_sentence(name, tm
             saltus.page(system, path=tmp_path / "page.html", **start)
         return
     content, described = page_parts(system)
-    assert content[:8] == b"\0asm\1\0\0\0"
-    assert 2 not in _sections(content)  # it imports nothing
+    kernel, structure = described["engine"]["code_sizes"]
+    assert len(content) == kernel + structure
+    assert _imports(content[:kernel]) <= SHARED
+    assert _imports(content[kernel:]) <= SHARED | set(objects.KERNEL_FUNCTIONS)
     assert described["engine"]["several"] == system.model.holds_coordinates
     assert saltus.page(system, path=tmp_path / "page.html", **start).stat().st_size > 50_000
 
 
-def _sections(content):
-    """The numbers of a module's sections."""
-    found, at = [], 8
-    while at < len(content):
-        found.append(content[at])
-        size, shift, at = 0, 0, at + 1
+def _imports(code):
+    """The names that a module imports: its second section, behind the types."""
+    assert code[:8] == b"\0asm\1\0\0\0"
+    at = 8
+
+    def number():
+        nonlocal at
+        value = shift = 0
         while True:
-            byte, at = content[at], at + 1
-            size, shift = size | (byte & 0x7F) << shift, shift + 7
+            byte, at = code[at], at + 1
+            value, shift = value | (byte & 0x7F) << shift, shift + 7
             if byte < 0x80:
-                break
+                return value
+
+    def text():
+        nonlocal at
+        size = number()
         at += size
-    return found
+        return code[at - size : at].decode()
+
+    kind, at = code[at], at + 1
+    assert kind == 1
+    size = number()
+    at += size
+    kind, at = code[at], at + 1
+    assert kind == 2
+    number()
+    names = set()
+    for _ in range(number()):
+        text()
+        names.add(text())
+        kind, at = code[at], at + 1
+        if kind == 0:  # a function and its type
+            number()
+        elif kind == 3:  # a global: its type, and whether it changes
+            at += 2
+        else:  # a table with its kind, or a memory, and their limits
+            at += kind == 1
+            bounded = number() & 1
+            number()
+            if bounded:
+                number()
+    return names
 
 
 def check_other_machines(several, monkeypatch, machines):
-    """A kernel's object file is the same to the last byte where another processor is named, and
+    """A kernel's module is the same to the last byte where another processor is named, and
     where Python orders its sets otherwise.
     """
-    known = objects.kernel_object(several)
+    known = objects.kernel_code(several)
     for number, name in enumerate(machines):
         for key, value in OTHER_MACHINES[name].items():
             monkeypatch.setitem(os.environ, key, value)

@@ -16,15 +16,14 @@ import saltus
 from saltus.errors import SaltusError
 from saltus.flow import PortableMotion, state_names
 from saltus.systems import System, children, numbers, stops_of
-from saltus.web.linker import link
-from saltus.web.objects import kernel_object, structure_object
+from saltus.web.objects import KERNEL_DATA, KERNEL_FUNCTIONS, kernel_code, structure_code
 
 FREQUENCY = "load.frequency"
-EXPORTED = ("advance", "rewind", "constants", "edges", "margins")
 
 
 def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
-    """The WebAssembly of a system's page, and the description that its engine needs beside it.
+    """The WebAssembly of a system's page, the modules of its kernel and of its structure one behind
+    the other, and the description that its engine needs beside it.
 
     Raises
     ------
@@ -33,15 +32,14 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
     """
     motion = PortableMotion(system)
     several = motion.kernel.several
-    called = [
-        argument["name"] for argument in motion.kernel.arguments if argument["kind"] == "function"
-    ]
-    objects = [kernel_object(several), structure_object(motion.functions())]
-    layout = motion.layout()
-    own = ["drawing"] if layout["drawing"] else []
-    linked = link(objects, (*EXPORTED, "matrices" if several else "geometry", *own), called)
-    engine = layout | {"pointers": linked.table, "heap": linked.heap}
-    return linked.content, description(motion) | {"engine": engine}
+    functions = motion.functions()
+    modules = [kernel_code(several), structure_code(functions)]
+    engine = motion.layout() | {
+        "functions": [KERNEL_FUNCTIONS, [function.name for function in functions]],
+        "code_sizes": [len(code) for code in modules],
+        "kernel_data": KERNEL_DATA,
+    }
+    return b"".join(modules), description(motion) | {"engine": engine}
 
 
 def description(motion: PortableMotion) -> dict[str, Any]:

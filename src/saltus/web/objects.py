@@ -1,15 +1,16 @@
-"""Object files for WebAssembly, of the kernels and of a structure's functions, made by LLVM and
-linked in Python.
+"""The WebAssembly of a page, as LLVM writes it: one module of a kernel, and one of a structure's
+functions, which share their memory.
 
 A kernel is compiled once and kept in the cache of compiled code; a structure's functions are
-compiled anew for each page, in some tenths of a second. The text of a kernel is written in a
-process of its own: numba must not optimise it for this machine.
+compiled anew for each page, in a tenth of a second. The text of a kernel is written in a process of
+its own: numba must not optimise it for this machine.
 """
 
 from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,11 @@ from saltus.taylor import (
 TARGET = "wasm32-unknown-unknown"
 # all browsers of the last years have them
 FEATURES = "+bulk-memory,+sign-ext,+nontrapping-fptoint,+mutable-globals"
+END = "end_of_data"  # the last variable of a module
+# What a kernel has for the page and for the functions of a structure; `advance` runs it.
+KERNEL_FUNCTIONS = ["advance", "rewind", "sqrt", *C_FUNCTIONS]
+# Bytes that the data of a kernel may take: behind them lie the data of a structure's functions.
+KERNEL_DATA = 1 << 16
 # What numba's code calls besides: memory that is never given back, but used again by the next call,
 # and a root.
 RUNTIME = """
@@ -98,30 +104,68 @@ def machine() -> Any:
     return target.create_target_machine(cpu="generic", features=FEATURES, opt=3, reloc="static")
 
 
-def object_code(texts: list[str], public: list[str]) -> bytes:
-    """The object file of LLVM's texts together, of which only the public functions are seen from
-    outside.
+def module(
+    texts: list[str], names: list[str], *, room: int = 0, imports: Iterable[str] = ()
+) -> bytes:
+    """The WebAssembly of LLVM's texts together, with the functions of these names.
+
+    LLVM writes a module that imports its memory, its table of functions and its stack pointer, and
+    that exports nothing. Its data begin at address 0 with one word of 4 bytes for each name, the
+    function's place in the table, and one more, the address at which the data end. Then follow
+    `room` bytes that the module does not use.
+
+    Raises
+    ------
+    SaltusError
+        A function is neither in the texts nor among the imports.
     """
     target = machine()
-    whole: Any = None
-    for text in texts:
-        part = binding.parse_assembly(_for_page(text))
+
+    def parsed(text: str) -> Any:
+        part = binding.parse_assembly(text)
         part.triple = TARGET
         part.data_layout = str(target.target_data)
         part.verify()
-        if whole is None:
-            whole = part
-        else:
-            whole.link_in(part)
-    for each in (*whole.functions, *whole.global_variables):
-        if not each.is_declaration and not each.name.startswith("llvm."):
-            each.linkage = "external" if each.name in public else "internal"
+        return part
+
+    first, *others = map(_for_page, texts)
+    code = parsed(first)
+    for text in others:
+        code.link_in(parsed(text))
+    _hide(code, names)
     options = binding.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization = options.slp_vectorization = False
     builder = binding.create_pass_builder(target, options)
-    builder.getModulePassManager().run(whole, builder)
+    builder.getModulePassManager().run(code, builder)
+    lacking = [
+        function.name
+        for function in code.functions
+        if function.is_declaration
+        and not function.name.startswith("llvm.")
+        and function.name not in imports
+    ]
+    if lacking:
+        raise SaltusError(f"a page has no function {lacking[0][:60]!r}, which these equations need")
+    # Variables keep their order: the words come first, and the end last.
+    words = ", ".join(f"ptr @{name}" for name in (*names, END))
+    declared = [f"declare void @{name}()" for name in names]
+    head = [
+        f"@words = global [{len(names) + 1} x ptr] [{words}]",
+        f"@room = global [{room} x i8] zeroinitializer",
+        f"@{END} = external global i64",
+    ]
+    whole = parsed("\n".join(head + declared))
+    whole.link_in(code)
+    whole.link_in(parsed(f"@{END} = global i64 0"))
     made: bytes = target.emit_object(whole)
     return made
+
+
+def _hide(code: Any, public: list[str]) -> None:
+    """Let only the public functions be seen from outside."""
+    for part in (*code.functions, *code.global_variables):
+        if not part.is_declaration and not part.name.startswith("llvm."):
+            part.linkage = "external" if part.name in public else "internal"
 
 
 def _for_page(text: str) -> str:
@@ -139,8 +183,8 @@ def _for_page(text: str) -> str:
 # --- the kernels -------------------------------------------------------------
 
 
-def kernel_object(several: bool) -> bytes:
-    """The object file of a kernel, with the elementary functions: from the cache, or made."""
+def kernel_code(several: bool) -> bytes:
+    """The module of a kernel, with the elementary functions: from the cache, or made."""
     sources = [
         PortableKernel(several).source,
         source_of(elementary),
@@ -148,26 +192,26 @@ def kernel_object(several: bool) -> bytes:
         source_of(sys.modules[__name__]),
     ]
     return kept_bytes(
-        f"page_{digest(*sources, binding.llvm_version_info.__repr__())}.o",
+        f"page_{digest(*sources, binding.llvm_version_info.__repr__())}.wasm",
         lambda: _made_elsewhere(several),
     )
 
 
 def _made_elsewhere(several: bool) -> bytes:
-    """A kernel's object file, made by a new process."""
+    """A kernel's module, made by a new process."""
     call = f"from saltus.web import objects; objects.make_kernel({several!r}, path)"
     return made_elsewhere(call, "the kernel for a page")
 
 
 def make_kernel(several: bool, path: str) -> None:
-    """Write a kernel's object file; called in a process of its own."""
+    """Write a kernel's module; called in a process of its own."""
     motion = PortableKernel(several)
     texts = [RUNTIME]
     for function, signature in functions_of(motion.source):
         text, name = llvm_of(function, signature)
         texts += [text, advance_text(name, motion.arguments)]
     texts += [part for text in elementary_texts() for part in text]
-    Path(path).write_bytes(object_code(texts, ["advance", "rewind", "sqrt", *C_FUNCTIONS]))
+    Path(path).write_bytes(module(texts, KERNEL_FUNCTIONS))
 
 
 def advance_text(inner: str, arguments: list[dict[str, Any]]) -> str:
@@ -225,9 +269,10 @@ define i32 @advance(ptr %request) {{
 # --- a structure's functions -------------------------------------------------
 
 
-def structure_object(functions: list[WrittenFunction]) -> bytes:
-    """The object file of a structure's functions; WebAssembly has no fused multiply-adds, with
-    which series divide faster.
+def structure_code(functions: list[WrittenFunction]) -> bytes:
+    """The module of a structure's functions; WebAssembly has no fused multiply-adds, with which
+    series divide faster.
     """
     functions = [replace(each, arithmetic=each.arithmetic.unfused()) for each in functions]
-    return object_code([llvm_text(functions)], [function.name for function in functions])
+    names = [function.name for function in functions]
+    return module([llvm_text(functions)], names, room=KERNEL_DATA, imports=KERNEL_FUNCTIONS)

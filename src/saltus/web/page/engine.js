@@ -26,25 +26,61 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {{kind: string, role: string, points: number}[]} drawing  The shapes of the model's own drawing.
  * @property {boolean} energy @property {string[]} event_kinds
  * @property {Record<number, string>} refusals @property {Record<number, string>} stops @property {Record<string, string>} stop_meanings
- * @property {Record<string, number>} pointers @property {number} heap
+ * @property {string[][]} functions  Of the kernel and of the structure, in the order of their words in memory.
+ * @property {number[]} code_sizes  Bytes of both modules. @property {number} kernel_data  Bytes that the data of the kernel may take.
  *
  * @typedef {object} EngineDescription  What the engine needs of the page's description.
  * @property {Layout} engine
  * @property {{path: string, value: number}[]} numbers
  * @property {{coordinates: {name: string, velocity: string}[], contacts: {name: string}[], frictions: {name: string}[]}} model
  *
- * @typedef {object} Exports  What Python has compiled.
- * @property {WebAssembly.Memory} memory
+ * @typedef {object} Functions  What Python has compiled.
  * @property {(request: number) => number} advance @property {(top: number) => void} rewind
  * @property {(parameters: number, out: number) => void} constants @property {(parameters: number, out: number) => void} edges
  * @property {(...all: any[]) => void} geometry @property {(...all: any[]) => void} matrices @property {(...all: any[]) => void} margins
  * @property {(...all: any[]) => void} [drawing]
  */
 
-/** @param {Uint8Array | ArrayBuffer} wasm @param {EngineDescription} description */
+// Bytes of the stack, and of a unit of memory; how many functions the table can hold.
+const STACK = 1 << 18;
+const PAGE = 1 << 16;
+const MOST_FUNCTIONS = 1024;
+
+/**
+ * The modules of the kernel and of the structure, in one memory. @param {Uint8Array | ArrayBuffer} wasm @param {EngineDescription} description
+ */
 export async function open(wasm, description) {
-  const made = await WebAssembly.instantiate(/** @type {any} */ (wasm), {});
-  return new Engine(/** @type {any} */ (made).instance ?? made, description);
+  const { functions, code_sizes: sizes, kernel_data: room } = description.engine;
+  const [kernelSize = 0] = sizes;
+  const memory = new WebAssembly.Memory({ initial: Math.ceil((wasm.byteLength + room + STACK) / PAGE) + 16 });
+  const stack = new WebAssembly.Global({ value: "i32", mutable: true }, 0);
+  /** @type {Record<string, any>} */
+  const made = {};
+  /**
+   * Run a module, whose data begin with the words that `module` of Python's `web/objects.py` writes; gives the end of its data.
+   * @param {Uint8Array | ArrayBuffer} code @param {string[]} names
+   */
+  const run = async (code, names) => {
+    const table = new WebAssembly.Table({ element: "anyfunc", initial: MOST_FUNCTIONS });
+    // The names with lines below are LLVM's.
+    const env = { ...made, __linear_memory: memory, __indirect_function_table: table, __stack_pointer: stack };
+    await WebAssembly.instantiate(/** @type {any} */ (code), { env });
+    const words = new Uint32Array(memory.buffer, 0, names.length + 1);
+    names.forEach((name, i) => (made[name] = table.get(words[i] ?? 0)));
+    return { table, end: (words[names.length] ?? 0) + 8 };
+  };
+  const kernel = await run(wasm.slice(0, kernelSize), functions[0] ?? []);
+  if (kernel.end > room) throw new Error(`the kernel has ${kernel.end} bytes of data`);
+  const data = new Uint8Array(memory.buffer, 0, kernel.end).slice();
+  const structure = await run(wasm.slice(kernelSize), functions[1] ?? []);
+  new Uint8Array(memory.buffer).set(data); // where the structure has unused bytes
+  const heap = Math.ceil(structure.end / 16) * 16 + STACK;
+  stack.value = heap; // it grows downwards
+  // The kernel calls the functions of the structure through its table.
+  const first = MOST_FUNCTIONS - (functions[1] ?? []).length;
+  const pointers = Object.fromEntries((functions[1] ?? []).map((name, i) => [name, first + i]));
+  for (const [name, place] of Object.entries(pointers)) kernel.table.set(place, made[name]);
+  return new Engine(memory, pointers, heap, /** @type {any} */ (made), description);
 }
 
 /** A system with all of its numbers, ready to run. */
@@ -72,11 +108,16 @@ export class PageSystem {
 }
 
 export class Engine {
-  /** @param {WebAssembly.Instance} instance @param {EngineDescription} description */
-  constructor(instance, description) {
+  /**
+   * @param {WebAssembly.Memory} memory @param {Record<string, number>} pointers  Places in the table, by the function's name.
+   * @param {number} heap  The first byte that is free. @param {Functions} functions @param {EngineDescription} description
+   */
+  constructor(memory, pointers, heap, functions, description) {
     this.description = description;
     this.layout = description.engine;
-    this.exports = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
+    this.memory = memory;
+    this.pointers = pointers;
+    this.functions = functions;
     this.several = this.layout.several;
     this.names = description.model.coordinates.map(({ name }) => name);
     this.rates = description.model.coordinates.map(({ velocity }) => velocity);
@@ -84,7 +125,7 @@ export class Engine {
     this.contacts = description.model.contacts.map(({ name }) => name);
     this.frictions = description.model.frictions.map(({ name }) => name);
     this.known = new Set(description.numbers.map(({ path }) => path));
-    this.top = this.layout.heap;
+    this.top = heap;
     this.width = this.several ? 1 + 2 * this.dof + this.contacts.length : 3; // of an event
     this.lengths = lengthsOf(this);
     /** @type {Record<string, number>} */
@@ -97,7 +138,7 @@ export class Engine {
     this.scratch = this.bytes(8 * 4096);
     this.results = this.bytes(8 * 4096);
     this.grow(this.top + (1 << 20));
-    this.exports.rewind(this.top);
+    this.functions.rewind(this.top);
     /** The system whose numbers are in memory. @type {PageSystem|null} */
     this.placed = null;
   }
@@ -111,19 +152,19 @@ export class Engine {
 
   /** @param {number} size */
   grow(size) {
-    const { memory } = this.exports;
+    const { memory } = this;
     const have = memory.buffer.byteLength;
     if (size > have) memory.grow(Math.ceil((size - have) / 65536));
   }
 
   /** @param {number} at @param {number} count */
   doubles(at, count) {
-    return new Float64Array(this.exports.memory.buffer, at, count);
+    return new Float64Array(this.memory.buffer, at, count);
   }
 
   /** @param {number} at @param {number} count */
   longs(at, count) {
-    return new BigInt64Array(this.exports.memory.buffer, at, count);
+    return new BigInt64Array(this.memory.buffer, at, count);
   }
 
   /** Where an argument of the kernel is. @param {string} name */
@@ -150,7 +191,7 @@ export class Engine {
 
   /** The numbers of the motion, by the names of Python's record. */
   record() {
-    const view = new DataView(this.exports.memory.buffer, this.address("numbers"), this.layout.record_size);
+    const view = new DataView(this.memory.buffer, this.address("numbers"), this.layout.record_size);
     const place = (/** @type {string} */ name) => /** @type {[number, boolean]} */ (this.layout.record[name]);
     return {
       /** @param {string} name @returns {number} */
@@ -176,25 +217,25 @@ export class Engine {
     if (!records.rows.length) return [new Float64Array(0), new Float64Array(0)];
     this.placed = null;
     this.put("parameters", parameters);
-    this.exports.edges(this.address("parameters"), this.results);
+    this.functions.edges(this.address("parameters"), this.results);
     return loadTable(records, this.doubles(this.results, 3 * records.pulses).slice());
   }
 
   /** The numbers that Python's traced functions make of the parameters: the constants, and the geometry of the contacts. @param {PageSystem} system @returns {[Float64Array, Float64Array]} */
   derived(system) {
-    const { exports, layout } = this;
+    const { functions, layout } = this;
     this.placed = null;
     this.put("parameters", system.parameters);
     this.put("breaks", system.breaks);
     this.put("table", system.table);
-    exports.constants(this.address("parameters"), this.address("constants"));
+    functions.constants(this.address("parameters"), this.address("constants"));
     this.doubles(this.address("constants"), layout.constant_count).set(layout.data, layout.constant_count - layout.data.length);
     const constants = this.doubles(this.address("constants"), layout.constant_count).slice();
     if (this.several) {
-      exports.matrices(...this.environment(system), 0n, this.scratch, this.results);
+      functions.matrices(...this.environment(system), 0n, this.scratch, this.results);
       return [constants, this.doubles(this.results, layout.contact_numbers).slice()];
     }
-    exports.geometry(...this.environment(system), this.address("geometry"));
+    functions.geometry(...this.environment(system), this.address("geometry"));
     return [constants, this.doubles(this.address("geometry"), 3).slice()];
   }
 
@@ -210,12 +251,12 @@ export class Engine {
    * @param {PageSystem} system @param {number} time @param {number} side @param {ArrayLike<number>} state
    */
   evaluated(system, time, side, state) {
-    return this.called(this.exports.margins, system, time, side, state, this.layout.margins.length);
+    return this.called(this.functions.margins, system, time, side, state, this.layout.margins.length);
   }
 
   /** The model's own drawing in a state, or null where it has none. @param {PageSystem} system @param {ArrayLike<number>} state @param {number} time */
   drawing(system, state, time) {
-    const { drawing } = this.exports;
+    const { drawing } = this.functions;
     if (!drawing) return null;
     const count = this.layout.drawing.reduce((sum, { points }) => sum + 2 * points + 1, 0);
     const values = Array.from(this.called(drawing, system, time, 1, state, count));

@@ -85,7 +85,7 @@ export class Run {
     engine.place(system);
     if (engine.several) engine.put("signs", layout.signs);
     else engine.put("geometry", system.geometry);
-    new Uint8Array(engine.exports.memory.buffer, engine.address("numbers"), layout.record_size).fill(0);
+    new Uint8Array(engine.memory.buffer, engine.address("numbers"), layout.record_size).fill(0);
     const record = engine.record();
     const numbers = {
       ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length, natural_time: this.naturalTime(),
@@ -172,7 +172,7 @@ export class Run {
     /** @type {Record<string, number[]>} */
     const lengths = { ...engine.lengths, ...own };
     const words = engine.layout.arguments.flatMap(({ name, kind }) =>
-      kind === "function" ? [engine.layout.pointers[name] ?? 0] : [engine.address(name), ...(lengths[name] ?? [])],
+      kind === "function" ? [engine.pointers[name] ?? 0] : [engine.address(name), ...(lengths[name] ?? [])],
     );
     engine.longs(engine.request, words.length).set(words.map((word) => BigInt(word)));
   }
@@ -188,8 +188,8 @@ export class Run {
     let status = FULL ?? 0;
     let whole = true;
     while (whole && (status === FULL || status === PAUSED)) {
-      engine.exports.rewind(engine.top);
-      status = engine.exports.advance(engine.request);
+      engine.functions.rewind(engine.top);
+      status = engine.functions.advance(engine.request);
       this.empty(steps, events);
       whole = events.length <= MOST_EVENTS && performance.now() - begun < LONGEST;
     }
