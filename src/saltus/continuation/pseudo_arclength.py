@@ -155,7 +155,7 @@ def _step(
 ) -> np.ndarray | None:
     """Newton's step, shortened where it is too long; None where there is none."""
     try:
-        step = np.linalg.solve(matrix, right)
+        step = solved_in_units(matrix, right, units.unknowns)
     except np.linalg.LinAlgError:
         return None
     longest = units.length(step, place)
@@ -251,7 +251,8 @@ class EquationCurve(Curve[P]):
                 bordered(found, normal @ (place + step - guess)),
                 left,
             )
-            matrix += np.outer(right - before - matrix @ step, step) / (step @ step)
+            along = step * self.weights**2
+            matrix += np.outer(right - before - matrix @ step, along) / (along @ step)
         return place, error
 
     def solve_beside(self, guess: np.ndarray, direction: np.ndarray, point: P) -> P | None:
@@ -341,7 +342,7 @@ class EquationCurve(Curve[P]):
         right = np.zeros(len(matrix))
         right[-1] = 1.0
         try:
-            tangent = np.linalg.solve(matrix, right)
+            tangent = solved_in_units(matrix, right, 1.0 / self.weights)
         except np.linalg.LinAlgError:
             return None
         length = self.norm(tangent)
@@ -373,6 +374,22 @@ class EquationCurve(Curve[P]):
         """The angle between the tangents, rad."""
         cosine = float(b.tangent @ (self.weights**2 * a.tangent))
         return math.acos(min(1.0, max(-1.0, cosine)))
+
+
+def solved_in_units(matrix: np.ndarray, right: np.ndarray, units: Any) -> np.ndarray:
+    """The solution of linear equations whose unknowns have units. It is found in these, with rows
+    of one size: else the pivots, and how rounding grows, would depend on the units of the user.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The matrix is singular.
+    """
+    scaled = matrix * units
+    sizes = np.abs(scaled).max(axis=1)
+    if not sizes.min() > 0.0:
+        raise np.linalg.LinAlgError("a row is 0")
+    return np.asarray(units * np.linalg.solve(scaled / sizes[:, None], right / sizes))
 
 
 def bordered(rows: np.ndarray, last: Any) -> np.ndarray:

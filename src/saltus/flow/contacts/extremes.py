@@ -22,9 +22,10 @@ from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
 
-# the speed below which a contact opens from rest after an impact without restitution
+# a gap and a speed, in natural units, below which a contact opens from rest after an impact without
+# restitution
 AT_REST = 1e-9
-HARDLY_OPEN = 1e-3  # a time in which a gap hardly opens
+HARDLY_OPEN = 1e-3  # a time in which a gap hardly opens, in natural units
 # share of a segment at both of its ends in which no extremum is looked for: guards are 0 there
 ENDS = 1e-6
 
@@ -53,7 +54,15 @@ def find_minimum(motion, c, t, h):
 
 
 @lean_jit
-def extremes_at_step(motion, t, h, begin, end, seen):
+def unit_of(units, place):
+    """The unit of a minimum: `units` are the natural ones of length, time and force."""
+    if place == SegmentExtremes.GAP:
+        return units[0]
+    return units[2]
+
+
+@lean_jit
+def extremes_at_step(motion, t, h, begin, end, units, seen):
     """Update the extremes with a step: extrema of the coordinates, inner minima of the guards,
     least values of the margins.
     """
@@ -89,8 +98,9 @@ def extremes_at_step(motion, t, h, begin, end, seen):
             else SegmentExtremes.GAP
         )
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
-        if inside and least[0] < seen[place]:
-            seen[place] = least[0]
+        value = least[0] / unit_of(units, place)
+        if inside and value < seen[place]:
+            seen[place] = value
             seen[place + 1] = least[1]
             seen[place + 2] = i
     for j in range(count, motion.margin_count):
@@ -102,9 +112,11 @@ def extremes_at_step(motion, t, h, begin, end, seen):
 
 
 @lean_jit
-def extremes_at_start(motion, hit, seen):
+def extremes_at_start(motion, hit, units, seen):
     """Begin the extremes of a segment: `PULL` is the least of the reactions of closed contacts and
     of the acceleration with which the contact `hit` opens, if it opens from rest."""
+    length = units[0]
+    time = units[1]
     for k in range(seen.size):
         seen[k] = np.inf
     seen[SegmentExtremes.TOP] = -np.inf
@@ -112,16 +124,16 @@ def extremes_at_start(motion, hit, seen):
         pull = np.inf
         coordinate = motion.contacts[i, ContactColumn.COORDINATE]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            pull = motion.margin_series[i, 0]
-        elif i == hit and abs(motion.velocities[coordinate]) < AT_REST:
-            pull = motion.signs[i] * motion.acceleration_series[coordinate, 0]
+            pull = motion.margin_series[i, 0] / unit_of(units, SegmentExtremes.PULL)
+        elif i == hit and abs(motion.velocities[coordinate]) * time < AT_REST * length:
+            pull = motion.signs[i] * motion.acceleration_series[coordinate, 0] * time**2 / length
         if pull < seen[SegmentExtremes.PULL]:
             seen[SegmentExtremes.PULL] = pull
             seen[SegmentExtremes.PULL + 1] = i
 
 
 @lean_jit
-def extremes_at_section(motion, t, seen):
+def extremes_at_section(motion, t, units, seen):
     """Update the extremes with the guards at the start of a segment without event there: a minimum
     may lie just at its start.
     """
@@ -132,6 +144,7 @@ def extremes_at_section(motion, t, seen):
         gap = motion.signs[i] * (x - contact_position(motion, i))
         value = motion.margin_series[i, 0] if closed else gap
         place = SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
+        value /= unit_of(units, place)
         if value < seen[place]:
             seen[place] = value
             seen[place + 1] = t
@@ -139,12 +152,12 @@ def extremes_at_section(motion, t, seen):
 
 
 @lean_jit
-def extremes_at_end(motion, released, seen):
+def extremes_at_end(motion, released, units, seen):
     """Update `TAIL`, the least reaction at the end of a segment of all closed contacts but the one
     that is released there.
     """
     for i in range(motion.contacts.shape[0]):
-        reaction = motion.margin_series[i, 0]
+        reaction = motion.margin_series[i, 0] / unit_of(units, SegmentExtremes.TAIL)
         if (
             motion.contacts[i, ContactColumn.CLOSED] == 1
             and i != released
@@ -155,7 +168,7 @@ def extremes_at_end(motion, released, seen):
 
 
 @lean_jit
-def gap_beside(motion, plan, s, duration, ends, seen):
+def gap_beside(motion, plan, s, duration, ends, units, seen):
     """Update `BESIDE`, the least gap at the impact with which segment s of the plan ends, of
     another contact whose speed the impact changes.
 
@@ -165,6 +178,8 @@ def gap_beside(motion, plan, s, duration, ends, seen):
     """
     own = motion.own
     count = motion.contacts.shape[0]
+    length = units[0]
+    lasts = duration / units[1]
     hit = plan[s, SegmentPlan.CONTACT]
     released = plan[s - 1, SegmentPlan.KIND] == EventCode.RELEASE
     for i in range(count):
@@ -173,10 +188,11 @@ def gap_beside(motion, plan, s, duration, ends, seen):
         sign = motion.signs[i]
         place = SegmentEnd.NUMBERS + motion.contacts[i, ContactColumn.COORDINATE]
         position = contact_position(motion, i)
-        gap = sign * (ends[place + 4 * own] - position)
-        if sign * (ends[place] - position) < AT_REST:
-            if not duration > HARDLY_OPEN:
+        gap = sign * (ends[place + 4 * own] - position) / length
+        if sign * (ends[place] - position) < AT_REST * length:
+            if not lasts > HARDLY_OPEN:
                 continue
-            power = 1 if abs(ends[place + own]) >= AT_REST else 3 if released else 2
-            gap /= duration**power
+            speed = abs(ends[place + own]) * units[1] / length
+            power = 1 if speed >= AT_REST else 3 if released else 2
+            gap /= lasts**power
         seen[SegmentExtremes.BESIDE] = min(seen[SegmentExtremes.BESIDE], gap)

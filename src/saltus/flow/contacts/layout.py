@@ -90,7 +90,8 @@ class SegmentEnd(IntEnum):
 
 
 class SegmentExtremes(IntEnum):
-    """Places in the extremes along a segment; inf where there is no such minimum."""
+    """Places in the extremes along a segment; inf where there is no such minimum. Those from `GAP`
+    to `BESIDE` are in natural units."""
 
     TOP = 0  # the largest value of any coordinate
     BOTTOM = 1  # the least value of any coordinate

@@ -90,7 +90,7 @@ def hold_contacts(motion, closed):
 
 
 @lean_jit
-def follow_segment(motion, begin, end, seen):
+def follow_segment(motion, begin, end, units, seen):
     """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it
     cannot be followed.
     """
@@ -106,7 +106,7 @@ def follow_segment(motion, begin, end, seen):
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if seen.size > 1 and h > 0.0:
-            extremes_at_step(motion, t, h, begin, end, seen)
+            extremes_at_step(motion, t, h, begin, end, units, seen)
         move(motion, h)
         if last:
             return count + 1
@@ -293,6 +293,7 @@ def follow_with(numbers, parts, request, results):
     plan = request.plan
     times = request.times
     first = request.first
+    units = request.units
     ends = results.ends
     columns = results.columns
     maps = results.maps
@@ -312,10 +313,10 @@ def follow_with(numbers, parts, request, results):
         copy_numbers(motion, ends[s], SegmentEnd.NUMBERS)
         seen = extremes[s] if extremes.shape[0] > 0 else nothing
         if extremes.shape[0] > 0:
-            extremes_at_start(motion, plan[s, SegmentPlan.HIT], seen)
+            extremes_at_start(motion, plan[s, SegmentPlan.HIT], units, seen)
             if kind < 0:
-                extremes_at_section(motion, begin, seen)
-        steps = follow_segment(motion, begin, end, seen)
+                extremes_at_section(motion, begin, units, seen)
+        steps = follow_segment(motion, begin, end, units, seen)
         if steps == 0:
             return s
         power = plan[s, SegmentPlan.POWER]
@@ -328,7 +329,9 @@ def follow_with(numbers, parts, request, results):
         if not math.isfinite(ends[s, SegmentEnd.NUMBERS + 8 * own - 1]):
             return s
         if extremes.shape[0] > 0:
-            extremes_at_end(motion, contact if kind == EventCode.RELEASE else -1, seen)
+            extremes_at_end(
+                motion, contact if kind == EventCode.RELEASE else -1, units, seen
+            )
         if kind >= 0:
             if single:
                 velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
@@ -341,7 +344,7 @@ def follow_with(numbers, parts, request, results):
             if not pass_event(motion, plan[s], ends[s], maps[s]):
                 return s
             if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
-                gap_beside(motion, plan, s, end - begin, ends[s], seen)
+                gap_beside(motion, plan, s, end - begin, ends[s], units, seen)
     return plan.shape[0]
 
 

@@ -341,6 +341,8 @@ class ContactsSegmentRequest(NamedTuple):
     plan: Any  # (n, ...), in the columns of `SegmentPlan`
     times: Any  # (n + 1,)
     first: Any  # the state at the first of them
+    # the natural units of the system in which extremes are given: of length, time and force, (3,)
+    units: Any
 
 
 class ContactsSegmentResults(NamedTuple):
@@ -394,7 +396,7 @@ _results = types.NamedTuple((_f2, _f3, _f2), SegmentResults)
 SEGMENTS = _i(NUMBERS, ENV, MODEL, types.NamedTuple((_f2, _i2, _f2), SegmentRequest), _results)
 CONTACT_SEGMENTS = _i(
     *(NUMBERS, ENV, CONTACT_MODEL, _i2),
-    types.NamedTuple((_i2, _f1, _f1), ContactsSegmentRequest),
+    types.NamedTuple((_i2, _f1, _f1, _f1), ContactsSegmentRequest),
     types.NamedTuple((_f2, _f3, _f3, _f2), ContactsSegmentResults),
 )
 IMPACT_EQUATIONS = types.void(

@@ -156,7 +156,8 @@ class Switching:
             i
             for i, timed in enumerate(self.events)
             if timed.event.is_impact
-            and abs(self.evaluation.ends[i - 1, SegmentEnd.RATE]) < TOLERANCES.touch
+            and abs(self.evaluation.ends[i - 1, SegmentEnd.RATE])
+            < TOLERANCES.touch * self.equations.natural.speed
             and timed.event.closed == self._before(i)
         ]
 
@@ -307,11 +308,9 @@ def contact_change(point: OrbitPoint) -> SpecialKind:
     orbit = point.orbit
     here = Switching.of_point(point)
     joined = next(iter(here._together(False)), None) is not None
-    return (
-        SpecialKind.SW
-        if joined or orbit.pressing <= min(orbit.slowest, orbit.clearance)
-        else SpecialKind.GR
-    )
+    natural = orbit.equations.natural
+    grazes = min(orbit.slowest / natural.speed, orbit.clearance / natural.length)
+    return SpecialKind.SW if joined or orbit.pressing <= grazes else SpecialKind.GR
 
 
 def bounces(system: System, contact: int) -> bool:
@@ -367,7 +366,9 @@ def _begun(here: Switching, events: list[Timed], known: tuple[Cycle, ...]) -> Or
         return None
     curve = here.point.curve.with_equations(found[0])
     solved = curve.known(found[1], here.point.parameters)
-    if solved is None or not np.abs(solved.evaluation.residual).max() < TOLERANCES.switching:
+    if solved is None:
+        return None
+    if not found[0].units.residual(solved.evaluation.residual) < TOLERANCES.switching:
         return None
     begun: OrbitPoint = curve.along_kernel(solved)
     return begun

@@ -62,7 +62,8 @@ class BranchLimits:
     # An orbit grows without end if its amplitude exceeds this in natural units, and exceeds that of
     # the first orbit of the branch by this factor: a thousand of the longest steps lead there.
     largest: float = 1e2
-    # A fold and a crossing of branches whose parameters differ by less than this are one point.
+    # A fold and a crossing of branches whose parameters differ by less than this, in the scale of
+    # the branch, are one point.
     same_fold: float = 1e-8
     # How far a complex pair of multipliers may be from the unit circle at an NS; a pair farther
     # outside, where areas of the state plane never grow, is an error of saltus.
@@ -201,7 +202,8 @@ class BranchEvents(OrbitEvents):
 
         def is_fold(zero: Zero) -> bool:
             crossing = zero.kind == SpecialKind.BPC and not zero.point.orbit.symmetric
-            return crossing and any(abs(zero.parameter - p) < SETTINGS.same_fold for p in folds)
+            near = SETTINGS.same_fold * zero.point.curve.scales[0]
+            return crossing and any(abs(zero.parameter - p) < near for p in folds)
 
         def impossible(zero: Zero) -> bool:
             orbit = zero.point.orbit

@@ -106,7 +106,8 @@ def keeps_symmetry(system: System, path: str) -> bool:
     value = float(system.get(path))
     for share in (1e-3, -1e-3):
         try:
-            beside = system.with_({path: value * (1 + share) + share})
+            # a share of the value, as its unit is not known; of 0 any number is beside it
+            beside = system.with_({path: value * (1 + share) if value else share})
         except ParameterError:  # on one side of a limit of the parameter
             continue
         other = mirror_of(beside.in_gap_coordinates) if is_symmetric(beside) else None

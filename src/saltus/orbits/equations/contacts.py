@@ -324,8 +324,8 @@ class ContactsEquations(OrbitEquations):
         columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]
         evaluation: Any = solution.evaluation
         seen = evaluation.seen
-        reactions = seen[:, columns].min() / self.natural.forces.max()
-        gaps = seen[:, SegmentExtremes.BESIDE].min() / self.natural.length
+        reactions = seen[:, columns].min()
+        gaps = seen[:, SegmentExtremes.BESIDE].min()
         return float(min(reactions, gaps, apart.min(initial=math.inf)))
 
     def covered(self, solution: Solution) -> int | None:
@@ -417,7 +417,8 @@ class ContactsEquations(OrbitEquations):
             first = equations.split(goal)[1][0]
             begun = begun + math.tau * round((first - begun[0]) / math.tau)
             found.append(equations.joined(begin, begun))
-        best: np.ndarray = min(found, key=lambda one: float(np.abs(one - goal).max()))
+        unknowns_apart = lambda one: float(np.abs((one - goal) / self.units.unknowns).max())  # noqa: E731
+        best: np.ndarray = min(found, key=unknowns_apart)
         return best
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
@@ -493,20 +494,19 @@ class ContactsEquations(OrbitEquations):
         seen = evaluation.seen
         phases = self.split(solution.unknowns)[1]
         events = self.signature.events
-        forces = natural.forces.max()
         found = list[Witness]()
 
-        def at(s: int, column: int, after: int, unit: float, what: str, grazes: bool) -> None:
+        def at(s: int, column: int, after: int, what: str, grazes: bool) -> None:
             number = seen[s, column + after]
             name = names[int(number)] if np.isfinite(number) else ""
-            found.append(Witness(f"{what} {name}", grazes, float(seen[s, column] / unit)))
+            found.append(Witness(f"{what} {name}", grazes, float(seen[s, column])))
 
         for s in range(len(seen)):
-            at(s, SegmentExtremes.GAP, 2, natural.length, "gap of", True)
-            at(s, SegmentExtremes.FORCE, 2, forces, "reaction of", False)
-            at(s, SegmentExtremes.PULL, 1, forces, "reaction after an event of", False)
-            at(s, SegmentExtremes.TAIL, 1, forces, "reaction before an event of", False)
-            beside = float(seen[s, SegmentExtremes.BESIDE] / natural.length)
+            at(s, SegmentExtremes.GAP, 2, "gap of", True)
+            at(s, SegmentExtremes.FORCE, 2, "reaction of", False)
+            at(s, SegmentExtremes.PULL, 1, "reaction after an event of", False)
+            at(s, SegmentExtremes.TAIL, 1, "reaction before an event of", False)
+            beside = float(seen[s, SegmentExtremes.BESIDE])
             found.append(Witness("gap at an impact of another contact", False, beside))
         for i, event in enumerate(events):
             slow = event.is_impact and self.plan[i - 1, SegmentPlan.POWER] == 0
@@ -533,7 +533,7 @@ class ContactsEquations(OrbitEquations):
         solution = point.solution
         _, phases = self.split(solution.unknowns)
         rates = -np.roll(solution.evaluation.ends[:, SegmentEnd.RATE], 1)[: phases.size]
-        if phases.size and rates.min() < TOLERANCES.touch:
+        if phases.size and rates.min() < TOLERANCES.touch * self.natural.speed:
             return self._to_prove(solution, touching=int(np.argmin(rates)))
         return CannotProve("the grazing between the events of several contacts is not proved yet")
 
@@ -607,8 +607,7 @@ class ContactsEquations(OrbitEquations):
                     seen[s, column] = math.inf
         # what opens with another contact has no gap at the start of the segment behind both, where
         # rounding makes minima
-        small = GAP_AT_REST * self.natural.length
-        for s in np.flatnonzero(np.abs(seen[:, SegmentExtremes.GAP]) <= small):
+        for s in np.flatnonzero(np.abs(seen[:, SegmentExtremes.GAP]) <= GAP_AT_REST):
             after = float(seen[s, SegmentExtremes.GAP + 1]) * frequency - phases[s]
             together = len(acting[s]) > 1 and after <= JUST_OPENED * self.closing
             if together and int(seen[s, SegmentExtremes.GAP + 2]) in acting[s]:
@@ -626,6 +625,12 @@ class ContactsEquations(OrbitEquations):
             None if followed is None else np.asarray(followed[0][0, begin : begin + 2 * self.own])
         )
 
+    @cached_property
+    def _units_of_extremes(self) -> np.ndarray:
+        """The natural units of length, time and force."""
+        natural = self.natural
+        return np.array([natural.length, natural.time, natural.forces.max()])
+
     def _followed(
         self,
         plan: np.ndarray,
@@ -640,7 +645,8 @@ class ContactsEquations(OrbitEquations):
         parameters = self._values.copy()
         parameters[self._places] = values
         numbers = self._run.structure.prepare(parameters, self._records, self._run.data)
-        return self._follower.follow_contacts(numbers, (plan, times, state), with_extremes)
+        request = (plan, times, state, self._units_of_extremes)
+        return self._follower.follow_contacts(numbers, request, with_extremes)
 
     def _assembled(
         self,
@@ -729,7 +735,7 @@ class ContactsEquations(OrbitEquations):
         ]
         extremes[:, [SegmentColumn.LOWEST_GAP, SegmentColumn.LOWEST_GAP_TIME]] = seen[
             :, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]
-        ]
+        ] * [self.natural.length, 1.0]
         extremes[:, SegmentColumn.CROSSINGS] = 0.0
         extremes[:, SegmentColumn.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
         return extremes

@@ -330,7 +330,7 @@ class OneContactEquations(OrbitEquations):
     def touching_segments(self, point: OrbitPoint) -> OrbitSegments | CannotProve:
         """In the signature with fewer impacts."""
         orbit = point.orbit
-        if orbit.slowest >= TOLERANCES.touch:
+        if orbit.slowest >= TOLERANCES.touch * self.natural.speed:
             extremes = point.evaluation.extremes
             segment = int(np.argmin(extremes[:, SegmentColumn.LOWEST_GAP]))
             time = float(extremes[segment, SegmentColumn.LOWEST_GAP_TIME])
