@@ -29,6 +29,7 @@ from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialK
 from saltus.orbits.branches.symmetry import (
     beside_image,
     falls_onto_image,
+    is_image,
     nearest,
     on_family,
     passes_image,
@@ -178,6 +179,7 @@ class BranchEvents(OrbitEvents):
             # between the last point and the end the family may have further special points
             if beside is not None:
                 run.take(beside)
+            _forget_turns(run, parent)
             run.points.append(last or parent.point)
             run.special.append(parent)
         return End(OrbitEnd.IMAGE, ahead.parameter if parent is None else parent.parameter, kind)
@@ -358,6 +360,27 @@ def _same_place(a: Zero, b: Zero) -> bool:
     same = (a.kind, one.orbit.signature) == (b.kind, other.orbit.signature)
     near = math.isclose(one.parameter, other.parameter, rel_tol=1e-10)
     return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
+
+
+def _forget_turns(run: Run, parent: Zero) -> None:
+    """Forget the folds and crossings at which a family turns back along its images at its parent.
+
+    There the equations are singular, so that rounding decides on which side of the parent these
+    zeros are seen.
+    """
+
+    def is_turn(zero: Zero) -> bool:
+        near = SETTINGS.same_fold * zero.point.curve.scales[0]
+        return (
+            zero.kind in (SpecialKind.LP, SpecialKind.BPC)
+            and abs(zero.parameter - parent.parameter) < near
+            and is_image(zero.point, TOLERANCES.grazing_orbits)
+        )
+
+    turns = [zero for zero in run.special if is_turn(zero)]
+    run.special = [zero for zero in run.special if zero not in turns]
+    own = {id(zero.point) for zero in turns}
+    run.points = [point for point in run.points if id(point) not in own]
 
 
 def parent_point(a: OrbitPoint, b: OrbitPoint) -> Zero | None:

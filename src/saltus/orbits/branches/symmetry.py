@@ -121,6 +121,8 @@ def keeps_symmetry(system: System, path: str) -> bool:
 
 # Shares of the last step: at the end itself the equations are singular.
 NEAR_THE_END = (0.99, 0.95, 0.9)
+# A shorter last step has no point nearer to the end: its tangent would be rounding.
+LAST_STEP = 1e-3
 
 
 def asymmetry(point: OrbitPoint) -> np.ndarray | None:
@@ -165,6 +167,8 @@ def beside_image(point: OrbitPoint, last: OrbitPoint) -> OrbitPoint | None:
     can be solved.
     """
     chord = last.place - point.place
+    if point.curve.norm(chord) < LAST_STEP:
+        return None
     for share in NEAR_THE_END:
         beside: OrbitPoint | None = point.curve.solve(
             between(point, last, share), chord / point.curve.norm(chord)
