@@ -115,9 +115,7 @@ class ImpactPair(saltus.ContactModel):
     @property
     def contacts(self) -> tuple[saltus.Contact, ...]:
         apart = {"y": 1.0, "x": -1.0}
-        return (
-            saltus.Contact(name="between", coordinate=apart, sign=1, position=-self.apart),
-        )
+        return (saltus.Contact(name="between", coordinate=apart, sign=1, position=-self.apart),)
 
     def mass_matrix(self, q: Any) -> Any:
         return [[self.m1, 0.0], [0.0, self.m2]]
@@ -238,11 +236,9 @@ class Case:
                 first=n[2] * length,
                 second=n[6] * length,
             )
-        system = saltus.System(
-            model=model,
-            load=saltus.Load(frequency=self.frequency, force=saltus.Harmonic(n[4] * force)),
-            impact=saltus.NewtonImpact(e=n[5]),
-        )
+        load = saltus.Load(frequency=self.frequency, force=saltus.Harmonic(n[4] * force))
+        impact = {"impact": saltus.NewtonImpact(e=n[5])} if model.contacts else {}
+        system = saltus.System(model=model, load=load, **impact)
         return system if self.rounded is None else _rounded(system, self.rounded)
 
 
@@ -260,9 +256,9 @@ def _rounded(system: saltus.System, seed: int) -> saltus.System:
 RANGES = {
     "absorber": ((0.02, 0.3), (0.01, 0.1), (0.3, 1.5), (0.8, 1.2), (0.05, 0.4), (0.4, 0.9)),
     "backlash": ((0.2, 1.0), (0.03, 0.2), (-0.2, 0.2), (0.6, 1.4), (0.1, 0.6), (0.5, 0.6)),
-    "wall": ((0.5, 1.5), (0.05, 0.3), (0.0, 1.0), (0.7, 2.5), (0.2, 0.8), (0.3, 0.9)),
+    "wall": ((0.5, 1.5), (0.05, 0.3), (0.15, 1.0), (0.7, 2.5), (0.2, 0.8), (0.3, 0.9)),
     "stops": ((0.1, 1.0), (0.03, 0.2), (0.5, 1.2), (0.7, 1.5), (0.4, 1.0), (0.3, 0.8)),
-    "pair": ((0.2, 1.5), (0.05, 0.2), (0.0, 0.6), (0.7, 2.0), (0.2, 0.8), (0.3, 0.9)),
+    "pair": ((0.2, 1.5), (0.05, 0.2), (0.15, 0.6), (0.7, 2.0), (0.2, 0.8), (0.3, 0.9)),
     "chain": ((0.1, 0.8), (0.05, 0.2), (0.2, 0.8), (0.7, 2.0), (0.2, 0.8), (0.3, 0.9)),
 }
 KINDS = tuple(RANGES)

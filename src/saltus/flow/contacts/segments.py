@@ -329,9 +329,7 @@ def follow_with(numbers, parts, request, results):
         if not math.isfinite(ends[s, SegmentEnd.NUMBERS + 8 * own - 1]):
             return s
         if extremes.shape[0] > 0:
-            extremes_at_end(
-                motion, contact if kind == EventCode.RELEASE else -1, units, seen
-            )
+            extremes_at_end(motion, contact if kind == EventCode.RELEASE else -1, units, seen)
         if kind >= 0:
             if single:
                 velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
