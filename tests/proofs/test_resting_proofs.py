@@ -88,11 +88,6 @@ def test_a_rest_that_is_too_short_is_not_proved() -> None:
         assert rest_by(proof.shooting, proof.zero.box, wrong) is None
 
 
-def test_a_certificate_of_a_rest_is_refused_by_a_sentence() -> None:
-    with pytest.raises(saltus.ParameterError, match="no certificate of an orbit with rests"):
-        _ = saltus.prove(resting(1.3, 0.3)).certificate
-
-
 def test_a_resting_orbit_s_dataset_has_its_impacts() -> None:
     data = saltus.prove(resting(1.3, 0.3)).to_xarray()
     assert data.sizes["enclosed"] == 6

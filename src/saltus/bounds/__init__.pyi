@@ -21,6 +21,7 @@ from .krawczyk import multipliers_of as multipliers_of
 from .krawczyk import only_one as only_one
 from .krawczyk import prove_zero as prove_zero
 from .krawczyk import return_map as return_map
+from .krawczyk import verified_zero as verified_zero
 from .outward import rounded_ball as rounded_ball
 from .outward import rounded_down as rounded_down
 from .outward import rounded_up as rounded_up

@@ -28,6 +28,10 @@ class KrawczykSettings:
     # A box is wide enough if its result fills this share of it.
     filled: float = 0.6
     halvings: int = 10  # of the box of a singular orbit, see `only_one`
+    # A box is told wider than the operator's image of it by this, and its image is narrower than it
+    # by `sure`: machines that round in another way verify it too.
+    room: float = 1.01
+    sure: float = 0.99
 
 
 SETTINGS = KrawczykSettings()
@@ -106,8 +110,9 @@ def prove_zero(
             return NotProved("a Taylor step over the box of the unknowns has no enclosure")
         jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
         reach = contraction(inverse, residual, jacobian, radius)
-        if (reach < radius).all():
-            tight, inner = _tightened(shooting, x, inverse, residual, reach)
+        if (reach < settings.sure * radius).all():
+            first = (radius, enclosure)
+            tight, inner = _tightened(shooting, x, inverse, residual, first, reach)
             alone = radius
             if unique:
                 alone = _widest(shooting, x, inverse, residual, radius, settings)
@@ -122,19 +127,51 @@ def prove_zero(
 
 
 def _tightened(
-    shooting: Shooting, x: np.ndarray, inverse: np.ndarray, residual: Ball, radius: np.ndarray
+    shooting: Shooting,
+    x: np.ndarray,
+    inverse: np.ndarray,
+    residual: Ball,
+    proved: tuple[np.ndarray, Enclosure],
+    reach: np.ndarray,
 ) -> tuple[np.ndarray, Enclosure]:
-    """The operator's image of a box that is known to contain the zero, as long as it shrinks to
-    half its width, and the equations over it.
+    """A smaller box that the operator maps into its interior too, with the equations over it; from
+    a box that is `proved`, and its image, as long as images shrink to half.
     """
     while True:
+        radius = np.minimum(proved[0], SETTINGS.room * reach)
         enclosure = shooting.enclose(Ball(x, radius))
         jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
-        reach = np.minimum(radius, contraction(inverse, residual, jacobian, radius))
-        shrinks = (reach / shooting.scales).sum() < 0.5 * (radius / shooting.scales).sum()
-        if not enclosure.proved or not shrinks:
+        reach = contraction(inverse, residual, jacobian, radius)
+        if not enclosure.proved or not (reach < radius).all():
+            return proved
+        if (reach / shooting.scales).sum() >= 0.5 * (radius / shooting.scales).sum():
             return radius, enclosure
-        radius = reach
+        proved = (radius, enclosure)
+
+
+def verified_zero(
+    shooting: Shooting, middle: np.ndarray, radius: np.ndarray, unique: np.ndarray
+) -> ProvedZero | NotProved:
+    """A zero that is said to lie within `radius` of a middle, and to be alone within `unique`:
+    verified anew by the operator, without a search.
+    """
+    if not middle.shape == radius.shape == unique.shape == (shooting.size,):
+        return NotProved("its unknowns are not those of the equations")
+    if not (radius <= unique).all():
+        return NotProved("its box is wider than the one in which it is alone")
+    at = shooting.enclose(Ball(middle))
+    residual, jacobian = shooting.system_rows(at, Ball(middle))
+    inverse = shooting.nearly_inverse(jacobian.middle)
+    if not at.proved or inverse is None:
+        return NotProved("the equations have no enclosure there, or are singular")
+    for box in (unique, radius):
+        enclosure = shooting.enclose(Ball(middle, box))
+        jacobian = shooting.system_rows(enclosure, Ball(middle, box))[1]
+        reach = contraction(inverse, residual, jacobian, box)
+        if not enclosure.proved or not (reach < box).all():
+            return NotProved("Krawczyk's operator does not map its box into the interior")
+    condition = float(natural_weights(shooting, inverse).max())
+    return ProvedZero(middle, radius, inverse, residual, enclosure, unique, condition)
 
 
 def _newton(shooting: Shooting, steps: int) -> tuple[np.ndarray, np.ndarray, Ball] | NotProved:
@@ -195,7 +232,7 @@ def _widest(
         jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
         reach = contraction(inverse, residual, jacobian, radius)
         worst = float((reach / radius).max())
-        if worst < 1.0:
+        if worst < settings.sure:
             best = radius
             found = True
         if found and (worst > settings.filled or attempt > 3):
