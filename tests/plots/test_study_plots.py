@@ -7,6 +7,7 @@ import pytest
 import xarray
 from matplotlib.colors import same_color
 
+import saltus
 from saltus import ParameterError, phase_portrait
 from saltus.branch_tables import branch_tables
 from saltus.plots import figure_of
@@ -251,3 +252,74 @@ def test_where_the_amplitude_is_flat_the_lowest_values_can_be_drawn():
         ParameterError, match="quantity must be one of amplitude, lowest, got 'speed'"
     ):
         draw_diagram(tree, "speed")
+
+
+def two_masses(push, damping=0.1):
+    """Two masses in a row whose stop lies far away, so that they are linear, and their matrices."""
+    mass, stiffness = np.diag([1.0, 2.0]), np.array([[2.0, -1.0], [-1.0, 1.5]])
+    structure = saltus.Structure(
+        mass=mass,
+        stiffness=stiffness,
+        damping=damping * stiffness,
+        points={"tip": [0.0, 1.0], "root": [1.0, 0.0]},
+        contacts=[
+            saltus.Contact(name=f"far_{name}", coordinate=name, position=-50.0)
+            for name in ("tip", "root")
+        ],
+        forces={"push": push},
+    )
+    load = Load(frequency=0.5, push=saltus.Harmonic(0.1))
+    system = System(model=structure, load=load, impact=saltus.NewtonImpact(e=0.0))
+    return system, mass, stiffness, damping * stiffness
+
+
+@pytest.mark.parametrize(("push", "shown"), [([0.0, 1.0], "tip"), ([1.0, 0.2], "root")])
+def test_a_branch_of_a_structure_shows_the_displacement_that_the_load_drives(push, shown):
+    """The amplitudes are those of the linear response, from the matrices."""
+    system, mass, stiffness, damping = two_masses(push)
+    orbit = saltus.find_orbit(system, **system.model.start())
+    axes = saltus.plot(saltus.continue_orbit(orbit, "load.frequency", (0.4, 0.7)))
+    assert shown in axes.get_ylabel()
+    place = {"tip": 1, "root": 0}[shown]
+    for w, amplitude in axes.lines[0].get_xydata():
+        response = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, push)
+        assert amplitude == pytest.approx(0.1 * abs(response[place]), rel=2e-4)  # drawn smoothly
+
+
+def test_a_sweep_of_a_structure_shows_what_its_branch_shows():
+    system, mass, stiffness, damping = two_masses([0.0, 1.0])
+    sweep = saltus.frequency_sweep(
+        system, [0.4, 0.5, 0.6], **system.model.start(), periods=80, stop_early=False
+    )
+    axes = saltus.plot(sweep)
+    assert "tip" in axes.get_ylabel()
+    for w, amplitude in axes.lines[0].get_xydata():
+        response = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, [0.0, 1.0])
+        assert amplitude == pytest.approx(0.1 * abs(response[1]), rel=1e-3)
+    other = saltus.plot(sweep, quantity="largest_root")
+    assert "root" in other.get_ylabel()
+
+
+def test_a_jump_of_another_quantity_is_an_arrow_and_no_ramp():
+    """A made-up sweep that jumps between its second and third value, on the way up alone."""
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    up, down = np.array([1.0, 1.0, 5.0, 5.0]), np.array([1.0, 1.0, 1.0, 5.0])
+    over = ("direction", "value")
+    jump = {"direction": ["up", "down"], "before": [2.4, 3.6], "after": [2.5, 3.5]}
+    sizes = {"amplitude_before": [1.0, 5.0], "amplitude_after": [5.0, 1.0]}
+    sweep = xarray.Dataset(
+        {
+            "amplitude": (over, np.array([up, down])),
+            "work": (over, 3.0 * np.array([up, down]), {"long_name": "work"}),
+            "hysteresis": ("value", np.array([0, 0, 1, 0])),
+            **{f"jump_{name}": ("jump", row) for name, row in (jump | sizes).items()},
+        },
+        coords={"direction": ["up", "down"], "value": values},
+        attrs={"kind": "frequency_sweep", "path": "load.frequency", "coordinate": "x"},
+    )
+    axes = saltus.plot(sweep, quantity="work")
+    x, y = axes.lines[0].get_data()
+    broken = x[np.isnan(y)]
+    assert broken == pytest.approx([2.45])
+    arrows = [(text.xyann, text.xy) for text in axes.texts]
+    assert arrows == [((2.45, 3.0), (2.45, 15.0)), ((3.55, 15.0), (3.55, 3.0))]

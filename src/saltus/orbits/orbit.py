@@ -251,6 +251,16 @@ class PeriodicOrbit(Result):
         return self.solution.evaluation.extremes
 
     @cached_property
+    def extrema(self) -> np.ndarray:
+        """The least and the largest value of each coordinate over its period, (n, 2); nan where the
+        motion cannot be followed by direct simulation.
+        """
+        try:
+            return self._own_extrema
+        except MotionError:
+            return np.full((len(self.equations.given.model.coordinates), 2), np.nan)
+
+    @cached_property
     def _own_extrema(self) -> np.ndarray:
         return self.motion().extrema
 

@@ -403,10 +403,39 @@ def parameter_name(path: str) -> str:
 
 
 def quantity_name(dataset: Any, quantity: str) -> str:
-    """The symbol of the amplitude of a dataset's coordinates, or a quantity's name in words."""
+    """The symbol of an amplitude, or a quantity's name in words."""
     if quantity == "amplitude" and "coordinate" in dataset.attrs:
         return f"${peak(dataset.attrs['coordinate'])}$"
+    kind, _, coordinate = quantity.partition("_")
+    if coordinate and coordinate in str(dataset.attrs.get("coordinate", "")).split():
+        return {
+            "amplitude": f"${peak(coordinate)}$",
+            "largest": f"${peak(coordinate, 'highest')}$",
+            "smallest": f"${peak(coordinate, 'lowest')}$",
+        }.get(kind, quantity.replace("_", " "))
     return quantity.replace("_", " ")
+
+
+def with_amplitudes(dataset: Any) -> Any:
+    """The dataset with the amplitude of each coordinate, `amplitude_x`, beside its extrema."""
+    amplitudes: dict[str, Any] = {}
+    for name in map(str, dataset.data_vars):
+        before, largest, coordinate = name.partition("largest_")
+        low = f"{before}smallest_{coordinate}"
+        if largest and before in ("", "special_") and low in dataset:
+            size = np.maximum(abs(dataset[name]), abs(dataset[low]))
+            text = {"long_name": f"max abs({coordinate})"}
+            size.attrs = {**dataset[name].attrs, **text}
+            amplitudes[f"{before}amplitude_{coordinate}"] = size
+    return dataset.assign(amplitudes)
+
+
+def shown_quantity(dataset: Any) -> str:
+    """The amplitude that is drawn of a branch or a sweep: of the coordinate that its model names,
+    else of all coordinates.
+    """
+    name = dataset.attrs.get("shown")
+    return f"amplitude_{name}" if name and f"largest_{name}" in dataset else "amplitude"
 
 
 def parameter_symbol(path: str) -> str:

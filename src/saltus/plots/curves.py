@@ -26,8 +26,10 @@ from saltus.plots.conventions import (
     parameter_name,
     peak,
     quantity_name,
+    shown_quantity,
     symbol,
     unit_in_brackets,
+    with_amplitudes,
 )
 from saltus.plots.response import MARK_NAMES, MARKS, line_handles, line_style
 
@@ -68,7 +70,7 @@ def _in_ink(dataset: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
 @drawing
 def draw_branch(
     dataset: Any,
-    quantity: str = "amplitude",
+    quantity: str | None = None,
     *,
     ax: Axes | None = None,
     width: float = LOOK.single_column,
@@ -76,8 +78,14 @@ def draw_branch(
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special
     points; returns `ax`.
 
+    The `quantity` is any number of its points. By default it is the amplitude: of a `Structure`
+    that of the local displacement which the load drives, else the largest of any coordinate. With
+    several coordinates there are "amplitude_x", "largest_x" and "smallest_x" of each coordinate x.
+
     Of the dataset of a proof, what is proved is in full ink, and the rest pale.
     """
+    dataset = with_amplitudes(dataset)
+    quantity = quantity or shown_quantity(dataset)
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     for part, ink in _in_ink(dataset):
         for line in smooth_lines(part, quantity):

@@ -28,11 +28,13 @@ from saltus.plots.conventions import (
     new_figure,
     parameter_name,
     parameter_symbol,
-    peak,
+    quantity_name,
+    shown_quantity,
     state_symbol,
     symbol,
     unit_in_brackets,
     varied,
+    with_amplitudes,
 )
 from saltus.result import MAPPED
 
@@ -442,10 +444,14 @@ def draw_sweep(
     """Draw the dataset of `frequency_sweep`: amplitudes up and down, jumps as arrows, hysteresis in
     grey; returns the axes.
 
+    An arrow goes from the last value before a jump to the first one after it. The grey band is
+    where the amplitudes up and down differ by more than a hundredth of the largest one.
+
     The `quantity` is any of its numbers over both directions, such as "impact_count" or one of its
-    `functions`; by default the amplitude or, where most motions have the same, as between two
-    stops, the first of the functions.
+    `functions`. By default it is the amplitude, as in `draw_branch`, or, where most motions have
+    the same, as between two stops, the first of the functions.
     """
+    dataset = with_amplitudes(dataset)
     known = [
         str(name)
         for name, part in dataset.items()
@@ -458,14 +464,16 @@ def draw_sweep(
     if quantity is None:
         # as functions have
         functions = [name for name in known if dataset[name].attrs.get("long_name") == name]
-        flat = is_flat(dataset["amplitude"].values.ravel())
-        quantity = functions[0] if functions and flat else "amplitude"
+        quantity = shown_quantity(dataset)
+        if functions and is_flat(dataset[quantity].values.ravel()):
+            quantity = functions[0]
     own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
     edges = cell_edges(values)
-    for i in np.flatnonzero(dataset["hysteresis"].values):
-        ax.axvspan(edges[i], edges[i + 1], color=BAND, linewidth=0.0, zorder=0)
+    for number, i in enumerate(np.flatnonzero(dataset["hysteresis"].values)):
+        label = None if number else "up and down differ"
+        ax.axvspan(edges[i], edges[i + 1], color=BAND, linewidth=0.0, zorder=0, label=label)
     for way, line in WAYS.items():
         found = _jumps(dataset, way, quantity)
         middle = found[:, :2].mean(axis=1)
@@ -492,11 +500,11 @@ def draw_sweep(
             }
             ax.annotate("", (place, high), (place, low), arrowprops=arrow, zorder=3)
     ax.set_xlim(values[0], values[-1])
-    ax.set_ylim(bottom=0.0 if quantity == "amplitude" else None)
+    ax.set_ylim(bottom=0.0 if quantity.startswith("amplitude") else None)
     ax.set_xlabel(parameter_name(dataset.attrs["path"]))
     ax.set_ylabel(
-        f"${peak(dataset.attrs['coordinate'])}${unit_in_brackets(dataset['amplitude'])}"
-        if quantity == "amplitude"
+        f"{quantity_name(dataset, quantity)}{unit_in_brackets(dataset[quantity])}"
+        if quantity.partition("_")[0] in ("amplitude", "largest", "smallest")
         else dataset[quantity].attrs["long_name"]
     )
     legend_of(ax, own)
@@ -504,13 +512,20 @@ def draw_sweep(
 
 
 def _jumps(dataset: Any, way: str, quantity: str) -> np.ndarray:
-    """The values before and after each jump of one direction, and the amplitudes there, (n, 4);
-    they are known of no other quantity."""
-    if quantity != "amplitude":
-        return np.empty((0, 4))
+    """The values before and after each jump of one direction, and the quantity there, (n, 4): the
+    sweep has the amplitudes; another quantity is read at the values of the sweep beside the jump.
+    """
     chosen = dataset["jump_direction"].values == way
-    names = ("before", "after", "amplitude_before", "amplitude_after")
-    return np.stack([dataset[f"jump_{name}"].values[chosen] for name in names], axis=1)
+    places = [dataset[f"jump_{name}"].values[chosen] for name in ("before", "after")]
+    if quantity == "amplitude":
+        sizes = [dataset[f"jump_amplitude_{name}"].values[chosen] for name in ("before", "after")]
+        return np.stack([*places, *sizes], axis=1)
+    values = dataset["value"].values
+    right = np.searchsorted(values, (places[0] + places[1]) / 2.0)
+    right = np.clip(right, 1, max(len(values) - 1, 1))
+    beside = dataset[quantity].sel(direction=way).values
+    sizes = [beside[right - 1], beside[right]]
+    return np.stack([*places, *(sizes if way == "up" else sizes[::-1])], axis=1)
 
 
 def limit_lines(ax: Any, angle: float, label: str | None = None, axis: str = "x") -> None:

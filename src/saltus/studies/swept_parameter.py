@@ -550,4 +550,6 @@ def _dataset(
     }
     data.attrs = {"title": "sweep computed by saltus", "kind": "frequency_sweep"}
     data.attrs |= provenance(asked.system, tol=asked.tol, **numbers)
+    if chosen := asked.system.model.shown_coordinate(asked.system.load):
+        data.attrs["shown"] = chosen
     return data

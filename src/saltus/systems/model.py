@@ -109,6 +109,16 @@ class Model:
             )
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
+    def shown_coordinate(self, load: Any) -> str | None:
+        """The coordinate whose amplitude pictures show; None for the largest of all coordinates.
+
+        Parameters
+        ----------
+        load
+            The load of the system.
+        """
+        return None
+
     def margin_kind(self, margin: str) -> MarginKind:
         """The meaning of one of the margins.
 

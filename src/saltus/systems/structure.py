@@ -376,6 +376,27 @@ class Structure(ContactModel):
         local = self.form[0]
         return (*local, *(f"{MODE}{i + 1}" for i in range(len(self.names) - len(local))))
 
+    def shown_coordinate(self, load: Any) -> str | None:
+        """The local displacement that the load drives most directly, the first of equal ones; None
+        if there is no local displacement.
+
+        Parameters
+        ----------
+        load
+            The load of the system.
+        """
+        local = self.form[0]
+        driving = [np.array(row) for name, row in self.forces.items() if name in load.channels]
+        shares = [0.0 for _ in local]
+        for i, name in enumerate(local):
+            row = np.array(self.points.get(name) or _vector(name, self.names, name))
+            for force in driving:
+                size = float(np.linalg.norm(row) * np.linalg.norm(force))
+                # a cosine, of which the last digits are rounding
+                share = round(abs(float(row @ force)) / size, 9) if size else 0.0
+                shares[i] = max(shares[i], share)
+        return local[shares.index(max(shares))] if local else None
+
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
         """The channels of the load."""

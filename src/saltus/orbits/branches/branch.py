@@ -149,7 +149,7 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     data |= (
         multiplier_columns(orbits)
         | solution_columns(orbits)
-        | _special(branch.special)
+        | _special(branch.special, equations.given.model.coordinates)
         | _rests(orbits)
     )
     attributes: dict[str, Any] = {
@@ -163,6 +163,8 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "closed": int(branch.closed),
         "missed": "; ".join(map(str, branch.missed)),
     }
+    if chosen := equations.given.model.shown_coordinate(equations.given.load):
+        attributes["shown"] = chosen
     return xarray.Dataset(data, attrs=provenance(equations.given, tol=equations.tol, **attributes))
 
 
@@ -198,6 +200,14 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("residual", column(lambda o: o.residual), {}),
         ("rest_share", column(lambda o: o.rest_share), {}),
     ]
+    if len(model.coordinates) > 1:
+        extrema = np.array([orbit.extrema for orbit in orbits])
+        for i, name in enumerate(model.coordinates):
+            unit = {"units": model.unit_of(name)}
+            columns += [
+                (f"largest_{name}", extrema[:, i, 1], {**unit, "long_name": f"max {name}"}),
+                (f"smallest_{name}", extrema[:, i, 0], {**unit, "long_name": f"min {name}"}),
+            ]
     for name in orbits[0].equations.margins:
         attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
         columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), attrs))
@@ -274,7 +284,7 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     }
 
 
-def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
+def _special(special: tuple[SpecialPoint, ...], coordinates: tuple[str, ...]) -> dict[str, Any]:
     """The special points with their evidence."""
     rows: dict[str, list[Any]] = {
         "kind": [str(s.kind) for s in special],
@@ -292,6 +302,10 @@ def _special(special: tuple[SpecialPoint, ...]) -> dict[str, Any]:
         "test_value": [s.evidence.value for s in special],
         "special_defect": [s.defect for s in special],
     }
+    if len(coordinates) > 1:
+        for i, name in enumerate(coordinates):
+            rows[f"special_largest_{name}"] = [s.orbit.extrema[i, 1] for s in special]
+            rows[f"special_smallest_{name}"] = [s.orbit.extrema[i, 0] for s in special]
     proofs = [s.evidence.proof for s in special]
     if any(proof is not None for proof in proofs):
         rows["special_proved"] = [int(p is not None and bool(p.proved)) for p in proofs]
