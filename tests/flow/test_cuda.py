@@ -80,15 +80,9 @@ def test_motions_in_threads_are_those_in_lanes(name, monkeypatch, host):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("more", [{}, ALL | EARLY], ids=["ends", "all"])
-@pytest.mark.parametrize("name", [name for name in FAMILIES if name not in ("pair", "curved")])
+@pytest.mark.parametrize("name", [name for name in FAMILIES if name != "pair"])
 def test_all_models_with_one_contact_agree(name, more, monkeypatch, host):
     agree(name, monkeypatch, host, count=300, **more)
-
-
-@pytest.mark.thorough
-@pytest.mark.xfail(reason="one motion of 200, with e = 0, stalls in a thread and not in a lane")
-def test_a_model_of_every_function_agrees(monkeypatch, host):
-    agree("curved", monkeypatch, host, count=300)
 
 
 # --- launches ----------------------------------------------------------------

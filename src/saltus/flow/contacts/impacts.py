@@ -104,10 +104,11 @@ def contact_step_size(motion, t, target, size):
     for i in range(motion.contacts.shape[0]):
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             r = motion.margin_series[i : i + 1]
-            size = max(press_of(motion, i), abs(r[0, 0]))
-            if size > 0.0:
-                natural = min(natural, step_size(r, order, size, sharp))
-    while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size):
+            reaction = max(press_of(motion, i), abs(r[0, 0]))
+            if reaction > 0.0:
+                natural = min(natural, step_size(r, order, reaction, sharp))
+    terms = max(motion.press, motion.pull)
+    while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size, terms):
         natural = 0.5 * min(natural, target - t)
     return natural
 

@@ -150,6 +150,8 @@ ROUGHER = 100.0
 # The largest defect of a series in the equation at the end of a step, in tol size / h; sound steps
 # stay below 4.
 DEFECT = 100.0
+# a smaller acceleration may be the rounding of terms that cancel, in units of the largest of them
+CANCELLED = 2.0**-50
 BATCH = 100_000  # passes of the loop before the kernel returns to Python, which can then see Ctrl-C
 
 # Rest and release.

@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import (
+    CANCELLED,
     DEFECT,
     GAP,
     INSTANT,
@@ -174,12 +175,13 @@ def step_size(coefficients, order, size, tol):
 
 
 @lean_jit
-def leaps(motion, t, side, h, size):
+def leaps(motion, t, side, h, size, terms):
     """Whether a step passes a feature of the acceleration that its series cannot show, such as the
     bend of a saturated tanh, whose coefficients are below rounding far away from it.
 
     It is noticed because the model's acceleration at the end of the step then differs from that of
-    the series.
+    the series, by more than the rounding of its largest `terms`: these cancel at a release from
+    rest, where the size of the state is rounding too.
     """
     q = motion.coordinate_series
     v = motion.velocity_series
@@ -208,7 +210,7 @@ def leaps(motion, t, side, h, size):
         defect = max(defect, abs(a_end[i, 0] - horner(a[i], order, h)))
     for i in range(motion.own - motion.first_order, motion.own):
         defect = max(defect, abs(v_end[i, 0] - horner(v[i], order, h)))
-    return defect > DEFECT * motion.tolerance * size / h
+    return defect > DEFECT * motion.tolerance * size / h + CANCELLED * terms
 
 
 @lean_jit

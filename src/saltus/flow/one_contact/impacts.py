@@ -94,6 +94,13 @@ def note_press(motion):
 
 
 @lean_jit
+def largest_terms(motion, side):
+    """The largest acceleration of the first coordinate that a contact has held back so far."""
+    largest = max(motion.press, motion.pull)
+    return largest / abs(rate_of(motion, side)) if largest > 0.0 else 0.0
+
+
+@lean_jit
 def leave_or_stay(motion):
     """Decide whether a system at rest at the contact leaves it on an ARC or stays in REST. False if
     that is not unique.

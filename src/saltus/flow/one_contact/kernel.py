@@ -65,6 +65,7 @@ from saltus.flow.one_contact.impacts import (
     decide,
     hold,
     impact,
+    largest_terms,
     note_press,
     rate_of,
 )
@@ -79,8 +80,9 @@ def arc_step(motion, t, target, size):
     natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
     if motion.columns > 0:
         natural = min(natural, column_step(motion))
+    side = float(motion.side)
     while motion.checked > 0 and leaps(
-        motion, t, float(motion.side), min(natural, target - t), size
+        motion, t, side, min(natural, target - t), size, largest_terms(motion, side)
     ):
         natural = 0.5 * min(natural, target - t)
     return natural

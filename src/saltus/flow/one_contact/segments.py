@@ -47,7 +47,7 @@ from saltus.flow.kernel.steps import (
     step_arrays,
     step_size,
 )
-from saltus.flow.one_contact.impacts import rate_of, set_state
+from saltus.flow.one_contact.impacts import largest_terms, rate_of, set_state
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -181,7 +181,8 @@ def segment_step(motion, t, end, side, size):
     natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
     natural = min(natural, column_step(motion))
     while motion.checked > 0 and end >= t:
-        if not leaps(motion, t, side, min(natural, end - t), size):
+        terms = largest_terms(motion, side)
+        if not leaps(motion, t, side, min(natural, end - t), size, terms):
             break
         natural = 0.5 * min(natural, end - t)
     return natural
