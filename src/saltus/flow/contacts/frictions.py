@@ -21,6 +21,7 @@ from saltus.flow.contacts.layout import (
     ContactColumn,
     FrictionColumn,
     NoMargin,
+    NoPress,
     ground_speed,
     is_sum,
 )
@@ -302,9 +303,11 @@ def rounding_of_speed(motion, k):
 
 @lean_jit
 def is_lifted(motion, k):
-    """Whether a friction is in a contact that is open."""
+    """Whether a friction is in a contact that is open, or has no force in any case."""
     pressed = motion.frictions[k, FrictionColumn.PRESSED]
-    return pressed > 0 and motion.contacts[pressed - 1, ContactColumn.CLOSED] == 0
+    if pressed <= 0:
+        return pressed == NoPress.INERT
+    return motion.contacts[pressed - 1, ContactColumn.CLOSED] == 0
 
 
 @lean_jit
@@ -492,11 +495,12 @@ def leans(motion, k):
 
 @lean_jit
 def is_along(motion, k, i):
-    """Whether a friction, no surface, acts along the coordinate of a contact."""
+    """Whether a friction, no surface and not without force, acts along the coordinate of a contact."""
     along = (
         motion.contacts[i, ContactColumn.COORDINATE]
         == motion.frictions[k, FrictionColumn.COORDINATE]
     )
+    along = along and motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT
     return along and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
 
 
@@ -532,5 +536,6 @@ def all_stand(motion):
         return False
     for k in range(motion.frictions.shape[0]):
         is_friction = motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
+        is_friction = is_friction and motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT
         moves = moves or (is_friction and ground_speed(motion, k) != 0.0)
     return not moves

@@ -19,6 +19,7 @@ from saltus.flow.contacts.layout import (
     VANISHED,
     ContactColumn,
     FrictionColumn,
+    NoPress,
     contact_position,
     jumping,
     restitution,
@@ -522,6 +523,8 @@ def note_rubs(motion):
     """Note what presses on frictions and surfaces at the start of a step, and sliding speeds, for
     the natural scales."""
     for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
+            continue
         coordinate = motion.frictions[k, FrictionColumn.COORDINATE]
         press = abs(motion.acceleration_series[coordinate, 0])
         motion.swiftest = max(motion.swiftest, abs(motion.velocities[coordinate]))

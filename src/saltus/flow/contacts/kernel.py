@@ -73,6 +73,7 @@ from saltus.flow.contacts.layout import (
     ContactColumn,
     FrictionColumn,
     NoMargin,
+    NoPress,
     contact_position,
     ground_speed,
     solver_arrays,
@@ -269,6 +270,8 @@ def first_press(motion, t):
             place = motion.contacts[row, ContactColumn.COORDINATE]
         else:
             k = row - motion.contacts.shape[0]
+            if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
+                continue
             place = motion.frictions[k, FrictionColumn.COORDINATE]
         a = motion.acceleration_series[place]
         size = max(abs(a[0]), abs(a[1]) * span, 2.0 * abs(a[2]) * span * span)
@@ -320,7 +323,8 @@ def decide_contacts(motion):
     if motion.rested == 1 and not rested:
         all_bits = closed_bits(motion)
         for k in range(motion.frictions.shape[0]):
-            all_bits |= 1 << (count + k)
+            if motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT:
+                all_bits |= 1 << (count + k)
         record_contact_event(motion, EventCode.REST, all_bits, settled)
         note_shifts(motion, motion.event_shifts)
     motion.mode = Mode.REST if motion.rested == 1 else Mode.ARC

@@ -14,7 +14,7 @@ even if it is not the same one in all lanes (`one_free.py`).
 from __future__ import annotations
 
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.lanes.lane_steps import (
     both_at,
@@ -103,6 +103,8 @@ def begin_contact(lane, env, state):
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE
             if beyond == 0.0:
                 row[FrictionColumn.SLIDES] = -1 if rate < 0.0 else 1
+        elif row[FrictionColumn.PRESSED] == NoPress.INERT:
+            row[FrictionColumn.SLIDES] = 2
         mode = Mode.CONTACT if mode == Mode.ARC else mode
     lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
     write_closed(lane, contacts[:count])

@@ -33,9 +33,8 @@ class FrictionColumn(IntEnum):
 
     COORDINATE = 0  # the coordinate along which it acts
     # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above
-    # its position; 2 of a
+    # its position; 2 of a friction in a contact that is open, or that is inert
     SLIDES = 1
-    # friction in a contact that is open
     # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a
     # step
     SKIP = 2
@@ -44,7 +43,8 @@ class FrictionColumn(IntEnum):
     # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached;
     # 4: a margin was at 0, or below, at the start of the step
     REACHED = 4
-    PRESSED = 5  # 1 plus the number of the contact whose reaction presses it, 0 for none
+    # 1 plus the number of the contact whose reaction presses it, 0 for none; or a `NoPress`
+    PRESSED = 5
     STRUCK = 6  # a `FrictionImpact`
 
 
@@ -55,6 +55,12 @@ class FrictionImpact(IntEnum):
     STUCK = 1  # after it the coordinate has the speed of the ground
     FORWARDS = 2  # it slides forwards after it
     BACKWARDS = 3
+
+
+class NoPress(IntEnum):
+    """In place of the contact that presses a friction."""
+
+    INERT = -1  # the coefficients are 0, and nothing that it does changes a motion
 
 
 class NoMargin(IntEnum):

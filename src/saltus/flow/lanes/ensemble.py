@@ -44,6 +44,7 @@ from saltus.progress import Progress, silent
 from saltus.systems import (
     System,
     check_system,
+    inert_frictions,
     natural_units,
     numbers,
 )
@@ -206,7 +207,7 @@ def run_ensemble(
         16.0 * len(options.sample) * kept * inputs.size,
         f"samples of {kept} periods of {inputs.size} motions",
     )
-    lanes = compiled_lanes(system, run, options, kept)
+    lanes = compiled_lanes(system, run, options, kept, inputs.parameters)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
     total = float(np.sum(spans + 1))
@@ -218,10 +219,19 @@ def run_ensemble(
     return EnsembleResult(own, given, options, jobs, ends, target.name)
 
 
-def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept: int) -> Lanes:
+def compiled_lanes(
+    system: System,
+    run: Program,
+    options: EnsembleOptions,
+    kept: int,
+    parameters: Mapping[str, np.ndarray] | None = None,
+) -> Lanes:
     """The compiled lanes of a system, with the settings for the samples that they keep of each
-    trajectory.
+    trajectory; lanes differ in the values of `parameters`.
     """
+    varied: dict[str, Iterable[float]] = dict.fromkeys(options.paths or (), ())
+    for path, values in (parameters or {}).items():
+        varied[path] = float(np.min(values)), float(np.max(values))
     # their addresses, which structures of different sizes may share
     key = run.structure.functions, run.structure.sizes
     if key not in _functions:
@@ -248,6 +258,7 @@ def compiled_lanes(system: System, run: Program, options: EnsembleOptions, kept:
         settle=Until.SETTLED in options.until,
         natural_time=longest_time(system),
         shortest_step=SHORTEST * natural_units(system).time,
+        inert_frictions=inert_frictions(system, varied),
     )
 
 
@@ -334,7 +345,7 @@ class TangentEnsemble:
             tol=tol, periods=None, limits=limits, sample=(), until=(), paths=()
         )
         run = program(system, limits, ())
-        self._lanes = compiled_lanes(system, run, options, 1)
+        self._lanes = compiled_lanes(system, run, options, 1, parameters)
         self._columns = {places.index(path): values for path, values in parameters.items()}
         self._lengths, self.holds_coordinates = lengths, system.model.holds_coordinates
         self._records = record_tables(system, run.trace.records, {})

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts.layout import FrictionColumn, solver_arrays
+from saltus.flow.contacts.layout import FrictionColumn, NoPress, solver_arrays
 from saltus.flow.kernel.compiled import Program, taylor_order
 from saltus.flow.kernel.layout import (
     CHATTER_SPEED,
@@ -185,6 +185,7 @@ class Lanes:
     settle: bool  # whether a trajectory ends when it repeats itself
     natural_time: float  # of what moves without a forcing period, inf where the load has one
     shortest_step: float  # below which an acceleration counts as singular
+    inert_frictions: tuple[int, ...] = ()  # the numbers of those without any force
 
     def run(
         self, jobs: Jobs, threads: int, progress: Progress = silent, total: float = 0.0
@@ -346,6 +347,7 @@ class Lanes:
         rows[contacts:, FrictionColumn.PRESSED] = np.add(
             trace.friction_contacts or [-1] * frictions, 1
         )
+        rows[[contacts + k for k in self.inert_frictions], FrictionColumn.PRESSED] = NoPress.INERT
         return rows
 
     def _sizes(self) -> LaneSizes:

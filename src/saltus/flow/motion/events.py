@@ -325,7 +325,7 @@ def modes_of(
 ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     """Closed contacts as bits, the direction in which each friction slides, and the side of each
     surface, +1 or -1, from the numbers `side` of motions. A friction slides to +1 or -1; 0 where it
-    sticks, 2 where its contact is open."""
+    sticks, 2 where its contact is open or its coefficients are 0."""
     count = len(model.contacts)
     number = np.asarray(side).astype(np.int64) - 1
     pairs = [

@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
 from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
 from saltus.flow.kernel.memory import (
@@ -31,7 +31,7 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.systems import natural_units, time_without_period
+from saltus.systems import inert_frictions, natural_units, time_without_period
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -336,6 +336,9 @@ class ContactState(KernelState):
         for row, friction in zip(contacts[len(held) :], own_frictions, strict=False):
             rate = speeds[names.index(friction.coordinate)] - float(friction.ground_speed)
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
+        for k in inert_frictions(request.system, dict.fromkeys(request.sensitivities or (), ())):
+            contacts[len(held) + k, FrictionColumn.PRESSED] = NoPress.INERT
+            contacts[len(held) + k, FrictionColumn.SLIDES] = 2
         for row, surface in zip(contacts[len(contacts) - len(surfaces) :], surfaces, strict=True):
             place = names.index(surface.coordinate)
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE

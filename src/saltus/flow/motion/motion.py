@@ -546,7 +546,8 @@ def _add_contacts(motion: Motion, dataset: xarray.Dataset, side: np.ndarray) -> 
     closed, slides, sides = modes_of(model, side)
     for friction, direction in zip(model.frictions, slides, strict=True):
         text = f"direction in which {friction.name} slides, 0 where it sticks"
-        text += ", 2 where its contact is open" * (friction.contact is not None)
+        opens = "its contact is open or " * (friction.contact is not None)
+        text += f", 2 where {opens}its coefficients are 0"
         dataset[f"sliding_{friction.name}"] = (
             "time",
             direction.astype(np.int8),
