@@ -247,10 +247,10 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
         A result, such as a branch, or a Dataset or a DataTree that saltus has made, such as an
         ensemble or a diagram.
     table
-        Which of its tables: the name of a dimension, such as "special" of a branch or "jump" of a
-        sweep, of a variable, whose table has a row for each of its numbers, or of a part of a tree,
-        such as "special" or "bands" of a diagram. By default that of its points, of all motions of
-        an ensemble, or of all cells of basins or of a grid of one's own.
+        Which of its tables, by the name of a dimension, such as "special" of a branch or "jump" of
+        a sweep. The name of a variable gives a row for each of its numbers, and the name of a part
+        of a tree, such as "bands" of a diagram, its table. By default that of its points, of all
+        motions of an ensemble, or of all cells of basins or of a grid of one's own.
 
     Raises
     ------

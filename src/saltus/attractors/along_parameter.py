@@ -68,9 +68,9 @@ def attractors_along(
     parameter changes.
 
     At each value they are found by `find_attractors`, from the same initial states and from states
-    of the attractors at the value before, so that none is lost because its basin is small. The
-    attractors at two neighbouring values are then matched, the nearest pair first, by the distance
-    between the sets of their points at phase 0 (Hausdorff's), relative to the size of the larger
+    of the attractors at the value before. So none is lost because its basin is small. The
+    attractors at two neighbouring values are then matched, the nearest pair first. Their distance
+    is Hausdorff's, between the sets of their points at phase 0, relative to the size of the larger
     set. Between attractors of different periods, as across a period doubling, the threshold is half
     as large; between two of the same period it is three times as large if motions from all points
     of the first settle on the second. An attractor without a match is born, or has died. Rest

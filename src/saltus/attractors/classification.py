@@ -229,12 +229,11 @@ def classify(
       multipliers inside the unit circle
       and repeats itself in direct simulation. Under constant loads an equilibrium is such an orbit,
       of period 1.
-    * `chaotic`: it has not settled after transient + periods, and `judge`, the judge of charts and
-      diagrams, finds that the
-      largest Lyapunov exponent is above 0 by more than its error and what regular motion may show,
-      and that of 16 companions, which begin in the motion's last states, none settles in 100 000
-      forcing periods for which they are followed in all. A chaotic transient would be noticed with
-      a probability of 95 % if its mean life was below 33 000.
+    * `chaotic`: it has not settled after transient + periods. Also `judge`, the judge of charts and
+      diagrams, finds the largest Lyapunov exponent above 0 by more than its error and what regular
+      motion may show. Of 16 companions, which begin in the motion's last states, none settles in
+      100 000 forcing periods in all. A chaotic transient would be noticed with a probability of 95
+      % if its mean life was below 33 000.
     * `quasi-periodic`: the exponent may be 0, the 0-1 test shows a regular motion, also on every
       n-th state, and `excludes_tori`
       knows no reason against it.

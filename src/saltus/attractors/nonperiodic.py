@@ -161,7 +161,7 @@ def excludes_tori(system: System) -> str | None:
     may have one (errata 22).
 
     Under one forcing frequency a quasi-periodic motion lies on closed curves that the stroboscopic
-    map P (or, where a curve is mapped to another one, a power of it) carries onto themselves. There
+    map P carries onto themselves; where a curve is mapped to another one, a power of P does. There
     is none where
 
     * P is continuous on the plane of states, in which the states before and after an impact are one
@@ -255,9 +255,9 @@ def regular_motion(system: System, state: np.ndarray, periods: int, tol: float) 
     """Whether a motion from a state (d,) whose largest exponent is 0, as far as that is known, is
     on a torus.
 
-    It is if nothing excludes tori, if the 0-1 test of its coordinate sees order in all of the
-    states at phase 0 and in every n-th of them, and if no attracting orbit is near, which it might
-    approach slowly.
+    It is if nothing excludes tori, and if no attracting orbit is near, which it might approach
+    slowly. The 0-1 test of its coordinate must also see order in all of the states at phase 0 and
+    in every n-th of them.
     """
     if periods < FEWEST_OF_BANDS or excludes_tori(system) is not None:
         return RegularMotion(None, None)

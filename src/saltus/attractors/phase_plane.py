@@ -299,9 +299,9 @@ def separatrices(
     """The stable manifolds of all saddles in a window: the curves that separate the basins under a
     constant load.
 
-    Each branch is followed back for at most a time `span`, until it leaves the window for good
-    (three half widths), comes to a saddle or to a margin that ends all motions; points are given
-    every `step` of time.
+    Each branch is followed back for at most a time `span`. It ends where it leaves the window for
+    good (three half widths), or comes to a saddle or to a margin that ends all motions; points are
+    given every `step` of time.
 
     Parameters
     ----------

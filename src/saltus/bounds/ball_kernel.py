@@ -1,9 +1,8 @@
 """Taylor series in ball arithmetic, validated Taylor steps, and open gaps: the compiled part.
 
-Every operation adds to the radius a bound of its rounding (IEEE doubles, rounded to nearest,
-contraction to fused multiply-adds allowed, no reassociation), so that a ball holds for all numbers
-of its operands.
-The C library's functions are taken to be right within 3 units in the last place.
+Every operation adds to the radius a bound of its rounding, so that a ball holds for all numbers of
+its operands. Doubles are those of IEEE, rounded to nearest; fused multiply-adds are allowed, and no
+reassociation. The C library's functions are taken to be right within 3 units in the last place.
 
 A validated step of y'' = A(t, y, y') starts from a ball of states at a ball of times and has a
 ball of lengths h.

@@ -137,7 +137,7 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     """The speed of the gap just after an impact below which a motion is provably captured at the
     contact.
 
-    From any impact, at any time and to any side, that leaves abs(gap_rate * velocity) below the
+    The impact may be at any time and to any side. If it leaves abs(gap_rate * velocity) below the
     returned speed, the motion stays near the contact under all later loads and its speed falls to
     zero: in finite time if impacts lose speed, otherwise through damping. No later release is
     possible, as the contact accelerations press on every side at all times. The speed is 0 where
@@ -145,9 +145,9 @@ def capture_speed(system: System, parameters: Mapping[str, Any] | None = None) -
     damping dissipate energy, or if the impact law has no bounded slope at rest
     (`EnergyRestitution`). Margins at which a motion may stop are not considered.
 
-    On side s the gap obeys w'' = A(t, w, u), u = w'. With f the factor of the gap's speed at
-    impact, and the gap of one side in units that make the factors of both sides equal, the larger
-    of two speeds is returned.
+    On side s the gap obeys w'' = A(t, w, u), u = w'. Let f be the factor of the gap's speed at
+    impact, and measure the gap of one side in units that make the factors of both sides equal. The
+    larger of two speeds is returned.
 
     *Energy.* Let A_u <= 0 and 0 < lo(w) <= -A(t, w, 0) <= hi(w) for all t. A flight that leaves
     with speed v turns before W, where 2 int_0^W lo dw = v^2, and comes back with rho^2 v^2 <= 2

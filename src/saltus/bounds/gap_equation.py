@@ -119,10 +119,10 @@ def area_contraction(system: System) -> float | None:
     states; None if they may grow.
 
     Along a motion an area changes by the factor exp(integral of da/dv), and by e^2 at each impact
-    v+ = e v-. If -da/dv >= 0 everywhere and no impact raises the speed, the product of an orbit's
-    two multipliers is at most 1, and a complex pair never leaves the unit circle: there is no
-    Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic, so that None
-    does not mean that areas do grow.
+    v+ = e v-. Let -da/dv >= 0 everywhere, and let no impact raise the speed. The product of an
+    orbit's two multipliers is then at most 1, and a complex pair never leaves the unit circle:
+    there is no Neimark-Sacker bifurcation (errata 22). The rate is bounded by interval arithmetic,
+    so that None does not mean that areas do grow.
     """
     if not system.model.has_state_plane:
         return None

@@ -316,9 +316,9 @@ def plot(
     Parameters
     ----------
     result
-        A Dataset or a DataTree that saltus has made, a result with `to_xarray`, such as a motion or
-        a branch, or a tuple of such results, as `switch_branch` and `separatrices` return them,
-        which are drawn into the same axes.
+        A Dataset or a DataTree that saltus has made, or a result with `to_xarray`, such as a motion
+        or a branch. A tuple of such results, as `switch_branch` and `separatrices` return it, is
+        drawn into the same axes.
     legend
         Where the legend is: "inside" the axes, "below" or to the "right" of them, or False for
         none. A new figure has it below, where it covers nothing; given axes have it inside.

@@ -191,8 +191,9 @@ def _resting(chart: Any) -> np.ndarray:
 
 def draw_chart(ax: Any, chart: Any, top: float | None = None) -> Any:
     """The cells: coloured by the largest amplitude (or, if `has_speeds`, by the largest of the
-    motions' least impact speeds), filled and hatched if there is something else (`FILLINGS`), white
-    if there is rest alone; crosses where the largest motion goes beyond the kinematic limit.
+    motions' least impact speeds), and filled and hatched if there is something else (`FILLINGS`). A
+    cell is white if there is rest alone; crosses where the largest motion goes beyond the kinematic
+    limit.
 
     Returns what a colour bar needs, or None.
     """

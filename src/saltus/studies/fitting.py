@@ -361,8 +361,8 @@ def fit(
     with the exact derivatives of the motion and of the times of its impacts.
 
     The data are taken in a growing window: first up to the second impact of the motion, then up to
-    the fourth, the eighth, ..., so that a motion with another number of impacts is led there step
-    by step. In the first window the search begins at the system's own numbers and, where all have
+    the fourth, the eighth, .... So a motion with another number of impacts is led there step by
+    step. In the first window the search begins at the system's own numbers and, where all have
     bounds, at further points between these; those that fit it best are followed.
 
     The errors are those of the linearised motion. Where no `sigma` was given, the noise is

@@ -47,9 +47,9 @@ class Border(EquationCurve[Point]):
     """The amplitudes and frequencies of motions that end on an unstable equilibrium: both are
     parameters of the curve.
 
-    At a time T after the load, the deviation (x, v) of a state from a saddle with the eigenvalues l
-    > 0 > m has the part u = v - m x along the unstable direction, but for terms of second order in
-    the deviation. The distance from the border in the amplitude A is u / (du/dA), with the
+    Let (x, v) be the deviation of a state from a saddle with the eigenvalues l > 0 > m, at a time T
+    after the load. Its part along the unstable direction is u = v - m x, but for terms of second
+    order in the deviation. The distance from the border in the amplitude A is u / (du/dA), with the
     derivative of the exact motion; T is where the motion is nearest to the saddle, so that the
     distance has an error of third order in the deviation there, and the deviation is 0 on the
     border.
@@ -198,9 +198,9 @@ def overturning_spectrum(
 
     The map is computed by an ensemble. Its borders are curves on which the motion ends on an
     unstable equilibrium after the load, each with the number of impacts before; they are followed
-    through their folds, and exact to rounding (see `Border`). Under a record, whose frequency says
-    how many times faster than written it is played, the borders are computed at each frequency of
-    the map, by halving the interval between two amplitudes down to rounding.
+    through their folds, and exact to rounding (see `Border`). The frequency of a record says how
+    many times faster than written it is played. Its borders are computed at each frequency of the
+    map, by halving the interval between two amplitudes down to rounding.
 
     Parameters
     ----------

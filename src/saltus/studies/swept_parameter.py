@@ -207,10 +207,10 @@ def frequency_sweep(
     and steadily. Values change at phase 0 of the load, so that the phase of a harmonic does not
     jump.
 
-    A step of the amplitude that is large compared with its neighbours, or at which the number of
-    impacts or the period changes, is swept again in parts, down to a thousandth of it; the part
-    that is then left is a jump (without `stop_early` the step itself is reported). Where up and
-    down differ there is hysteresis.
+    A step of the amplitude may be large compared with its neighbours, or the number of impacts or
+    the period changes there. It is swept again in parts, down to a thousandth of it; the part that
+    is then left is a jump (without `stop_early` the step itself is reported). Where up and down
+    differ there is hysteresis.
 
     Parameters
     ----------
@@ -231,9 +231,9 @@ def frequency_sweep(
     tol
         The error that one step of the integration may make.
     functions
-        Quantities of one's own by name: numbers of the motion on which each value was left, which
-        begins at phase 0 and takes one period or, where it does not repeat itself, `max_period`
-        forcing periods, but no more than `periods`.
+        Quantities of one's own by name: numbers of the motion on which each value was left. It
+        begins at phase 0 and takes one period. Where it does not repeat itself, it takes
+        `max_period` forcing periods, but no more than `periods`.
     progress
         Called with the fraction done and what is being done.
 

@@ -72,11 +72,11 @@ def map_over(
     all combinations of values.
 
     With a `store` it can be stopped, or killed, at any moment, and the same call goes on where it
-    was. A store that was made by another function, or by other values that it reads (closures,
-    defaults, globals, and what these depend on), is refused, and where it goes on two points are
-    computed again and compared. The function may be
-    defined anywhere, in a notebook too: with `workers` or a `scheduler` it is sent to the processes
-    by cloudpickle then (`pip install "saltus[cluster]"` has it).
+    was. A store that was made by another function is refused, or by other values that it reads:
+    closures, defaults, globals, and what these depend on. Where a store goes on, two points are
+    computed again and compared. The function may be defined anywhere, in a notebook too: with
+    `workers` or a `scheduler` it is sent to the processes by cloudpickle then (`pip install
+    "saltus[cluster]"` has it).
 
     Parameters
     ----------

@@ -25,8 +25,8 @@ WRITER = "saltus_version"
 @dataclass(frozen=True, kw_only=True)
 class Variable:
     """A variable of a sweep: its NumPy type (boolean, integer, real or complex), the (name, size)
-    of its dimensions in addition to the grid's axes, its attributes, and the fill value of chunks
-    that are not computed yet.
+    of its dimensions in addition to the grid's axes, and its attributes. Chunks that are not
+    computed yet have its fill value.
 
     Parameters
     ----------

@@ -33,11 +33,11 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
     series are faster or more accurate.
 
     It begins with the number of channels and the place of a channel's series behind that of the one
-    before. Then follow, for each set of closed contacts and of surfaces on whose side +1 it is,
-    lambda, how far a mode reaches in units of the state, the rows of the inverse of the
-    eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the reactions
-    of the contacts by eigenmodes and by inputs. The real and the imaginary part of a mode have rows
-    of their own.
+    before. Then follow numbers for each set of closed contacts and of surfaces on whose side +1 it
+    is. They are lambda, how far a mode reaches in units of the state, the rows of the inverse of
+    the eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the
+    reactions of the contacts by eigenmodes and by inputs. The real and the imaginary part of a mode
+    have rows of their own.
 
     Parameters
     ----------

@@ -398,10 +398,10 @@ def energy_gain(model: ContactModel, impact: ImpactLaw) -> dict[str, float]:
     raised where it is <= 0.
 
     The contacts of all other coordinates are taken as closed and at rest. The rates of the gaps
-    after the impact are then -E v- where an impulse acts, coordinates without a contact keep their
-    momentum, and the gain is (v+' M v+) / (v-' M v-) - 1, on fixed ground and in the position where
-    these contacts are closed. For two layers it is positive where M_ss e_s^2 + 2 cos(2 beta0) e_s g
-    + M_jj g^2 > M_ss, s the layer that is hit.
+    after the impact are then -E v- where an impulse acts, and coordinates without a contact keep
+    their momentum. The gain is (v+' M v+) / (v-' M v-) - 1, on fixed ground and in the position
+    where these contacts are closed. For two layers it is positive where M_ss e_s^2 + 2 cos(2 beta0)
+    e_s g + M_jj g^2 > M_ss, s the layer that is hit.
 
     Parameters
     ----------
@@ -464,9 +464,9 @@ def check_paradox(model: ContactModel) -> None:
     """Refuse frictions in contacts that slide with no reaction, or with several: Painleve's
     paradox, of a constant mass matrix.
 
-    The sliding of frictions with the directions s adds s mu (M a - r)_n to their rows, and the
-    reactions are the only ones if the determinant of the rows and columns of the coordinates that
-    are free stays positive, whichever these are.
+    The sliding of frictions with the directions s adds s mu (M a - r)_n to their rows, and
+    whichever coordinates are free, their rows and columns have a determinant. The reactions are the
+    only ones if it stays positive.
     """
     pressed = [friction for friction in model.frictions if friction.contact is not None]
     if any(friction.limit in model.friction_limits for friction in pressed):
@@ -517,10 +517,10 @@ def friction_margins(
     """What must stay positive for each friction, by the name of the limit at which a motion ends
     where it vanishes.
 
-    That is the normal force. Of one in a contact it decides whether a reaction is the only one:
-    with the Schur complement m of M over the free coordinates, t of the friction and n of the
-    contact along its sign, m_tt + s mu m_nt, and where it sticks m_tt - mu abs(m_nt), with mu_s and
-    times positive numbers.
+    That is the normal force. Of one in a contact it decides whether a reaction is the only one: let
+    m be the Schur complement of M over the free coordinates, t of the friction and n of the contact
+    along its sign. The margins are m_tt + s mu m_nt, and where it sticks m_tt - mu abs(m_nt), with
+    mu_s and times positive numbers.
     """
     forces = normal_forces(model, t, q, v, load)
     names = model.coordinates

@@ -67,11 +67,10 @@ class Metainterface(LayeredCell, OneContactModel):
     Margins, at which a motion may be asked to stop: `line_limit`, pi - beta0 - abs(theta)
     (`line_cond`, n = 1); `kinematic_limit`, 2 (pi - beta0) - abs(theta), where the slider closes
     again (errata 20); `reaction`, the closed layer's reaction, positive while it keeps the layer
-    closed (errata 21): with the lower layer open -R2 = cos(2 beta0 + theta) theta'' - sin(2 beta0 +
-    theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0, with the upper one open R1
-    = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2 -
-    [(1+h) H - (1+m) zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of
-    `eomnl`.
+    closed (errata 21). With the lower layer open it is -R2 = cos(2 beta0 + theta) theta'' - sin(2
+    beta0 + theta) theta'^2 + (H - zeta'') sin beta0 - (V - nu'') cos beta0 >= 0. With the upper one
+    open it is R1 = -cos(2 beta0 - theta) theta'' - sin(2 beta0 - theta) theta'^2 - [(1+h) H - (1+m)
+    zeta''] sin beta0 - [(1+v) V - (1+m) nu''] cos beta0 >= 0, rows two and one of `eomnl`.
 
     Parameters
     ----------

@@ -338,10 +338,10 @@ def within_window(
     towards the contact by a factor.
 
     States beyond a contact are reflected at it. For a model with several contacts the states
-    alternate, in pairs, between those with all contacts open and those with some, but not all,
-    coordinates held at their nearest contacts, for each choice of coordinates whose contacts lie in
-    the window. Without this no motion would begin with a closed contact, because such states have
-    no share of the window's volume.
+    alternate, in pairs, between two kinds. All contacts are open, or some, but not all, coordinates
+    are held at their nearest contacts, for each choice of coordinates whose contacts lie in the
+    window. Without this no motion would begin with a closed contact, because such states have no
+    share of the window's volume.
     """
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)

@@ -231,9 +231,9 @@ class Structure(ContactModel):
         frictions.
 
     Its coordinates are the displacements of contacts, surfaces and frictions, under their names,
-    and behind them the amplitudes `mode_1`, `mode_2`, ... of the modes, of mass 1, that it has
-    while these are held, the slowest first. `start` makes a state of displacements u, and
-    `displacements` gives u.
+    and behind them the amplitudes `mode_1`, `mode_2`, ... of its modes. The modes have mass 1, are
+    those while these displacements are held, and the slowest is the first. `start` makes a state of
+    displacements u, and `displacements` gives u.
 
     Parameters
     ----------

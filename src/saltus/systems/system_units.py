@@ -42,8 +42,9 @@ class NaturalUnits:
        times s times, `lengths` are L times and `time` is s times as large, up to rounding. They are
        not rounded themselves; `powers_of_two` are, for those who scale numbers by them exactly.
     2. They do not depend on the order of contacts and coordinates, on the origin of a coordinate
-       along which a contact holds, on a shift of the load by a phase, on friction of 0, or on
-       contacts that are farther away than another one or than the load moves what it pulls off.
+       along which a contact holds, on a shift of the load by a phase, or on friction of 0. Nor do
+       they depend on contacts that are farther away than another one or than the load moves what it
+       pulls off.
     3. `time` is 1 / Omega of the load, or shorter where an angle moves by 1 rad in less; without a
        load it is sqrt(d / a) of the distance d and the acceleration a below, or that of the
        stiffness alone. `lengths` are the range through which the load moves the equilibrium, or

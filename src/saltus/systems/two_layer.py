@@ -314,10 +314,10 @@ class CellChain(LayeredCell, ContactModel):
 
         u_1 = cos(beta0) - cos(beta0 + theta_1),    u_2 = u_1 + cos(beta0 - theta_2) - cos(beta0)
 
-    of the lower and the upper mass of a cell, in units of l, the energy of the springs per K2 is
-    kappa / 2 times the sum of the squares of the differences of u_j between neighbouring cells.
-    Coordinates are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and theta_2 <= 0 (`upper_1`, ...); each
-    has a contact of the same name. An impact passes its speed on within its cell only.
+    of the lower and the upper mass of a cell, in units of l. The energy of the springs per K2 is a
+    sum over neighbouring cells, kappa / 2 times the square of the difference of u_j. Coordinates
+    are theta_1 >= 0 (`lower_1`, `lower_2`, ...) and theta_2 <= 0 (`upper_1`, ...); each has a
+    contact of the same name. An impact passes its speed on within its cell only.
 
     Parameters
     ----------

@@ -30,9 +30,9 @@ class UnitCell:
     `max_disp_condition`).
 
     In every layer base, inclined bar (length 1, in units of l) and diagonal form a triangle: `beta`
-    is the angle between the base and the bar, `alpha` the one between the base and the line joining
-    the ends of the diagonal, `phi` the misalignment between that line and the two halves of the
-    diagonal, which stay parallel and slide past each other at mid-span.
+    is the angle between the base and the bar, and `alpha` the one between the base and the line
+    joining the ends of the diagonal. `phi` is the misalignment between that line and the two halves
+    of the diagonal, which stay parallel and slide past each other at mid-span.
 
     A difference angle `theta` is a number or an array of any shape, rad: theta >= 0 is theta_1 of
     the lower layer, theta <= 0 is theta_2 of the upper one (`theta_conditions`), as in the reduced

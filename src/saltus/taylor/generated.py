@@ -433,10 +433,10 @@ def equations_of(system: System) -> dict[str, str]:
     `System.to_json`.
 
     The parts are `acceleration` (including the load's channels), `gap`, `contact` (its position),
-    `reset` (including the impact law), `contacts` (of a model with several), `signs` (of its
-    contacts), `margins`, `mirror` (the load of the mirror image) and `names` (of coordinates,
-    units, channels, sides and stops). Values that a model's Python reads from elsewhere, such as
-    constants of its module, are numbers in the expressions.
+    `reset` (including the impact law), `contacts` (of a model with several) and `signs` (of its
+    contacts). The others are `margins`, `mirror` (the load of the mirror image) and `names` (of
+    coordinates, units, channels, sides and stops). Values that a model's Python reads from
+    elsewhere, such as constants of its module, are numbers in the expressions.
 
     Raises
     ------

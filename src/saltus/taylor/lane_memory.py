@@ -45,9 +45,9 @@ POINTER = DOUBLE.as_pointer()
 class LanesType(types.Type):
     """The type of a group of lanes.
 
-    `slots` and `parts` are the names of slots and parts in their order, `series` the length of a
-    series by the names of parts that have them, `rows` and `flags` the fields of the named tuple
-    that have a record for each lane, and a record for the group.
+    `slots` and `parts` are the names of slots and parts in their order, and `series` the length of
+    a series by the names of parts that have them. `rows` and `flags` are the fields of the named
+    tuple that have a record for each lane, and a record for the group.
     """
 
     # the types of the named tuples, by the names of the types of their groups

@@ -13,7 +13,7 @@
 
 A function that is written for LLVM is called with numbers and addresses alone, so that it can also
 be called from C, by `ctypes` or in a browser: an array is the address of its first element and all
-of its lengths but the first, a tuple is its parts one after the other, and two or more results are
+of its lengths but the first, and a tuple is its parts one after the other. Two or more results are
 put where the last argument says.
 """
 

@@ -192,8 +192,9 @@ def _context() -> Any:
 
 
 def by_value(name: str, inner: str, signature: Any) -> str:
-    """LLVM's text of a function `name` that takes and returns values as they are, by a function of
-    this signature that `llvm_of` has written under the name `inner`, which must not fail.
+    """LLVM's text of a function `name` that takes and returns values as they are. It calls a
+    function of this signature that `llvm_of` has written under the name `inner`, which must not
+    fail.
     """
     context = _context()
     module = context.create_module(name)

@@ -343,7 +343,7 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     ------
     ParameterError
         Another model, a force that is not one harmonic of order 1, damping that is not below
-        critical, a period below 1, an impact law that is not v+ = -e v-, a resonance without
+        critical, a period below 1, or another impact law than v+ = -e v-; a resonance without
         damping, at which no speed or every speed is a solution.
 
     Examples

@@ -203,9 +203,9 @@ def uncertainty_exponent(
 
     A cell is uncertain at eps if a cell with another label lies within eps cells of it along each
     axis; undecided cells do not count. Cells nearer to the edge of the grid than the largest eps
-    are left out. The slope of ln f over ln eps is fitted, with its standard error, over the
-    distances (1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid) at which f is below 0.5, or over all if
-    fewer than three of them are.
+    are left out. The slope of ln f over ln eps is fitted, with its standard error. The distances
+    are 1, 2, 3, 4, 6, 8, ... up to 1/16 of the grid. Those count at which f is below 0.5, or over
+    all if fewer than three of them are.
 
     Parameters
     ----------

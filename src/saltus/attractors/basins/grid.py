@@ -292,11 +292,12 @@ def basins_of_attraction(
     ends, and the time it takes.
 
     A cell has the label of an attractor if its motion is proved to be captured at rest, settles on
-    the orbit (to 1e-6, or stays as near for two of its periods and is nearer in the second), or
-    ends among the points of a chaotic set; else it is -1, undecided. Motions that settle elsewhere
-    give new attractors, with labels after the known ones. The time is the number of forcing periods
-    after which the motion stays within a distance (`within`) of the attractor's states at phase 0;
-    for rest it is at most the time until capture is proved.
+    the orbit, or ends among points of a chaotic set. To settle is to come as near as 1e-6, or to
+    stay as near for two periods of the orbit and to be nearer in the second; else it is -1,
+    undecided. Motions that settle elsewhere give new attractors, with labels after the known ones.
+    The time is the number of forcing periods after which the motion stays within a distance
+    (`within`) of the attractor's states at phase 0; for rest it is at most the time until capture
+    is proved.
 
     Parameters
     ----------

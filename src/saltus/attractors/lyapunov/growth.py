@@ -68,9 +68,9 @@ def weights(count: int) -> np.ndarray:
     sum 1.
 
     With these weights the average of a periodic or quasi-periodic series converges faster than any
-    power of the length (Das, Saiki, Sander and Yorke, Nonlinearity 30 (2017) 4111), while the plain
-    mean has an error of 1 / length; and the beginning of the run, which may still depend on the
-    start, has no weight. In chaos the standard error is larger by a quarter.
+    power of the length (Das, Saiki, Sander and Yorke, Nonlinearity 30 (2017) 4111). The plain mean
+    has an error of 1 / length; and the beginning of the run, which may still depend on the start,
+    has no weight. In chaos the standard error is larger by a quarter.
     """
     u = (np.arange(count) + 0.5) / count
     bump = np.exp(4.0 - 1.0 / (u * (1.0 - u)))

@@ -368,17 +368,17 @@ def lyapunov_spectrum(
     time t.
 
     The derivatives Phi of the exact flow, with the saltation of every impact, are carried over
-    spans of a forcing period, each no longer than 6.5 units of time, and made orthonormal after
-    each span. Averages over the periods are weighted (`averages.weights`), so that exponents of
-    periodic and quasi-periodic motions, and of equilibria, converge faster than any power of the
+    spans of a forcing period, each no longer than 6.5 units of time. They are made orthonormal
+    after each span. Averages over the periods are weighted (`averages.weights`), so that exponents
+    of periodic and quasi-periodic motions, and of equilibria, converge faster than any power of the
     time. Exponents are -inf for the directions in which closed contacts and sticking frictions hold
     the motion.
 
     The result contains two checks. The sum of the exponents must equal the mean divergence, which
     is computed from the impacts and from the times on each side; with several contacts or frictions
-    it is not known. And the stroboscopic map must have the same largest exponent, computed from a
-    second trajectory that starts at a distance of 1e-7 from the motion and is moved back to this
-    distance after every period.
+    it is not known. And the stroboscopic map must have the same largest exponent. It is computed
+    from a second trajectory, which starts at a distance of 1e-7 from the motion and is moved back
+    to it after every period.
 
     Parameters
     ----------

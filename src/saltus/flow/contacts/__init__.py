@@ -1,9 +1,9 @@
 """Motions with several contacts; each holds one coordinate while it is closed and its reaction
 pushes.
 
-`kernel.py` has the smooth steps and decides what follows an event, `impacts.py` has impacts and
-accumulations of them (`complementarity.py` solves for impulses), `closings.py` says which contacts
-stay closed and what several do that close at once, `frictions.py` what sticks and slides,
-`tangent.py` the derivatives at all of these, and `segments.py` and `extremes.py` the parts of
+`kernel.py` has the smooth steps and decides what follows an event. `impacts.py` has impacts and
+accumulations of them; `complementarity.py` solves for impulses. `closings.py` says which contacts
+stay closed and what several do that close at once, and `frictions.py` what sticks and slides.
+`tangent.py` has the derivatives at all of these, and `segments.py` and `extremes.py` the parts of
 orbits.
 """

@@ -18,8 +18,8 @@ is, if
 Otherwise there are only one-sided derivatives. Both orders are therefore tried. With springs
 between cells, whose forces do not jump, they agree. With a damper between them they differ: the
 impact of one mass changes the damper's force on the other mass, and the other mass's own impact
-reverses the effect of this force only if it comes later (no difference remains with e = 0, where
-the impact leaves no speed). Contacts of one block that close together have a derivative along
+reverses the effect of this force only if it comes later. No difference remains with e = 0, where
+the impact leaves no speed. Contacts of one block that close together have a derivative along
 columns that keep them together.
 
 Accumulations of impacts in several blocks that end at one instant are also treated one after the

@@ -2,7 +2,7 @@
 traced expressions.
 
 Where the accelerations on both sides are equal at the surface without speed along it, the map's
-derivative is continuous at a touch, as it is at such a single contact (see
+derivative is continuous at a touch. It is so at such a single contact, too (see
 `flow/one_contact/regularity.py`): the touch is no event of an orbit.
 """
 

@@ -2,8 +2,8 @@
 `taylor/tracing.py`).
 
 An event's instant depends on the parameter c of a column. The columns (u, z) of coordinates and
-velocities are first taken to the derivatives of the state *at the event*, u + v dt and z + a dt,
-where dt is the shift of the event and a the acceleration before it. The event's map is
+velocities are first taken to the derivatives of the state *at the event*, u + v dt and z + a dt.
+Here dt is the shift of the event, and a the acceleration before it. The event's map is
 differentiated there, with the contacts that act. Once it is known which contacts are closed
 afterwards, the columns are taken back to a fixed time with the velocity and acceleration after the
 event. Nothing jumps at a simple release, so that its saltation is the identity.

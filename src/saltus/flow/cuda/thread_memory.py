@@ -1,10 +1,10 @@
 """The memory of a thread, and LLVM's text of the function that gives it to the lanes' driver.
 
 The driver takes a `LaneGroup` (`lanes/memory.py`). What a structure and a call fix in it (sizes,
-the functions, the places of the parts) are constants of the text, so that LLVM removes what a
-structure does not have, and calls through addresses become code. What moves is in the thread's own
-memory; what a motion keeps from one launch to the next is a row of `kept`, and everything else is an
-array that a `Request` names.
+the functions, the places of the parts) are constants of the text. So LLVM removes what a structure
+does not have, and calls through addresses become code. What moves is in the thread's own memory;
+what a motion keeps from one launch to the next is a row of `kept`, and everything else is an array
+that a `Request` names.
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ class Saltation:
     """The tangent after an impact, one expression for each column.
 
     The leaves of these expressions are the tangent's coordinates and velocities before the impact,
-    the model's own velocity v- before it (as velocity 0), the time, the origin, the side before the
-    impact and the parameters.
+    and the model's own velocity v- before it (as velocity 0). The others are the time, the origin,
+    the side before the impact and the parameters.
     """
 
     coordinate: list[Expr]  # u+

@@ -117,9 +117,9 @@ def simulate_many(
     Returns
     -------
     xarray.Dataset
-        A Dataset with the state at the end, `time`, `side`, `stop` (why it ended), `impact_count`,
-        `grazings`, `periods` done (2.5 for two and a half), and what `sample` asks for, all over
-        the dimensions of the arguments; see `ensemble_dataset.py`.
+        A Dataset over the dimensions of the arguments, with the state at the end, `time`, `side`,
+        `stop` (why it ended), `impact_count`, `grazings` and what `sample` asks for. Its `periods`
+        are those done, 2.5 for two and a half; see `ensemble_dataset.py`.
 
     Raises
     ------

@@ -362,7 +362,7 @@ def find_recurrence(
     from_start
         Whether extrema are recorded from the start; they always are if a limit of the model may end
         a motion. Otherwise recording begins when a motion begins to repeat itself or its time is
-        nearly up, and extrema are nan for motions that come to rest for good or cannot go on.
+        nearly up. Extrema are nan for motions that come to rest for good or cannot go on.
     stop_early
         With False every motion is followed for all periods, and its period is read from the last
         states (`near_return`).

@@ -134,9 +134,8 @@ def to_torch(
     Raises
     ------
     ParameterError
-        An argument has no meaning. The function raises it where PyTorch is not installed, where a
-        path leads to no number, where the start is of another shape, and where a motion is refused
-        or ends before one of the `times`.
+        An argument has no meaning. PyTorch is not installed, a path leads to no number, the start
+        is of another shape, or a motion is refused or ends before one of the `times`.
 
     Examples
     --------

@@ -66,9 +66,10 @@ class Sensitivities(Result):
     the contact (see `grazings`).
 
     `event_times` has a row for each of `motion.events` and a column for each initial coordinate,
-    initial velocity and parameter: the derivatives of the event's time. They are nan if the event
-    has none (a grazing, the beginning of chatter, or impacts or releases of several contacts that
-    are not simultaneous in neighbouring motions), and after the motion has lost its derivative.
+    initial velocity and parameter: the derivatives of the event's time. They are nan after the
+    motion has lost its derivative, and if the event has none. Such are a grazing, the beginning of
+    chatter, and impacts or releases of several contacts that are not simultaneous in neighbouring
+    motions.
 
     Attributes
     ----------
@@ -115,9 +116,9 @@ class Sensitivities(Result):
         accuracy; at an impact, those just after it.
 
         They jump at impacts with the state. Just before one they are those of the last number below
-        its time, `np.nextafter(time, -np.inf)`. A motion whose end moves, with the forcing period
-        or with a margin, has in `state` and `parameters` the derivatives of the moving end, and
-        here those at the fixed time.
+        its time, `np.nextafter(time, -np.inf)`. The end of a motion may move with the forcing
+        period or with a margin. Then `state` and `parameters` have the derivatives of the moving
+        end, and this has those at the fixed time.
 
         Parameters
         ----------

@@ -420,10 +420,10 @@ def jump_over(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
     """The period doubling (for a symmetric orbit, the symmetry breaking) at a change of events
     where a multiplier jumps over -1.
 
-    At a grazing-sliding the map is continuous and its derivative is not. If the numbers of
-    multipliers below -1 on the two sides add up to an odd number, the branch of the doubled orbit
-    begins there, although no orbit has a multiplier of -1 (M. I. Feigin 1970; M. di Bernardo, M.
-    Feigin, S. Hogan, M. Homer, Chaos, Solitons and Fractals 10 (1999) 1881).
+    At a grazing-sliding the map is continuous and its derivative is not. Let the numbers of
+    multipliers below -1 on the two sides add up to an odd number. Then the branch of the doubled
+    orbit begins there, although no orbit has a multiplier of -1 (M. I. Feigin 1970; M. di Bernardo,
+    M. Feigin, S. Hogan, M. Homer, Chaos, Solitons and Fractals 10 (1999) 1881).
     """
     if cut.special is None or cut.special.kind != SpecialKind.GS:
         return None

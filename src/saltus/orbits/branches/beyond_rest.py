@@ -39,8 +39,8 @@ SETTINGS = RestSettings()
 
 def as_the_motion_goes_on(point: OrbitPoint) -> Restart:
     """Beyond the end of a rest: the impacts no longer die away, and the orbit has many of them.
-    Ever more of them towards the end of the rest, where grazings accumulate, so that the orbits are
-    those of a branch of its own, which is begun a little farther ahead."""
+    Ever more of them come towards the end of the rest, where grazings accumulate. The orbits are
+    then those of a branch of its own, which is begun a little farther ahead."""
     way = point.tangent[-len(point.parameters) :]
     sizes = np.abs(point.parameters)
     way = way / np.linalg.norm(way / np.where(sizes > 0.0, sizes, point.curve.scales))

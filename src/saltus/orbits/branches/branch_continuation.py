@@ -238,9 +238,9 @@ def switch_branch(
     """The branches that begin at a special point of another branch.
 
     At a PD this is the branch of the doubled orbit. At a BPC these are the branches of the two
-    unsymmetric orbits, which are mirror images of one another, or, where two branches cross, the
-    two halves of the other branch. Beyond a CH it is the branch of the orbits on which the motion
-    settles there, if there are any.
+    unsymmetric orbits, which are mirror images of one another. Where two branches cross, they are
+    the two halves of the other branch. Beyond a CH it is the branch of the orbits on which the
+    motion settles there, if there are any.
 
     Parameters
     ----------

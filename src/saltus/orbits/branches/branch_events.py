@@ -160,8 +160,8 @@ class BranchEvents(OrbitEvents):
         return changed
 
     def unlocated(self, run: Run, point: OrbitPoint, ahead: OrbitPoint, end: End) -> Cut | End:
-        """A cut at the last point where the orbits' events change just beyond it, as multipliers
-        grow without bound towards the change so that no orbit nearer to it can be solved for."""
+        """A cut at the last point, where the orbits' events change just beyond it. Multipliers grow
+        without bound towards the change, so that no orbit nearer to it can be solved for."""
         step = point.curve.norm(ahead.place - point.place)
         found = point.orbit.equations.stalled(point, step, run.points, run.bounds)
         return found if isinstance(found, Cut) else end
@@ -197,8 +197,8 @@ class BranchEvents(OrbitEvents):
         )
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
-        """The special points, without crossings of branches that are only folds, and without the
-        zeros of `torus` at which no complex pair of multipliers has the modulus 1 or that lie where
+        """The special points, without crossings of branches that are only folds. Zeros of `torus`
+        are left out at which no complex pair of multipliers has the modulus 1, or that lie where
         areas of states never grow."""
         folds = [zero.parameter for zero in found if zero.kind == SpecialKind.LP]
 

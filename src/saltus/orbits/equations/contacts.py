@@ -93,9 +93,8 @@ class ContactsEvaluation(OrbitEvaluation):
         a period before; inf at a grazing.
 
         The equations say how the state and the phase at the first event follow from those of the
-        period before.
-        At a fixed phase, a perturbation of the state alone begins the same motion as at any other,
-        and a later event by d phi moves the state by the rates times -d phi.
+        period before. At a fixed phase, a perturbation of the state alone begins the same motion as
+        at any other. An event that is later by d phi moves the state by the rates times -d phi.
         Without this the direction of the flow would be one multiplier more, which is 0.
         """
         count = self.state_count

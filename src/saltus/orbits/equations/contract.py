@@ -209,10 +209,10 @@ class OrbitEquations(ABC):
 
     and, where they differ from what stands here,
 
-    5. **F alone**: `residual`; **halving and repeating**: `halves` (both halves of a period as
-       unknowns of the equations over one
-       half, by which orbits that are their own images are known), `repeated` and `alternating` (the
-       unknowns, and a perturbation, of an orbit that goes round twice);
+    5. **F alone**: `residual`; **halving and repeating**: `halves`, both halves of a period as
+      unknowns of the equations over one half, by which orbits that are their own images are known;
+      `repeated` and `alternating`, the unknowns, and a perturbation, of an orbit that goes round
+      twice;
     6. **renumbering**: `nearest`, the unknowns of an orbit counted as those of another one;
        `has_events_of`, if the equations do not list events; `at_section_of` and
        `at_another_section`, if the state is given at a section that moves;
@@ -359,8 +359,8 @@ class OrbitEquations(ABC):
         return float(self.impacts(solution)[1].min(initial=math.inf))
 
     def pressing(self, solution: Solution) -> float:
-        """A quantity, in natural units, that is negative if a contact that the equations take for
-        closed would open, or one that they take for open is passed at the section; inf without
+        """A quantity, in natural units. It is negative if a contact that the equations take for
+        closed would open, or if one that they take for open is passed at the section; inf without
         either."""
         return math.inf
 

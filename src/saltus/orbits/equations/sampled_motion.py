@@ -478,8 +478,8 @@ class SampledMotion:
     ) -> tuple[float, str]:
         """How near the motion comes to a further change of its mode: the least of the inner minima
         of the gaps of open contacts and of the distances from surfaces, the speeds of sliding
-        frictions, the reactions of closed contacts, and the forces that sticking frictions still
-        lack to slip, all in natural units. Surfaces of the numbers `smooth` do not count.
+        frictions, the reactions of closed contacts; the forces that sticking frictions still lack
+        to slip; all are in natural units. Surfaces of the numbers `smooth` do not count.
 
         For reactions and sticking frictions the value just after an event counts too. inf without
         such minima. The second part of the result names the quantity.

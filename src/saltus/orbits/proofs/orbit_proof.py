@@ -211,8 +211,8 @@ class OrbitProof(Result):
         return certificate_of(self)
 
     def check(self) -> bool:
-        """Whether all that the proof and its certificate say holds when it is computed anew from the
-        system of the orbit and from the boxes of the certificate, without a search.
+        """Whether all that the proof and its certificate say holds when it is computed anew. It
+        takes the system of the orbit and the boxes of the certificate, and makes no search.
         """
         again = _again(self)
         return self.proved is True and again is not None and not differences(self, again)

@@ -76,13 +76,12 @@ def prove(
     """Prove by interval arithmetic that an orbit, a special point or a branch exists.
 
     Of an orbit: it exists, no other one of its signature is near, its contacts are open between
-    impacts, and it is stable or unstable.
-    Of a fold, a period doubling, a symmetry breaking or a grazing: an orbit with this property
-    exists at a parameter that is enclosed, and it is regular.
-    Of a branch: each of its special points, and that its points lie on connected curves of orbits, each alone in one of many boxes along
-    the arclength, with signs of its turns and with stability; some 20 to 50 boxes take a second.
-    The motion is enclosed by Taylor steps with a bound of their remainder, and the zero of the
-    shooting equations by Krawczyk's operator.
+    impacts, and it is stable or unstable. Of a fold, a period doubling, a symmetry breaking or a
+    grazing: an orbit with this property exists at a parameter that is enclosed, and it is regular.
+    Of a branch: each of its special points, and that its points lie on connected curves of orbits.
+    Each point is alone in one of many boxes along the arclength, with signs of its turns and with
+    stability; some 20 to 50 boxes take a second. The motion is enclosed by Taylor steps with a
+    bound of their remainder, and the zero of the shooting equations by Krawczyk's operator.
 
     Parameters
     ----------
@@ -110,8 +109,8 @@ def prove(
     Raises
     ------
     ParameterError
-        A result of another kind, a path that is no number of the system, a negative radius, a
-        radius on a whole number or, of a symmetric orbit, on a number that breaks the symmetry, a
+        A result of another kind, a path that is no number of the system, or a negative radius; a
+        radius on a whole number or, of a symmetric orbit, on a number that breaks the symmetry; a
         step so short that the equations have too many unknowns.
 
     Examples

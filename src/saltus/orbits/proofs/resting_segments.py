@@ -6,15 +6,13 @@ A release is a zero of the contact's acceleration; the first impacts after it so
 system, and the last segment of an excursion, which is no motion, has the equations of the next
 release at its end.
 
-After the last of these impacts, at t with the speed s, let the acceleration of the gap lie in
-[-a1, -a0], a0 > 0, for all times up to t + W, gaps up to g and speeds up to s, and let impacts
-return at most e of a speed.
-A flight that begins with the speed u lasts at most 2 u / a0, rises at most u^2 / (2 a0), and ends
-with at most u sqrt(a1 / a0).
-With r = e sqrt(a1 / a0) < 1 all impacts are over by t + 2 e s / (a0 (1 - r)), if this is less than
-t + W and if e^2 s^2 / (2 a0) < g.
-The contact then stays closed while the acceleration there is below 0, up to its next zero, which it
-passes rising: this is the next release.
+After the last of these impacts, at t with the speed s, let the acceleration of the gap lie in [-a1,
+-a0], a0 > 0, for all times up to t + W, gaps up to g and speeds up to s. Let impacts return at most
+e of a speed. A flight that begins with the speed u lasts at most 2 u / a0, rises at most u^2 / (2
+a0), and ends with at most u sqrt(a1 / a0). With r = e sqrt(a1 / a0) < 1 all impacts are over by t +
+2 e s / (a0 (1 - r)), if this is less than t + W and if e^2 s^2 / (2 a0) < g. The contact then stays
+closed while the acceleration there is below 0, up to its next zero, which it passes rising: this is
+the next release.
 """
 
 from __future__ import annotations

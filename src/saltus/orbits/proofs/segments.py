@@ -40,9 +40,9 @@ class Rest:
     """A rest at a contact, after infinitely many impacts of which some are events.
 
     `last` and `release` are the numbers of the last of these events and of the release after it.
-    The expressions are the acceleration of the gap, that at the closed contact and its rate, the
-    speed after an impact and its slope to the speed before, the contact's position, and the slope of
-    the gap to the coordinate.
+    The expressions are the acceleration of the gap, that at the closed contact and its rate, and
+    the speed after an impact with its slope to the speed before. The last two are the contact's
+    position, and the slope of the gap to the coordinate.
     """
 
     last: int

@@ -153,7 +153,7 @@ def with_motions(
     chart: xarray.Dataset, request: ChartRequest, cells: np.ndarray, found: np.ndarray
 ) -> xarray.Dataset:
     """The chart with the motions found, of `way_type`, in these cells, (n, 2) rows and columns,
-    unless the cells have them already, and with the motions to which these lead in neighbouring
+    unless the cells have them already. It also has the motions to which these lead in neighbouring
     cells."""
     # its arrays are written to
     made = chart.transpose("vertical", "horizontal", ...).copy(deep=True).load()
@@ -309,9 +309,9 @@ def with_borders(
 
     Where a cell has a motion that its neighbour lacks, the motion is followed by simulation towards
     the neighbour, and its end is enclosed between two values of the parameter. A motion that
-    reaches the neighbour is added to the chart. At the ends on the longest borders, above all those
-    next to cells with rest alone, the orbit is continued to its special point, and the curve of LP,
-    PD, BPC or GR through this point is followed through the plane of the chart.
+    reaches the neighbour is added to the chart. The ends on the longest borders are taken, above
+    all those next to cells with rest alone. There the orbit is continued to its special point. The
+    curve of LP, PD, BPC or GR through this point is followed through the plane of the chart.
 
     Parameters
     ----------

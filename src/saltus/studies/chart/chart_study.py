@@ -93,13 +93,13 @@ def disagreements(chart: xarray.Dataset, borders: Borders) -> xarray.Dataset:
     xarray.Dataset
         A Dataset. Along `change` it has the changes for which it is not known what becomes of the
         motion, and which no curve explains: `horizontal` and `vertical` halfway between the cells,
-        `amplitude` and `period` of the motion that ends, `cells` (the number of motions in its
-        family), and `beside_rest`, whether the neighbour has rest alone. Along `unseen` it has the
+        `amplitude` and `period` of the motion that ends, and `cells`, the number of motions in its
+        family. `beside_rest` says whether the neighbour has rest alone. Along `unseen` it has the
         places on curves of folds beside which no cell has the motions that end there. Attributes:
         `changes` and `changes_beside_rest` count all changes; `located` counts those with an
-        enclosed end of the motion, `on_curves` those that a curve explains, `harmless` those where
-        the same motion goes on, with another amplitude than expected or too small to count.
-        `sampled` is the number of located ends that were also solved for by continuation,
+        enclosed end of the motion, and `on_curves` those that a curve explains. `harmless` counts
+        those where the same motion goes on, with another amplitude than expected or too small to
+        count. `sampled` is the number of located ends that were also solved for by continuation,
         `sampled_agree` the number of these that lie where simulation has enclosed them.
         `chaos_beside_rest` counts pairs of neighbouring cells, one with rest alone and one with
         chaos alone, between which chaos ends but no stable motion.
@@ -184,9 +184,9 @@ def wrong_cells(
 ) -> dict[str, float]:
     """How many cells of a random sample are wrong.
 
-    Each cell is computed again with four times as many starts, which are others, and with eight
-    cells around it at half the distance of its neighbours, so that motions that begin at these are
-    found as well.
+    Each cell is computed again with four times as many starts, which are others. Eight cells around
+    it, at half the distance of its neighbours, are computed too, so that motions that begin at
+    these are found as well.
 
     Parameters
     ----------
@@ -203,10 +203,10 @@ def wrong_cells(
     -------
     dict[str, float]
         The number of `checked_cells` and of `wrong_cells` among them. The latter are `wrong_rest`
-        where the chart has rest alone and there is something else, `wrong_motions` where it lacks a
-        stable motion, and `wrong_chaos` where either the chart or the sample has chaos, but not
-        both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to `wrong_share_high`
-        its 95 % interval.
+        where the chart has rest alone and there is something else, and `wrong_motions` where it
+        lacks a stable motion. They are `wrong_chaos` where either the chart or the sample has
+        chaos, but not both. `wrong_share` is the share of wrong cells, and `wrong_share_low` to
+        `wrong_share_high` its 95 % interval.
 
     Examples
     --------
@@ -327,10 +327,10 @@ def stability_chart(
     two parameters (Figs. 14, 15).
 
     In every cell motions are followed from `starts` initial states, spread evenly over the window,
-    every other one drawn in towards the contact, and from every stable motion of the neighbouring
-    cells of the same chunk, until this adds nothing new. So a motion is followed to where its
-    stability ends, even where its basin is tiny. Deformed equilibria, which exist without a
-    horizontal load, are motions too. docs/charts.md lists the variables of the result.
+    every other one drawn in towards the contact. They are also followed from every stable motion of
+    the neighbouring cells of the same chunk, until this adds nothing new. So a motion is followed
+    to where its stability ends, even where its basin is tiny. Deformed equilibria, which exist
+    without a horizontal load, are motions too. docs/charts.md lists the variables of the result.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def motions_later(
 
     Motions are followed so in stages by cells and between cells. If one is about to settle its
     state is the limit to which its last states are extrapolated, so that the next stage begins
-    there, and its extrema are those of the period with which it seems to settle: the one of the
+    there. Its extrema are those of the period with which it seems to settle: the one of the
     extrapolation or, with `slow`, the one after which it returns within this share of its size.
     """
     ends = find_recurrence(

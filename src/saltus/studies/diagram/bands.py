@@ -324,8 +324,8 @@ def explained(system: System, chaos: Bands, branches: Sequence[Branch]) -> Bands
     If a fold or a grazing at which orbits lose their stability lies in the bracket of the edge, it
     is what happens there. The edge is the end of a cascade if the motions beyond it have 2^k times
     (k > 0) the period of an orbit whose period doubling lies on that side. It is a crisis if the
-    motions beyond are transients and the attractor, whose states at phase 0 are away from the
-    states of an unstable orbit within the band, comes up to them at the edge.
+    motions beyond are transients and the attractor comes up to an unstable orbit at the edge.
+    Within the band its states at phase 0 are away from the states of this orbit.
     """
     look = _Evidence(system, chaos, branches)
     bands = [

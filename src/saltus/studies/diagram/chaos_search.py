@@ -69,11 +69,11 @@ def chaotic_bands(
     is halved, down to a thousandth of the range. Motions at the new value begin on those at both
     ends, so that an attractor is followed however small its basin is. Motions that have not settled
     after 300 forcing periods are judged by `judge`. The edges of bands, and of windows of periodic
-    motion within them, are then enclosed in brackets of 1e-4 of the range, by motions begun on the
-    chaos of the inner side. Windows narrower than a thousandth of the range are found by chance
-    only; an attractor is not found if its basin contains no start and it ends before the next
-    value. `effort="quick"` halves to 4e-3 and 1e-3 of the range and judges once; "thorough" halves
-    to 5e-4 and 5e-5.
+    motion within them, are then enclosed in brackets of 1e-4 of the range. The motions for this
+    begin on the chaos of the inner side. Windows narrower than a thousandth of the range are found
+    by chance only; an attractor is not found if its basin contains no start and it ends before the
+    next value. `effort="quick"` halves to 4e-3 and 1e-3 of the range and judges once; "thorough"
+    halves to 5e-4 and 5e-5.
 
     Parameters
     ----------

@@ -409,7 +409,7 @@ class DiagramSearch:
 
         Motions that have not settled outside bands of chaos are given more time, as they are still
         on their way to an attractor. With `follow`, after the sample is counted, the orbits on
-        which its motions settle are followed and, if the effort has more than one sample, chaos is
+        which its motions settle are followed. If the effort has more than one sample, chaos is
         looked for where they do not settle. Then a new sample is counted.
         """
         for number in range(self.effort.samples):

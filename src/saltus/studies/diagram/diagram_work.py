@@ -1,8 +1,8 @@
 """The long computations of a diagram's search, done in this process, or as parts that other
 processes compute and a store keeps.
 
-Each part is a pure function of its inputs, which are JSON. The parts are how motions end, the
-judgement of motions that have not settled, the branch of an orbit, and the distance of an orbit
+Each part is a pure function of its inputs, which are JSON. The parts are how motions end, and the
+judgement of motions that have not settled. The others are the branch of an orbit, and its distance
 from itself after some of its periods. A search that runs again finds in its store what was computed
 before it was stopped.
 """
