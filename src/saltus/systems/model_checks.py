@@ -56,6 +56,9 @@ OWN_PARTS = {
 # What may be rounding in a gap at the contact, relative to its rate, and in entries of a mass
 # matrix; a mistake is larger.
 MODEL_ROUNDING = 1e-9
+# The least eigenvalue of a mass matrix whose diagonal is scaled to 1; of a smaller one it is rounding.
+SINGULAR = 1e-14
+MOST_SHOWN = 4  # of the masses, in an error
 # time, coordinate and velocity at which a model's answers are counted: any numbers would do
 PROBE = (0.37, 0.21, 0.13)
 
@@ -515,6 +518,72 @@ def _check_mass(model: ContactModel) -> None:
                 f" {names[j]} and {b:g} for {names[j]}, {names[i]}",
                 "model",
             )
+    _check_definite(model, found)
+
+
+def _check_definite(model: ContactModel, found: Any) -> None:
+    """Refuse a mass matrix that is not positive definite: a mass of 0, below it or nan.
+
+    One that depends on the coordinates may be so beyond the model's own range: it is refused where
+    it is so at several places.
+    """
+    if type(model).__module__.partition(".")[0] == "saltus":
+        return  # these check their numbers themselves
+    size = len(model.coordinates)
+    matrix = as_matrix(found, size)
+    if matrix is None or is_definite(matrix):
+        return
+    for share in (0.0, -0.7, 3.1):
+        other = _asked(
+            model,
+            "mass_matrix",
+            share if size == 1 else tuple(share / (1 + i) for i in range(size)),
+        )
+        beside = None if other is None else as_matrix(other, size)
+        if beside is not None and is_definite(beside):
+            return
+    entries = ", ".join(
+        f"{matrix[i, i]:g} for {name}" for i, name in enumerate(model.coordinates[:MOST_SHOWN])
+    )
+    raise ParameterError(
+        f"{type(model).__name__}.mass_matrix must be positive definite, with all masses above 0;"
+        f" got one that is not, with {entries} on its diagonal",
+        "model",
+    )
+
+
+def as_matrix(found: Any, size: int) -> np.ndarray | None:
+    """What `mass_matrix` returns, as an array; None if it has other entries than numbers.
+
+    Parameters
+    ----------
+    found
+        A number or rows of numbers.
+    size
+        The number of coordinates.
+    """
+    try:
+        return np.array(found, dtype=float).reshape(size, size)
+    except (TypeError, ValueError):
+        return None
+
+
+def is_definite(matrix: np.ndarray) -> bool:
+    """Whether a symmetric matrix is positive definite, by more than rounding.
+
+    Parameters
+    ----------
+    matrix
+        The matrix, (n, n).
+    """
+    diagonal = np.diagonal(matrix)
+    if not (np.isfinite(matrix).all() and (diagonal > 0.0).all()):
+        return False
+    # units of coordinates and masses do not matter
+    roots = np.sqrt(diagonal)
+    with np.errstate(all="ignore"):
+        scaled = matrix / roots / roots[:, None]
+    return bool(np.linalg.eigvalsh(scaled)[0] > SINGULAR)
 
 
 def _size_of(found: Any) -> str:
