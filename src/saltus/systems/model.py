@@ -506,6 +506,8 @@ SLOPES: dict[str, tuple[Callable[..., Any], ...]] = {
     "divide": (lambda a, b, y: 1.0 / b, lambda a, b, y: -y / b),
     "power": (lambda a, b, y: b * a ** (b - 1.0), lambda a, b, y: y * np.log(a)),
     "negative": (lambda u, y: -1.0,),
+    "absolute": (lambda u, y: np.sign(u),),
+    "sign": (lambda u, y: 0.0,),
     "square": (lambda u, y: 2.0 * u,),
     "sqrt": (lambda u, y: 0.5 / y,),
     "exp": (lambda u, y: y,),

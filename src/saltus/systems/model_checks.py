@@ -94,7 +94,8 @@ _known = set[type[Model]]()
 
 
 def check_traces(system: Any) -> None:
-    """Refuse a system of one's own class whose equations cannot be traced, when it is made.
+    """Refuse a system of one's own class whose equations cannot be traced, or are others for
+    symbols than for numbers, when it is made.
 
     The tracer is in a room above this one, which is asked by its name.
 
@@ -112,7 +113,8 @@ def check_traces(system: Any) -> None:
             f"@dataclass(frozen=True, kw_only=True) above class {kind.__name__}",
             "model",
         )
-    import_module("saltus.taylor").trace(system)
+    taylor = import_module("saltus.taylor")
+    taylor.check_agreement(system, taylor.trace(system))
     _traced.add(kind)
 
 

@@ -1,3 +1,4 @@
+from .agreement import check_agreement as check_agreement
 from .cache import cache_directory as cache_directory
 from .cache import digest as digest
 from .cache import kept_bytes as kept_bytes
