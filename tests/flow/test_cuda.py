@@ -19,6 +19,7 @@ import pytest
 from lane_cases import FAMILIES, amplification, end_state
 
 import saltus
+from saltus.attractors import Attractors
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow.cuda import devices
 from saltus.flow.cuda.launch import LaunchSettings, example_of, run_on
@@ -34,6 +35,7 @@ ALL = {"sample": ("state", "extrema", "speed", "impact_count"), "last": "all"}
 EARLY = {"until": ("rest", "settled")}
 COUNTED = ("impact_count", "stop", "side", "grazings")
 MOST_LOCAL = 1 << 14  # bytes of a thread in one function
+MANY = 1000, 1e9, 2  # motions, forcing periods of all of them, cores
 MOST_BYTES = 16  # stores of single bytes: of truths, in errors of memory
 
 
@@ -44,7 +46,7 @@ def host():
 
 def on_host(monkeypatch, host):
     """Let ensembles run in the threads of this processor."""
-    monkeypatch.setattr(ensemble, "target_of", lambda device, run, motions: host)
+    monkeypatch.setattr(ensemble, "target_of", lambda *asked: host)
 
 
 def agree(name, monkeypatch, host, count=150, **options):
@@ -88,13 +90,18 @@ def test_all_models_with_one_contact_agree(name, more, monkeypatch, host):
 # --- launches ----------------------------------------------------------------
 
 
-def oscillators():
-    """A metainterface whose motions lose speed at impacts: its lanes and jobs."""
-    system = saltus.System(
+def oscillator():
+    """A metainterface whose motions lose speed at impacts."""
+    return saltus.System(
         model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
         load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
         impact=saltus.VelocityReduction(0.9),
     )
+
+
+def oscillators():
+    """Motions of it: their lanes and jobs."""
+    system = oscillator()
     options = EnsembleOptions(
         tol=TOL, periods=20, limits=limits_of(system, ()), sample=(), until=(), paths=None
     )
@@ -188,10 +195,12 @@ def test_a_card_that_is_not_there_is_one_sentence(monkeypatch):
         raise SaltusError("no card was found: this machine has no driver of NVIDIA's")
 
     monkeypatch.setattr(devices, "card", none)
-    lanes, jobs = oscillators()
+    lanes, _ = oscillators()
     with pytest.raises(SaltusError, match="no card was found"):
-        devices.target_of("cuda", lanes.program, len(jobs))
-    assert devices.target_of("auto", lanes.program, 1000) is None
+        devices.target_of("cuda", lanes.program, *MANY)
+    assert devices.target_of("auto", lanes.program, *MANY) is None
+    with pytest.raises(SaltusError, match="no card was found"):
+        saltus.find_attractors(oscillator(), device="cuda")
 
 
 def test_what_the_driver_answers_is_told(monkeypatch):
@@ -209,18 +218,113 @@ def test_what_the_driver_answers_is_told(monkeypatch):
 def test_a_card_is_taken_where_it_is_faster(monkeypatch, host):
     monkeypatch.setattr(devices, "card", lambda: host)
     lanes, _ = oscillators()
-    assert devices.target_of("auto", lanes.program, devices.FEWEST) is host
-    assert devices.target_of("auto", lanes.program, devices.FEWEST - 1) is None
-    assert devices.target_of("cpu", lanes.program, 1000) is None
+    motions, periods, cores = MANY
+    assert devices.target_of("auto", lanes.program, *MANY) is host
+    for few in (
+        (cores * devices.FEWEST - 1, periods, cores),
+        (motions, 0.9 * cores * devices.LEAST_WORK, cores),
+    ):
+        assert devices.target_of("auto", lanes.program, *few) is None
+        assert devices.target_of("cuda", lanes.program, *few) is host
+    assert devices.target_of("cpu", lanes.program, *MANY) is None
 
 
 def test_what_a_card_cannot_follow_is_refused_by_name():
     system = saltus.System(model=saltus.TwoStops(), load=saltus.Load())
     with pytest.raises(ParameterError, match="several contacts"):
-        devices.target_of("cuda", program(system), 1000)
-    assert devices.target_of("auto", program(system), 1000) is None
+        devices.target_of("cuda", program(system), *MANY)
+    assert devices.target_of("auto", program(system), *MANY) is None
+    driven = saltus.System(
+        model=saltus.TwoStops(), load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.1))
+    )
+    with pytest.raises(ParameterError, match="several contacts"):
+        saltus.find_attractors(driven, device="cuda")
     with pytest.raises(ParameterError, match="device must be one of"):
         saltus.simulate_many(system, periods=1, device="gpu")
+
+
+# --- studies -----------------------------------------------------------------
+
+
+def block():
+    """A block under a pulse that may overturn it."""
+    pulse = saltus.OneSine(amplitude=0.3, frequency=2.0, quantity="acceleration")
+    load = saltus.Load(ground_horizontal=pulse)
+    return saltus.System(model=saltus.RockingBlock(alpha=0.2), load=load)
+
+
+GRID = np.linspace(-1.0, 1.0, 6)
+STUDIES = {
+    "attractors": lambda device: saltus.find_attractors(oscillator(), starts=24, device=device),
+    "basins": lambda device: saltus.basins_of_attraction(
+        oscillator(), theta=GRID, velocity=GRID, device=device
+    ),
+    "chart": lambda device: saltus.stability_chart(
+        oscillator(), horizontal=[0.2, 0.4], vertical=[-0.5], starts=8, device=device
+    ),
+    "spectrum": lambda device: saltus.response_spectrum(
+        oscillator(), bounds=(0.9, 1.0), max_period=1, values=[0.95], bands=False, device=device
+    ),
+    "overturning": lambda device: saltus.overturning_spectrum(
+        block(), amplitude=GRID[3:], frequency=[2.0, 3.0], curves=False, device=device
+    ),
+    "fragility": lambda device: saltus.fragility([block()], [1.0, 3.0, 5.0], device=device),
+}
+SLOW_STUDIES = ("attractors", "basins", "chart", "spectrum", "overturning")
+
+
+def numbers_of(result):
+    """The tables of a result."""
+    result = result.to_xarray() if isinstance(result, Attractors) else result
+    parts = [node.dataset for node in result.subtree] if hasattr(result, "subtree") else [result]
+    return [{name: values.values for name, values in part.data_vars.items()} for part in parts]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.thorough] if name in SLOW_STUDIES else [])
+        for name in STUDIES
+    ],
+)
+def test_a_study_passes_its_device_on(name, monkeypatch, host):
+    monkeypatch.setattr(devices, "card", lambda: host)
+    monkeypatch.setattr(devices, "FEWEST", 1)
+    here = STUDIES[name]("cpu")
+    there = STUDIES[name]("cuda")
+    told = there.device if name == "attractors" else there.attrs["device"]
+    assert told == host.name
+    for one, other in zip(numbers_of(here), numbers_of(there), strict=True):
+        assert one.keys() == other.keys()
+        for key, values in one.items():
+            if values.dtype.kind in "fc":
+                np.testing.assert_allclose(other[key], values, rtol=1e-6, atol=1e-8, err_msg=key)
+            else:
+                assert (other[key] == values).all(), key
+
+
+def test_a_study_on_a_card_is_of_one_process(monkeypatch, host):
+    monkeypatch.setattr(devices, "card", lambda: host)
+    with pytest.raises(ParameterError, match="one process"):
+        saltus.stability_chart(oscillator(), workers=2, device="auto")
+    with pytest.raises(ParameterError, match="device must be one of"):
+        saltus.fragility([block()], [1.0], device="gpu")
+
+
+def test_a_file_may_name_the_device(tmp_path, monkeypatch):
+    def none():
+        raise SaltusError("no card was found")
+
+    monkeypatch.setattr(devices, "card", none)
+    file = tmp_path / "study.toml"
+    file.write_text(
+        "[model]\ntype = 'Metainterface'\nbeta0 = '80 deg'\n[load]\nfrequency = 1\nhorizontal = 0.2\n"
+        "[basins]\ntheta = [0.0, 0.1]\nvelocity = [0.0, 0.1]\ndevice = 'cuda'\n"
+    )
+    study = saltus.load_study(file)
+    (ask,) = study.asks
+    with pytest.raises(SaltusError, match="no card was found"):
+        study.answer(ask, ask.function.check)
 
 
 @pytest.mark.gpu

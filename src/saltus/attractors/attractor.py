@@ -260,6 +260,8 @@ class Attractors(Result):
         The error that one step might make.
     reasons
         Why motions are undecided.
+    device
+        The card that followed motions, or nothing.
 
     Examples
     --------
@@ -277,6 +279,7 @@ class Attractors(Result):
     seed: int
     tol: float
     reasons: tuple[str, ...]
+    device: str = ""
 
     def __len__(self) -> int:
         return len(self.members)
@@ -365,6 +368,7 @@ def attractors_dataset(found: Attractors) -> xarray.Dataset:
         plane=list(state_plane(found.system)),
         undecided=found.undecided,
         reasons=list(found.reasons),
+        **({"device": found.device} if found.device else {}),
     )
     return xarray.Dataset(table, {"attractor": labels(found.members)}, attributes)
 

@@ -34,9 +34,11 @@ from saltus.flow import (
     RECURRENCE,
     Ending,
     Recurrence,
+    check_device,
     extrema_names,
     find_recurrence,
     motions_from,
+    on_device,
     simulate,
     stroboscopic,
 )
@@ -321,8 +323,10 @@ def _check(
     known: Any,
     also: Any,
     tol: float,
+    device: Any,
     progress: object,
 ) -> None:
+    check_device(device, system)
     with_clock(system)
     further = check_states("also", also, system.dimension)
     for place, coordinate in enumerate(system.model.coordinates):
@@ -336,6 +340,7 @@ def _check(
 
 
 @checked_by(_check)
+@on_device
 def find_attractors(
     system: System,
     *,
@@ -346,6 +351,7 @@ def find_attractors(
     known: Iterable[PeriodicOrbit | Branch] | PeriodicOrbit | Branch = (),
     also: Any = (),
     tol: float = 1e-11,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> Attractors:
     """The attractors on which motions from a window of initial states at phase 0 end, each
@@ -381,6 +387,8 @@ def find_attractors(
         A state at a contact that moves into it is taken just before the impact.
     tol
         The error of a step, as for `simulate_many`.
+    device
+        Where the motions are followed, as for `simulate_many`.
     progress
         Called with the fraction done and what is being done.
 

@@ -146,7 +146,8 @@ def computed(
     )
     # other processes do not know a model of one's own
     known = type(study.system.model).__module__.startswith("saltus.")
-    if ask.kind in DIAGRAMS and scheduler is None and known and available_cores() > 1:
+    alone = scheduler is not None or ask.options.get("device", "cpu") != "cpu"
+    if ask.kind in DIAGRAMS and not alone and known and available_cores() > 1:
         more["workers"] = available_cores()
     data = study.answer(ask, ask.function, progress=progress, **more)
     return data.to_xarray() if ask.kind == "attractors" else data

@@ -3,6 +3,8 @@ from .contacts.layout import SegmentExtremes as SegmentExtremes
 from .contacts.layout import SegmentPlan as SegmentPlan
 from .contacts.surface_regularity import continuous_surfaces as continuous_surfaces
 from .cuda.devices import card_seen as card_seen
+from .cuda.devices import check_device as check_device
+from .cuda.devices import on_device as on_device
 from .kernel.compiled import program as program
 from .kernel.layout import EventCode as EventCode
 from .kernel.layout import SegmentColumn as SegmentColumn

@@ -91,7 +91,7 @@ def animate(
     check_number("seconds", seconds, above=0.0, at_most=3600.0)
     check_number("fps", fps, above=0.0, at_most=240.0)
     check_number("width", width, at_least=NARROWEST, at_most=WIDEST, unit="mm")
-    motion = result.motion() if callable(getattr(result, "motion", None)) else result
+    motion = result.motion() if callable(getattr(type(result), "motion", None)) else result
     if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:
         raise ParameterError(
             f"result must be a motion that was kept densely, or an orbit, got {shown(result)}",

@@ -18,7 +18,7 @@ from saltus.attractors import Equilibrium, share_interval
 from saltus.checks import check_axis, checked_by
 from saltus.continuation import STEPS, Corrected, Course, EquationCurve, Events, Point, both_ways
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow import Motion, Stop, sensitivities, simulate
+from saltus.flow import Motion, Stop, check_device, on_device, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.result import result_dataset
 from saltus.studies.shaken import OVERTURNING, WINDOW, Outcomes, Shaken, end_of
@@ -156,8 +156,9 @@ class Border(EquationCurve[Point]):
         return None if evaluation is None else own.along_kernel(Corrected(place, evaluation, 0))
 
 
-def _check(progress: object = None, **arguments: Any) -> None:
-    OverturningRequest(**arguments)
+def _check(device: Any, progress: object = None, **arguments: Any) -> None:
+    request = OverturningRequest(**arguments)
+    check_device(device, request.system)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,6 +185,7 @@ class OverturningRequest:
 
 
 @checked_by(_check)
+@on_device
 def overturning_spectrum(
     system: System,
     *,
@@ -191,6 +193,7 @@ def overturning_spectrum(
     frequency: Iterable[float],
     curves: bool = True,
     window: Box = WINDOW,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.Dataset:
     """Which pulses of every amplitude and frequency overturn a system that rests at its contact,
@@ -217,6 +220,8 @@ def overturning_spectrum(
     window
         A pair (low, high) for the coordinate and one for the velocity: where unstable equilibria
         are looked for.
+    device
+        Where the motions are followed, as for `simulate_many`.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -391,11 +396,13 @@ def _lies_on(point: Point, course: Course[Point, Any], border: Border) -> bool:
     return bool((np.abs(there - size) <= OVERTURNING.same * border.scale[0]).any())
 
 
+@on_device
 def fragility(
     systems: Iterable[System],
     scales: Iterable[float],
     *,
     window: Box = WINDOW,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.Dataset:
     """The share of loads that overturn a system at rest, over a scale by which each pulse or record
@@ -413,6 +420,8 @@ def fragility(
         The factors, above 0, that increase.
     window
         As for `overturning_spectrum`.
+    device
+        Where the motions are followed, as for `simulate_many`.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -442,6 +451,8 @@ def fragility(
             f"systems must be a list of systems, one under each load, got {shown(systems)}",
             "systems",
         )
+    for system in given:
+        check_device(device, system)
     factors = check_axis("scales", scales)
     if not factors[0] > 0.0:
         raise ParameterError(f"scales must be above 0, got {factors[0]:g}", "scales")

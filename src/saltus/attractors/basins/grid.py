@@ -49,7 +49,7 @@ from saltus.checks import (
     checked_by,
 )
 from saltus.errors import ParameterError
-from saltus.flow import state_names
+from saltus.flow import check_device, on_device, state_names
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import (
@@ -244,9 +244,11 @@ def _check(
     store: Any,
     workers: object,
     scheduler: object,
+    device: Any,
     progress: object,
     **coordinates: Any,
 ) -> None:
+    check_device(device, system, workers, scheduler)
     grid = _grid(with_clock(system), velocity, coordinates, found)
     axes = dict(zip(grid.plane, (grid.horizontal, grid.vertical), strict=True))
     for name in system.model.coordinates:
@@ -272,6 +274,7 @@ def _check(
 
 
 @checked_by(_check)
+@on_device
 def basins_of_attraction(
     system: System,
     *,
@@ -285,6 +288,7 @@ def basins_of_attraction(
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
     **coordinates: Iterable[float] | float,
 ) -> xarray.Dataset:
@@ -325,6 +329,8 @@ def basins_of_attraction(
         Where the cells are kept and who computes them, see `saltus.sweep.run`. The attractors
         before and the curves after the cells are computed anew at every run. If none is given all
         cells are computed at once.
+    device
+        Where the motions are followed, as for `simulate_many`.
     progress
         Called with the fraction done and what is being done.
     coordinates

@@ -1,18 +1,48 @@
-"""Which machine follows an ensemble: the lanes of this processor, or a card."""
+"""Which machine follows an ensemble: the lanes of this processor, or a card.
+
+A study is told its device once, by the argument `device` of its function; all ensembles within it
+ask here (`on_device`). A study asks for derivatives and for a few motions now and then: these are
+followed by the lanes, also where a card is asked for.
+"""
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass, field, is_dataclass, replace
+from functools import cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 from saltus.errors import ParameterError, SaltusError, shown
 from saltus.flow.cuda.targets import Card, Target
 from saltus.flow.kernel.compiled import Program
 from saltus.progress import say
+from saltus.systems import System
+from saltus.taylor import trace
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 DEVICES = ("cpu", "cuda", "auto")
-FEWEST = 130  # motions: fewer take less time on two cores, by the prototype's measurement
+# Motions for each core of this processor: fewer take less time there, by the prototype's
+# measurement.
+FEWEST = 65
+# Forcing periods of all motions for each core, which it follows in about a second: for less nobody
+# waits for a card, whose code may have to be made first.
+LEAST_WORK = 1e6
 SLOW = 32  # single numbers that a card computes in the time of a double one
+SEVERAL = "models with several contacts or with friction are not followed"
+
+
+@dataclass
+class _Choice:
+    """The device of a study, and those that have followed ensembles of it."""
+
+    device: str
+    used: set[str] = field(default_factory=set)
+
+
+_CHOICE: ContextVar[_Choice | None] = ContextVar("device of a study", default=None)
 
 
 def read_device(device: Any) -> str:
@@ -29,8 +59,60 @@ def read_device(device: Any) -> str:
     return device
 
 
-def target_of(device: str, run: Program, motions: int) -> Target | None:
-    """The card on which so many motions of a program run, or None: the lanes of this processor.
+def check_device(
+    device: Any, system: System, workers: object = None, scheduler: object = None
+) -> str:
+    """The name of the device of a study of a system.
+
+    Raises
+    ------
+    ParameterError
+        It is none, the card cannot follow the system, or other processes compute.
+    SaltusError
+        There is no card, and it is asked for.
+    """
+    if read_device(device) != "cpu" and (workers is not None or scheduler is not None):
+        raise ParameterError(
+            "a card follows the motions of one process: leave device out, or workers and scheduler",
+            "device",
+        )
+    if device == "cuda":
+        if trace(system.in_gap_coordinates).several:
+            raise ParameterError(f"{SEVERAL} on a card: leave device out", "device")
+        card()
+    return str(device)
+
+
+def on_device(study: Callable[P, R]) -> Callable[P, R]:
+    """A study, a function with an argument `device`, all ensembles of which run there; its result
+    names the card as `device`.
+    """
+
+    @wraps(study)
+    def call(*given: P.args, **named: P.kwargs) -> R:
+        choice = _CHOICE.get() or _Choice(read_device(named.get("device", "cpu")))
+        before = _CHOICE.set(choice)
+        try:
+            return _named(study(*given, **named), ", ".join(sorted(choice.used)))
+        finally:
+            _CHOICE.reset(before)
+
+    return call
+
+
+def _named(result: R, device: str) -> R:
+    """A result that names its device."""
+    if not device:
+        return result
+    if is_dataclass(result):
+        return replace(result, device=device)  # type: ignore[type-var]
+    result.attrs["device"] = device  # type: ignore[attr-defined]
+    return result
+
+
+def target_of(device: str, run: Program, motions: int, periods: float, cores: int) -> Target | None:
+    """The card on which so many motions of a program run, of so many forcing periods in all, or
+    None: the lanes on so many cores of this processor.
 
     Raises
     ------
@@ -39,20 +121,31 @@ def target_of(device: str, run: Program, motions: int) -> Target | None:
     SaltusError
         There is no card, and it is asked for.
     """
-    if device == "cpu":
+    study = _CHOICE.get()
+    asked = device if device != "cpu" or study is None else study.device
+    if asked == "cpu":
         return None
     wrong = _refused(run)
-    if device == "auto":
-        return None if wrong or motions < FEWEST else _card_if_any()
-    if wrong:
+    few = motions < FEWEST * cores
+    found: Target | None
+    if asked == "auto":
+        few = few or periods < LEAST_WORK * cores
+        found = None if wrong or few else _card_if_any()
+    elif study is not None:
+        found = None if wrong or few else card()
+    elif wrong:
         raise ParameterError(f"{wrong} on a card: leave device out", "device")
-    return card()
+    else:
+        found = card()
+    if found is not None and study is not None:
+        study.used.add(found.name)
+    return found
 
 
 def _refused(run: Program) -> str:
     """Why the motions of a program are not followed on a card, or nothing."""
     if run.trace.several:
-        return "models with several contacts or with friction are not followed"
+        return SEVERAL
     if run.structure.sizes.columns:
         return "derivatives are not computed"
     return ""

@@ -109,7 +109,7 @@ def simulate_many(
         How many cores to use; by default all.
     device
         "cuda" follows the motions on a card, of models with at most one contact (`docs/howto/gpu.md`);
-        "auto" does so where there is one and it is faster.
+        "auto" does so where there is one and it is faster. Within a study "cpu" is the study's own.
     velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
         As for `simulate`; velocity a tuple of
         arrays where there are several coordinates.
@@ -211,7 +211,7 @@ def run_ensemble(
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)
     total = float(np.sum(spans + 1))
-    target = target_of(device, run, inputs.size)
+    target = target_of(device, run, inputs.size, total, threads)
     if target is None:
         ends = lanes.run(jobs, threads, progress, total)
         return EnsembleResult(own, given, options, jobs, ends)

@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.attractors import share_interval
 from saltus.checks import answered, check_count, check_dataset, checked_by
+from saltus.flow import check_device, on_device
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.chart.border_work import explained, special_point, unseen_folds
 from saltus.studies.chart.borders import Borders, with_borders
@@ -294,16 +295,24 @@ VERTICAL = np.linspace(-2.0, 0.0, 101)
 
 
 def _check(
-    system: System, store: Any, workers: object, scheduler: object, progress: object, **options: Any
+    system: System,
+    store: Any,
+    workers: object,
+    scheduler: object,
+    device: Any,
+    progress: object,
+    **options: Any,
 ) -> None:
     from saltus.sweep import check_store
 
+    check_device(device, system, workers, scheduler)
     plan = ChartRequest(system=system, **options).plan()
     if store is not None:
         check_store(plan, Path(store))
 
 
 @checked_by(_check)
+@on_device
 def stability_chart(
     system: System,
     *,
@@ -321,6 +330,7 @@ def stability_chart(
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.Dataset:
     """The largest amplitude of the stable motions beside rest, and their number, over the plane of
@@ -359,6 +369,8 @@ def stability_chart(
         only.
     store, workers, scheduler, progress
         Where the chunks are kept and who computes them, see `saltus.sweep.run`.
+    device
+        Where the motions are followed, as for `simulate_many`.
 
     Returns
     -------
@@ -399,6 +411,7 @@ def _check_bordered(system: System, curves: int, progress: object, **options: An
 
 
 @checked_by(_check_bordered)
+@on_device
 def bordered_chart(
     system: System,
     *,
@@ -417,6 +430,7 @@ def bordered_chart(
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """`stability_chart` with the exact borders of its motions (Figs. 14, 15).
@@ -429,7 +443,7 @@ def bordered_chart(
         The largest number of curves that are followed on which motions end, see `with_borders`.
     horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows
         As for `stability_chart`.
-    store, workers, scheduler
+    store, workers, scheduler, device
         As for `stability_chart`.
     progress
         Called with the fraction done and what is being done, first when all arguments have been
@@ -473,6 +487,7 @@ def bordered_chart(
         store=store,
         workers=workers,
         scheduler=scheduler,
+        device=device,
         progress=part_of(progress, 0.0, 0.5),
     )
     rest = part_of(progress, 0.5, 1.0)

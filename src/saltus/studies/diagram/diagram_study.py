@@ -14,7 +14,7 @@ import numpy as np
 from saltus.branch_tables import branch_tables
 from saltus.checks import as_numbers, check_bounds, check_count, check_step, checked_by
 from saltus.errors import ParameterError, shown
-from saltus.flow import state_names
+from saltus.flow import check_device, on_device, state_names
 from saltus.orbits import STEP, Branch, PeriodicOrbit, closing_rows
 from saltus.progress import Progress, growing, part_of, silent
 from saltus.result import provenance
@@ -259,9 +259,11 @@ def _check(
     store: Path | str | None,
     workers: int | None,
     scheduler: str | None,
+    device: Any,
     progress: object,
     **counts: int,
 ) -> None:
+    check_device(device, system, workers, scheduler)
     bounds = check_diagram(system, path, bounds, **counts)
     read_effort(effort)
     if starts is not None:
@@ -277,6 +279,7 @@ def _check(
 
 
 @checked_by(_check)
+@on_device
 def bifurcation_diagram(
     system: System,
     path: str = "load.horizontal.amplitude",
@@ -295,6 +298,7 @@ def bifurcation_diagram(
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos
@@ -333,8 +337,9 @@ def bifurcation_diagram(
     store
         Folder in which all that takes long is kept, so that a search that was stopped goes on, and
         one with more values or starts computes only what is new.
-    workers, scheduler, progress
-        Who computes, and how progress is reported, see `saltus.sweep.run`.
+    workers, scheduler, device, progress
+        Who computes, where motions are followed (as for `simulate_many`), and how progress is
+        reported, see `saltus.sweep.run`.
 
     Returns
     -------
@@ -418,6 +423,7 @@ def response_spectrum(
     store: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """`bifurcation_diagram` along the forcing frequency (the paper's Figs. 9 and 10).
@@ -430,7 +436,7 @@ def response_spectrum(
         The dotted path of the frequency, its lowest and its highest value.
     effort, max_period, values, starts, window, seed, repelling, switch, step, bands
         As for `bifurcation_diagram`.
-    store, workers, scheduler, progress
+    store, workers, scheduler, device, progress
         As for `bifurcation_diagram`.
 
     Examples
@@ -457,6 +463,7 @@ def response_spectrum(
         store=store,
         workers=workers,
         scheduler=scheduler,
+        device=device,
         progress=progress,
     )
     tree.attrs["kind"] = "response_spectrum"

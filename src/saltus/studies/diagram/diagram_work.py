@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
+from contextvars import copy_context
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
@@ -104,7 +105,8 @@ class _Others:
 
     def begin(self, compute: Callable[[Progress], R]) -> Future[R]:
         """Begin a computation in a thread of its own."""
-        run = self._pool.submit(compute, self._take_report)
+        # with the device of the study
+        run = self._pool.submit(copy_context().run, compute, self._take_report)
         self._runs.append(run)
         return run
 
