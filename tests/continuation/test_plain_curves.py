@@ -63,6 +63,30 @@ def test_both_folds_of_a_narrow_pair_are_found(a):
     assert {end.parameter for end in found.ends} == {-1.0, 1.0}
 
 
+@pytest.mark.parametrize("width", [1e-3, 1e-4])
+def test_two_zeros_between_which_another_function_vanishes_are_both_found(width):
+    """The first function is 1 but between two zeros that no step is short enough to see; the
+    zero of the second one lies between them, as an LP beside an NS.
+    """
+    zeros = 0.4123 - width, 0.4123 + 0.5 * width
+
+    def between(point):
+        first, last = (math.tanh((point.parameter - zero) / (0.1 * width)) for zero in zeros)
+        return first * last
+
+    class Both(Events):
+        def tests(self, point):
+            second = Function("second", lambda at: at.parameter - 0.4123)
+            return (Function("first", between), second)
+
+    line = Explicit(lambda z: z[1] - z[0], lambda z: np.array([-1.0, 1.0]))
+    found = both_ways(line.start(0.0, 0.0), Both, {"p": (-1.0, 1.0)})
+    assert kinds(found) == ["first", "second", "first"]
+    assert [zero.parameter for zero in found.special] == pytest.approx(
+        [zeros[0], 0.4123, zeros[1]], abs=1e-10
+    )
+
+
 def test_a_cusp_is_no_fold():
     """p = y^3: p stands still at 0 and goes on."""
     curve = Explicit(lambda z: z[1] - z[0] ** 3, lambda z: np.array([-3.0 * z[0] ** 2, 1.0]))

@@ -164,6 +164,22 @@ def test_a_branch_is_the_same_begun_elsewhere(kind: str, seed: int) -> None:
     begun_elsewhere(random_case(kind, seed))
 
 
+def test_a_branch_begun_at_the_end_of_a_family_is_its_parents() -> None:
+    """There an orbit of two periods is one of a single period, gone round twice."""
+    case = random_case("wall", 7)
+    orbit = saltus.find_orbit(case.system, **case.start)
+    bounds = (0.99 * case.frequency, 1.01 * case.frequency)
+    family = saltus.continue_orbit(orbit, "load.frequency", (0.8 * case.frequency, bounds[1]))
+    place = next(i for i, end in enumerate(family.ends) if str(end.reason.code) == "image")
+    last = family.orbits[-place]
+    parent = saltus.continue_orbit(
+        last, "load.frequency", (last.frequency * 0.99, last.frequency * 1.01)
+    )
+    assert 2 * parent.orbits[0].period == orbit.period
+    assert [str(point.kind) for point in parent.special] == ["PD"]
+    assert parent.special[0].parameter == pytest.approx(last.frequency, abs=1e-10)
+
+
 MODELS = int(os.environ.get("SALTUS_MODELS", "6"))
 
 

@@ -204,24 +204,13 @@ class Continuation:
         """Locate the special points of a step, in order."""
         found = []
         for a, b in pairwise(samples):
-            signs = zip(self.trail.tests, a.values * b.values, strict=True)
-            changed = [
-                test for test, sign in signs if sign < 0.0 and test is not self.trail.barrier
-            ]
-            singular = any(test.singular for test in changed)
-            for test in changed:
-                zero = located(test, a.point, b.point, singular)
-                if zero is None:
-                    self.missed.append(
-                        Missed(
-                            CurveMissed.NOT_LOCATED,
-                            test.kind,
-                            a.point.parameters,
-                            b.point.parameters,
-                        )
-                    )
-                else:
-                    found.append(zero)
+            zeros = self._zeros(a, b)
+            found += zeros
+            # a test function with two zeros in the interval shows them at the zero of another one
+            # between them, as an NS just before an LP
+            inner = self.trail.with_zeros(a, b, zeros)
+            for first, last in pairwise(inner if len(inner) > 2 else []):
+                found += self._zeros(first, last, self.trail.unchanged(a, b))
             if not self.trail.explained(a, b):
                 self.missed.append(
                     Missed(CurveMissed.STABILITY, "", a.point.parameters, b.point.parameters)
@@ -236,6 +225,23 @@ class Continuation:
                 self.points.append(zero.point)
             self.end = self.end or self.events.last(zero)
         self.trail.go_on(samples)
+
+    def _zeros(self, a: TrailPoint, b: TrailPoint, chosen: np.ndarray | bool = True) -> list[Zero]:
+        """The zeros of the test functions, or of those chosen, that change their signs between two
+        points.
+        """
+        signs = zip(self.trail.tests, (a.values * b.values < 0.0) & chosen, strict=True)
+        changed = [test for test, sign in signs if sign and test is not self.trail.barrier]
+        singular = any(test.singular for test in changed)
+        found = []
+        for test in changed:
+            zero = located(test, a.point, b.point, singular)
+            if zero is None:
+                places = a.point.parameters, b.point.parameters
+                self.missed.append(Missed(CurveMissed.NOT_LOCATED, test.kind, *places))
+            else:
+                found.append(zero)
+        return found
 
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""

@@ -5,11 +5,12 @@ of their zeros.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from saltus.continuation.curve import Zero
 from saltus.continuation.pseudo_arclength import arc, between
 from saltus.continuation.test_functions import Events
 
@@ -33,6 +34,9 @@ class TrailSettings:
     # A new point is no nearer to an end of the interval than this share of it: little would be
     # gained.
     inner: float = 0.1
+    # A value at the zero of another test function that is smaller than this share of the values at
+    # both ends of the interval is rounding of 0.
+    rounding: float = 1e-6
 
 
 SETTINGS = TrailSettings()
@@ -150,6 +154,26 @@ class Trail:
         if a.outside == b.outside or None in (a.outside, b.outside):
             return True
         return bool((a.values * b.values <= 0.0)[self.decisive].any())
+
+    def with_zeros(self, a: TrailPoint, b: TrailPoint, zeros: Sequence[Zero]) -> list[TrailPoint]:
+        """The two points with the zeros of test functions between them, in order; values there that
+        are 0 up to rounding are given as 0.
+        """
+        within = []
+        chord = a.point.curve.weights**2 * (b.point.place - a.point.place)
+        least = SETTINGS.rounding * np.maximum(np.abs(a.values), np.abs(b.values))
+        for zero in zeros:
+            if zero.point is a.point or zero.point is b.point:
+                continue
+            share = float((zero.point.place - a.point.place) @ chord)
+            there = self._at(zero.point, share)
+            values = np.where(np.abs(there.values) <= least, 0.0, there.values)
+            within.append(replace(there, values=values))
+        return [a, *sorted(within, key=lambda sample: sample.arc), b]
+
+    def unchanged(self, a: TrailPoint, b: TrailPoint) -> np.ndarray:
+        """Which test functions have the same sign at two points."""
+        return np.asarray(a.values * b.values > 0.0)
 
     def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
         """The trail point at a share of the way between two, or None if the curve cannot be solved

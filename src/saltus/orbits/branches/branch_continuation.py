@@ -20,7 +20,7 @@ from saltus.orbits.branches.branch import START, Branch
 from saltus.orbits.branches.branch_events import BranchEvents, restarted
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.branches.symmetry import full_period, half, keeps_symmetry
+from saltus.orbits.branches.symmetry import divide, full_period, half, keeps_symmetry
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_near
@@ -205,6 +205,10 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = full_period(found)
     elif symmetric:
         found = half(found) or found
+    if not found.isolated:
+        # the last orbit of a family of longer periods is its parent's
+        found = divide(found) or found
+        found = (half(found) if symmetric else None) or found
     if not found.isolated:
         raise ParameterError(
             "the orbit has others beside it at the same parameters, as that of a mass which nothing"
