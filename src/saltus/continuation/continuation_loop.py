@@ -230,7 +230,8 @@ class Continuation:
         """The zeros of the test functions, or of those chosen, that change their signs between two
         points.
         """
-        signs = zip(self.trail.tests, (a.values * b.values < 0.0) & chosen, strict=True)
+        changes = np.sign(a.values) * np.sign(b.values) < 0.0
+        signs = zip(self.trail.tests, changes & chosen, strict=True)
         changed = [test for test, sign in signs if sign and test is not self.trail.barrier]
         singular = any(test.singular for test in changed)
         found = []

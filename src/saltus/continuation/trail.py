@@ -162,6 +162,8 @@ class Trail:
         within = []
         chord = a.point.curve.weights**2 * (b.point.place - a.point.place)
         least = SETTINGS.rounding * np.maximum(np.abs(a.values), np.abs(b.values))
+        # an infinite value is none that others are compared with
+        least = np.where(np.isfinite(least), least, 0.0)
         for zero in zeros:
             if zero.point is a.point or zero.point is b.point:
                 continue
@@ -173,7 +175,7 @@ class Trail:
 
     def unchanged(self, a: TrailPoint, b: TrailPoint) -> np.ndarray:
         """Which test functions have the same sign at two points."""
-        return np.asarray(a.values * b.values > 0.0)
+        return np.asarray(np.sign(a.values) * np.sign(b.values) > 0.0)
 
     def _middle(self, a: TrailPoint, b: TrailPoint, share: float) -> TrailPoint | None:
         """The trail point at a share of the way between two, or None if the curve cannot be solved
