@@ -164,6 +164,15 @@ def test_marks_name_the_kinds_that_are_inside_and_are_thinned_out(axes):
     assert counts == {"^": 1, "o": 1}
 
 
+def test_a_branch_that_is_shorter_than_its_mark_has_none(axes):
+    """The axes are some centimetres wide: a thousandth of them is shorter than a mark of 1 mm."""
+    long = branch([0, 3], [1, 1], [1, 1], special=[("LP", 2.0, 1.0)])
+    short = branch([1, 1.003], [2, 2], [1, 1], special=[("PD", 1.0, 2.0), ("LP", 1.003, 2.0)])
+    response.draw_special(axes, diagram(long, short))
+    (marks,) = axes.lines
+    assert marks.get_xdata() == pytest.approx([2.0])
+
+
 def test_bands_are_light_blue_and_light_orange_behind_everything(axes):
     response.draw_bands(axes, diagram(folded()))
     (band,) = axes.patches

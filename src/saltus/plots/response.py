@@ -121,12 +121,19 @@ def line_style(stable: bool, validity: ModelValidity, weight: float = 1.0) -> di
     return style | ({"color": PALE[stable]} if validity is ModelValidity.LIMIT else {})
 
 
+# Of a branch that is shorter than its marks only the line is drawn, mm.
+SHORTEST_MARKED = 1.2
+
+
 def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """Small marks by kind at the special points inside the axes, the closest ones thinned out."""
+    """Small marks by kind at the special points inside the axes, the closest ones thinned out;
+    none on branches that are shorter than a mark.
+    """
     box = ax.get_window_extent()
     unit = np.array([box.width, box.height]) / ax.figure.dpi * 25.4
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     kept: list[np.ndarray] = []
+    spectrum = _marked(spectrum, quantity, scale, unit / (high - low))
     for kind, style in MARKS.items():
         places = special_places(spectrum, kind, quantity) / np.array([1.0, scale])
         first = len(kept)
@@ -137,6 +144,22 @@ def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: flo
                 kept.append(place)
         if len(kept) > first:
             ax.plot(*np.array(kept[first:]).T, linestyle="none", zorder=5, **_mark(style))
+
+
+def _marked(spectrum: Any, quantity: str, scale: float, unit: np.ndarray) -> Any:
+    """The special points of branches that are longer than a mark, where `unit` is the length of
+    each axis's unit in mm.
+    """
+    special = spectrum["special"].to_dataset()
+    if "kind" not in special:  # a diagram without branches
+        return {"special": special}
+    long = []
+    for number, branch in branches_of(spectrum):
+        curve = [branch["parameter"].values, branch[quantity].values / scale]
+        steps = np.diff(np.stack(curve, axis=1), axis=0) * unit
+        if np.nansum(np.linalg.norm(steps, axis=1)) > SHORTEST_MARKED:
+            long.append(number)
+    return {"special": special.isel(special=np.isin(special["branch"].values, long))}
 
 
 def special_places(spectrum: Any, kind: str, quantity: str = "amplitude") -> np.ndarray:
