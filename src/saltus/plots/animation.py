@@ -91,8 +91,10 @@ def animate(
     check_number("seconds", seconds, above=0.0, at_most=3600.0)
     check_number("fps", fps, above=0.0, at_most=240.0)
     check_number("width", width, at_least=NARROWEST, at_most=WIDEST, unit="mm")
+    # of the class, as a load takes any name for a channel
     motion = result.motion() if callable(getattr(type(result), "motion", None)) else result
-    if not hasattr(motion, "system") or getattr(motion, "dense", None) is None:
+    names = dir(motion)
+    if "system" not in names or "dense" not in names or motion.dense is None:
         raise ParameterError(
             f"result must be a motion that was kept densely, or an orbit, got {shown(result)}",
             "result",
