@@ -30,7 +30,8 @@ ELSEWHERE = (
     *SPECTRA,
     "smoothing",
     "chain",
-)  # the last two are computed, judged and drawn in test_smoothing_study.py and test_chain.py
+    "proofs",
+)  # the last three are computed and judged in test_smoothing_study.py, test_chain.py, test_proofs.py
 # Fewer values along an axis: reproduction/tests/test_both_layers.py has the loads on both sides of
 # the one that its claim names.
 COARSE = {"both_layers": {"size": 3}}

@@ -10,7 +10,7 @@ FIGURE_FILES = (
     *("fig01c", "fig02", "fig03", "table1"),
     *("fig04", "fig05", "fig06", "fig07", "smoothing", "fig08"),
     *("fig09", "fig10", "quasi", "fig11", "fig12", "fig13"),
-    *("fig14", "fig15", "both_layers", "chain", "appendix"),
+    *("fig14", "fig15", "both_layers", "chain", "proofs", "appendix"),
 )
 FILES = (
     *(f"saltus_paper.figures.{name}" for name in FIGURE_FILES),
