@@ -43,7 +43,9 @@ export class NumberField {
     label.htmlFor = `${this.id}-text`;
     const symbol = parameterSymbol(this.entry.path, this.entry.symbol);
     const words = symbol && isLetter(this.entry.path) ? "" : `${parameterName(this.entry.path)} `;
-    label.append(words, ...(symbol ? [asElement(symbol)] : []));
+    // The symbol of a state with a longer name would say the name again.
+    const again = this.entry.path.startsWith("start.") && [...(symbol?.text ?? "")].length > 1;
+    label.append(words, ...(symbol && !again ? [asElement(symbol)] : []));
     this.text = this.input("text", "value");
     this.text.setAttribute("aria-label", parameterName(this.entry.path));
     if (this.entry.text) label.title = this.entry.text;
@@ -187,6 +189,7 @@ export class NumberField {
     if (shown === this.shown && !this.element.classList.contains("refused")) return;
     if (this.text) this.text.value = this.written(value);
     this.text?.classList.toggle("long", this.written(value).length > 11);
+    if (this.text) this.text.title = this.written(value).length > 11 ? this.written(value) : "";
     if (this.slider) {
       this.slider.value = String(Math.round((SLIDER_STEPS * (value - low)) / (high - low || 1)));
       this.slider.setAttribute("aria-valuetext", this.written(value));

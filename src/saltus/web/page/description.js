@@ -2,7 +2,7 @@
 
 import { MOST_PERIODS } from "./session.js";
 import { withinBounds } from "./checks.js";
-import { clamp } from "./numbers.js";
+import { clamp, inDigits } from "./numbers.js";
 
 /** @typedef {import("./types.js").Description} Description */
 /** @typedef {import("./types.js").State} State */
@@ -61,7 +61,7 @@ export function firstState(description) {
     values, start: { ...description.start }, periods: Math.min(simulate.periods ?? simulate.duration ?? 20, MOST_PERIODS), cursor: description.start.time ?? 0,
     hover: null, playing: false, speed: FIRST_SPEED, coordinate: 0, degrees: entries.some(({ angle }) => angle), theme: "system",
     windows: {}, ranges: {}, selected: null,
-    sweep: { path: swept?.path ?? "", low: swept?.low ?? 0, high: swept?.high ?? 1, count: 61, periods: 60 },
+    sweep: { path: swept?.path ?? "", low: inDigits(swept?.low ?? 0), high: inDigits(swept?.high ?? 1), count: 61, periods: 60 },
   };
 }
 

@@ -1,7 +1,7 @@
 /** The sweep and the basins as they are seen: their settings, their pictures, and what a click on them does. */
 
 import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
-import { rangeOf, shortly, typedNumber } from "./numbers.js";
+import { inDigits, rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
 import { SWEPT, goesOn } from "./description.js";
 import { button } from "./transport.js";
@@ -22,7 +22,7 @@ export function sweepControls(host, session, entries, sweep) {
   for (const { path } of entries) choice.add(new Option(parameterName(path), path, false, path === store.state.sweep.path));
   choice.addEventListener("change", () => {
     const entry = entries.find(({ path }) => path === choice.value);
-    if (entry) store.set({ sweep: { ...store.state.sweep, path: entry.path, low: entry.low, high: entry.high } });
+    if (entry) store.set({ sweep: { ...store.state.sweep, path: entry.path, low: inDigits(entry.low), high: inDigits(entry.high) } });
   });
   host.append(choice);
   const said = document.createElement("p");

@@ -38,6 +38,11 @@ export function allDigits(value) {
   return withMinus(String(value));
 }
 
+/** A number rounded to so many significant digits. @param {number} value @param {number} digits */
+export function inDigits(value, digits = 4) {
+  return Number(value.toPrecision(digits));
+}
+
 /** A number for reading, with so many significant digits. @param {number} value @param {number} digits */
 export function shortly(value, digits = 6) {
   return withMinus(String(Number(value.toPrecision(digits))));

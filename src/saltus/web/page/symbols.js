@@ -52,11 +52,14 @@ export function parameterSymbol(path, given) {
 /** Names of numbers that are called otherwise in words. @type {Record<string, string>} */
 const IN_WORDS = { "impact.e": "restitution", "impact.r": "energy kept", "start.time": "time", "load.frequency": "frequency" };
 
+const PARTS = ["contacts", "surfaces", "friction"];
+
 /** A parameter's name in words. @param {string} path */
 export function parameterName(path) {
   if (IN_WORDS[path]) return IN_WORDS[path];
   const parts = path.split(".");
-  const shown = parts.length > 2 || parts[0] === "load" ? parts.slice(1) : parts.slice(-1);
+  const own = parts.length > 3 && PARTS.includes(parts[1] ?? "") ? 2 : 1; // "stop position", without "contacts"
+  const shown = parts.length > 2 || parts[0] === "load" ? parts.slice(own) : parts.slice(-1);
   return shown.join(" ").replace(/_/g, " ");
 }
 

@@ -91,7 +91,7 @@ export class Transport {
     if (!motion) return;
     const { first, last } = motion.time;
     this.slider.value = String(Math.round((SLIDER * (cursor - first)) / (last - first || 1)));
-    const periods = this.session.period ? ` = ${(cursor / this.session.period).toFixed(3)} T` : "";
+    const periods = this.session.period ? ` (${(cursor / this.session.period).toFixed(3)} forcing periods)` : "";
     this.clock.textContent = playing ? `τ = ${cursor.toFixed(3)}${periods}` : `τ = ${allDigits(cursor)}${periods}`;
     this.slider.setAttribute("aria-valuetext", `time ${cursor.toFixed(3)}`);
   }
