@@ -208,7 +208,8 @@ def _below(trees: list[Any]) -> Measured:
         orbits = tree["orbits"]
         all_proved = all(bool(group["proved"].values.all()) for group in (fold, orbits))
         born = float((fold["parameter"] + fold["radius"]).max())
-        loads_below = max(tree.attrs["loads"]) < below
+        # netCDF reads a list of one number as the number.
+        loads_below = float(np.max(tree.attrs["loads"])) < below
         good.append(
             all_proved and bool(orbits["stable"].values.all()) and loads_below and born < below
         )
@@ -218,7 +219,7 @@ def _below(trees: list[Any]) -> Measured:
         panels=[
             {
                 "frequency": tree.attrs["frequency"],
-                "loads": [{"load": load} for load in tree.attrs["loads"]],
+                "loads": [{"load": load} for load in np.atleast_1d(tree.attrs["loads"])],
                 "places": _places(tree),
             }
             for tree in trees
