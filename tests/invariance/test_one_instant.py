@@ -261,6 +261,40 @@ def test_slips_at_one_instant_have_a_derivative_where_their_order_makes_no_diffe
         assert "ground_a and ground_b change at one instant" in found.undefined
 
 
+@pytest.mark.parametrize("damper", [0.0, 0.4])
+def test_orbits_have_multipliers_where_the_order_of_slips_makes_no_difference(
+    damper: float,
+) -> None:
+    """Both blocks slip at one instant in each half period. Without the damper each has the multiplier
+    of a block alone; with it an orbit would have one-sided multipliers."""
+    model = DampedBlocks(kinetic=0.3, static=0.5, damper=damper)
+    system = system_of(model, 0.7).with_({"load.frequency": 0.4})
+    start = {"a": 0.0, "b": 0.0, "velocity": (0.0, 0.0)}
+    if damper:
+        with pytest.raises(saltus.MotionError, match=r"change at one instant"):
+            saltus.find_orbit(system, **start)
+        return
+    orbit = saltus.find_orbit(system, **start)
+    values = np.sort(np.abs(orbit.multipliers))
+    assert values[2] == pytest.approx(values[3], rel=1e-9)
+    assert values[1] < 1e-12
+
+
+def test_a_fit_needs_the_derivatives_to_its_own_unknowns_alone() -> None:
+    """With the damper the derivatives to the start of one block are one-sided, that to the friction
+    of both is not."""
+    system = system_of(DampedBlocks(kinetic=0.3, static=0.5), 1.2)
+    motion = saltus.simulate(system, a=0.0, b=0.0, duration=5.0)
+    times = np.linspace(0.5, 5.0, 20)
+    values = {"a": motion.at(times)[0][0]}
+    measured = saltus.Measurement(time=times, values=values, start={"a": 0.0, "b": 0.0})
+    with pytest.raises(saltus.MotionError):
+        saltus.fit(system, measured, {"start.a": (-1e-9, 1e-9)}, starts=1)
+    near = system.with_({"model.kinetic": 0.31})
+    fit = saltus.fit(near, measured, ["model.kinetic"], starts=1)
+    assert fit.values["model.kinetic"] == pytest.approx(0.3, abs=1e-8)
+
+
 def test_a_pipe_as_a_structure_has_the_orbit_and_the_branch_of_the_pipe() -> None:
     """The same equations from matrices; all along the branch both ends meet their stops at once."""
     stiffness = np.array([[1.0 + COUPLING, -COUPLING], [-COUPLING, 1.0 + COUPLING]])

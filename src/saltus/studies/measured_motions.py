@@ -196,7 +196,11 @@ class MeasuredMotions:
         place = {path: len(names) + j for j, path in enumerate(paths)}
         for name, own in self._starts(i):
             start[own], place[name] = values[name], names.index(own)
-        return _followed(system, start, paths, record, min(until, record.end), self.tol), place
+        result = _followed(system, start, paths, record, min(until, record.end), self.tol)
+        columns = np.hstack([result.state, result.parameters])[:, list(place.values())]
+        if result.undefined is not None and not np.isfinite(columns).all():
+            raise MotionError(f"the motion has no derivatives to fit it by: {result.undefined}")
+        return result, place
 
     def _starts(self, i: int) -> Iterator[tuple[str, str]]:
         """The unknowns of the start of measurement `i`, with the state variable that each is."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import Numbers, check_names, instants
+from saltus.errors import MotionError
 from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.compiled import Program
 from saltus.flow.kernel.layout import EventCode, GrazingDetail, RestDetail
@@ -293,10 +294,12 @@ def sensitivities(
         dense=dense,
         sensitivities=paths,
     )
-    return in_any_order(request, derivatives_of(request, None, progress))
+    return derivatives_of(request, None, progress)
 
 
-def in_any_order(request: MotionRequest, found: Sensitivities) -> Sensitivities:
+def in_any_order(
+    request: MotionRequest, run: Program | None, found: Sensitivities
+) -> Sensitivities:
     """Derivatives that do not depend on the order of events of several frictions at one instant:
     where they do, the columns are nan.
 
@@ -321,7 +324,12 @@ def in_any_order(request: MotionRequest, found: Sensitivities) -> Sensitivities:
         here = np.zeros_like(differs)
         for row in rows[:-1]:
             for units_moved in (MOVED, -MOVED):
-                other = derivatives_of(request.moved_events(count + row, units_moved), None)
+                # one event later is the other one earlier
+                moves = ((row, units_moved), (rows[-1], -units_moved))
+                other = _moved(request, run, [(count + k, by) for k, by in moves])
+                if other is None:
+                    here[:] = True
+                    continue
                 beside = np.hstack([other.state, other.parameters]) * given / units[:, None]
                 here |= ~(np.abs(beside - scaled).max(axis=0) <= SAME_ORDER * size)
         if here.any() and first is None:
@@ -340,6 +348,19 @@ def in_any_order(request: MotionRequest, found: Sensitivities) -> Sensitivities:
         at_end=at_end,
         undefined=found.undefined or IN_ORDER.format(time=first[0], names=first[1]),
     )
+
+
+def _moved(
+    request: MotionRequest, run: Program | None, moves: list[tuple[int, float]]
+) -> Sensitivities | None:
+    """The derivatives with events moved by the first of the moves with which the motion can be
+    followed; None if it cannot with any."""
+    for row, units_moved in moves:
+        try:
+            return _in_own_order(request.moved_events(row, units_moved), run)
+        except MotionError:
+            continue
+    return None
 
 
 def _ties(motion: Motion) -> list[tuple[float, list[int], str]]:
@@ -372,7 +393,17 @@ def _ties(motion: Motion) -> list[tuple[float, list[int], str]]:
 def derivatives_of(
     request: MotionRequest, run: Program | None, progress: Progress = silent
 ) -> Sensitivities:
-    """`sensitivities` of a request, with its program if that is known."""
+    """`sensitivities` of a request, with its program if that is known.
+
+    All derivatives of single motions are these, so that one rule says where they are undefined.
+    """
+    return in_any_order(request, run, _in_own_order(request, run, progress))
+
+
+def _in_own_order(
+    request: MotionRequest, run: Program | None, progress: Progress = silent
+) -> Sensitivities:
+    """The derivatives with events at one instant in the order in which the kernel takes them."""
     followed = follow(request, progress, run)
     paths = request.sensitivities or ()
     motion = followed.motion

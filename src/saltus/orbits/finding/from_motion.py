@@ -22,6 +22,7 @@ from saltus.flow import (
     nearest_return,
     return_distances,
     return_period,
+    sensitivities,
     simulate,
 )
 from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_symmetry
@@ -258,6 +259,12 @@ def _polish(
         progress(1.0, "done")
         return orbit
     when = "from the start" if passed is None else f"after {passed} forcing periods"
+    lost = sensitivities(base.given, **state, periods=periods, dense=False).undefined
+    if lost is not None:
+        raise MotionError(
+            f"the motion {when} repeats itself after {periods} forcing periods at best where it has"
+            f" no derivative, and so no multipliers: {lost}"
+        )
     raise MotionError(
         f"Newton's method finds no orbit of period {periods} near the motion {when}; "
         "try another start, another period=..., or let it settle first (settle=...)"
