@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import mpmath as mp
+import numpy as np
 import pytest
 
-from saltus.flow import simulate
+from saltus.flow import simulate, simulate_many
 from saltus.systems import Model, System
 
 
@@ -69,3 +70,19 @@ def test_odd_oscillators_keep_their_energy_when_steps_begin_near_zero(power, deg
         motion = simulate(system, x=0.0, velocity=speed, duration=20.0, tol=10.0**-digits)
         energy = motion.velocity**2 / 2 + motion.x**degree / degree
         assert energy == pytest.approx(speed**2 / 2, abs=30 * 10.0**-digits)
+
+
+@pytest.mark.parametrize("digits", [6, 9, 14])
+@pytest.mark.parametrize("power", ["cubic", "quintic"])
+def test_ensembles_of_odd_oscillators_keep_their_energy_from_near_zero(digits, power):
+    rng = np.random.default_rng(0)
+    x = np.append(np.zeros(20), 10.0 ** rng.uniform(-12, -1, 100))
+    velocity = rng.uniform(0.2, 3.0, x.size)
+    tol = 10.0**-digits
+    ends = simulate_many(
+        System(model=Odd(**{power: 1.0})), x=x, velocity=velocity, duration=20.0, tol=tol
+    )
+    degree = 4 if power == "cubic" else 6
+    before = velocity**2 / 2 + x**degree / degree
+    after = ends.velocity.values**2 / 2 + ends.x.values**degree / degree
+    assert np.abs(after / before - 1.0).max() < 30 * tol + 2e-14

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel.layout import DEFECT, SMALLEST
+from saltus.flow.kernel.layout import DEFECT, PAIR_GAP, SMALLEST
 from saltus.flow.lanes.memory import TOUCH
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_memory import one
@@ -35,16 +35,18 @@ from saltus.taylor.vectors import WIDTH
 
 def step_limits(
     order: int, tol: float
-) -> tuple[float, float, float, tuple[float, float, float, float]]:
-    """Constants of `row_step`: log2 of tol; log2 of the factor by which the step from the last
-    terms may exceed the one from the upper half of a series, and this factor; and one over the
-    orders of the last terms."""
+) -> tuple[float, tuple[float, float], float, tuple[float, float, float, float]]:
+    """Constants of `row_step`: log2 of tol; log2 of the factor by which the radius of convergence
+    may exceed the step from the last terms, by the upper half of a series, and this factor; what
+    the pair of terms before the last counts more; and one over the orders of the last terms.
+    """
     log_tol = math.log2(tol)
-    rarely = -log_tol / order - LOG_GAP
+    half = -log_tol / order - LOG_GAP
+    narrower = LOG_GAP - PAIR_GAP * math.log2(math.e) / order
     return (
         log_tol,
-        rarely,
-        2.0**rarely,
+        (half, 2.0**half),
+        2.0 ** ((order - LAST_TERMS - 1) * narrower + 1.0),  # mostly one of them is large
         (1.0 / (order - 3), 1.0 / (order - 2), 1.0 / (order - 1), 1.0 / order),
     )
 
@@ -148,10 +150,10 @@ def column_step(lanes, first):
 def row_step(series, order, size, limits):
     """The step at which the largest of a series' last terms is tol, relative to `size`.
 
-    If the last terms vanish, the growth of the series is taken from all terms of its upper half, as
-    in `steps.step_size`.
+    If the last terms vanish, the growth of the series is taken from all terms of its upper half; if
+    they are only small, from the two terms before them, as in `steps.step_size`.
     """
-    log_tol, rarely, factor, inverses = limits
+    log_tol, of_half, of_pair, inverses = limits
     wanted = log_tol + rough_log2(size)
     step = splat(500.0)
     for j in range(LAST_TERMS):
@@ -160,22 +162,32 @@ def row_step(series, order, size, limits):
     step = maximum(step, splat(-500.0))
     natural = rough_exp2(step)
     half = order // 2
-    reach = natural * factor
-    upper = absolute(series[order - LAST_TERMS])
-    for k in range(order - LAST_TERMS - 1, half - 1, -1):
+    reach = natural * of_half[1]
+    first = order - LAST_TERMS - 1
+    pair = fma(absolute(series[first + 1]), reach, absolute(series[first]))
+    upper = pair
+    for k in range(first - 1, half - 1, -1):
         upper = fma(upper, reach, absolute(series[k]))
-    vanishing = bits(rough_log2(upper) + half * (step + rarely) > wanted - log_tol + 1.0)
-    if vanishing:
-        shorter = rough_exp2(upper_half(series, order, wanted - log_tol, log_tol))
-        natural = select(mask(vanishing), minimum(shorter, natural), natural)
+        pair = pair * reach
+    # one logarithm tells whether either is too large
+    scale = half * (step + of_half[0]) - (wanted - log_tol + 1.0)
+    doubtful = bits(rough_log2(maximum(upper, pair * of_pair)) + scale > 0.0)
+    if doubtful:
+        log_size = wanted - log_tol
+        shorter = rough_exp2(earlier_step(series, order, first, log_size, log_tol))
+        natural = select(mask(doubtful), minimum(shorter, natural), natural)
+        vanishing = bits(rough_log2(upper) + scale > 0.0)
+        if vanishing:
+            shorter = rough_exp2(earlier_step(series, order, half, log_size, log_tol))
+            natural = select(mask(vanishing), minimum(shorter, natural), natural)
     return natural
 
 
 @lean_jit
-def upper_half(series, order, log_size, log_tol):
-    """log2 of the step that the upper half of a series allows, without its last terms."""
+def earlier_step(series, order, first, log_size, log_tol):
+    """log2 of the step that the terms of a series from `first` on allow, without its last ones."""
     step = splat(500.0)
-    for k in range(order // 2, order - LAST_TERMS + 1):
+    for k in range(first, order - LAST_TERMS + 1):
         growth = (rough_log2(maximum(splat(ZERO_TERM), absolute(series[k]))) - log_size) * (1.0 / k)
         step = minimum(step, log_tol / order - growth)
     return step
