@@ -159,3 +159,31 @@ def test_the_picture_of_a_backbone_has_frequencies_and_amplitudes():
     (line,) = ax.lines
     assert line.get_xdata()[:3] == pytest.approx(data.frequency.values[:3])
     assert line.get_ydata().tolist() == data.amplitude.values.tolist()
+
+
+@pytest.mark.parametrize("rate", [1e-8, 1.0, 1e8])
+def test_units_of_time_do_not_matter(rate):
+    """2 pi / sqrt(k)."""
+    spring = System(model=saltus.WallOscillator(stiffness=rate**2))
+    assert free_orbit(spring, -0.5).period * rate == pytest.approx(2.0 * np.pi, rel=1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Displaced(saltus.Model):
+    """x'' = -(x - o) - c x'."""
+
+    origin: float = 0.0
+    damping: float = 0.0
+    coordinates = ("x",)
+
+    def acceleration(self, t, x, velocity, side, load):
+        return self.origin - x - self.damping * velocity
+
+
+@pytest.mark.parametrize("origin", [0.0, 1.0, 1e6])
+def test_the_origin_does_not_matter(origin):
+    """What loses 1e-7 of its amplitude is no orbit, however far its origin is."""
+    still = System(model=Displaced(origin=origin))
+    assert free_orbit(still, origin + 0.5).period == pytest.approx(2 * np.pi, rel=1e-9)
+    with pytest.raises(MotionError, match="energy is lost"):
+        free_orbit(System(model=Displaced(origin=origin, damping=1e-6)), origin + 0.5)

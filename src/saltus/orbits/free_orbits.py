@@ -17,7 +17,7 @@ from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Ending, Motion, Stop, simulate
 from saltus.progress import Progress, silent
 from saltus.result import Result, provenance
-from saltus.systems import Constant, System, check_system
+from saltus.systems import Constant, System, check_system, time_without_period
 
 if TYPE_CHECKING:
     import xarray
@@ -28,14 +28,16 @@ class FreeOrbitSettings:
     """How a free motion is followed until it is back where it began."""
 
     tol: float = 1e-15  # The error of a step: periods are then exact to some 1e-14.
-    # How long the motion is followed first; the time is then doubled until it comes back.
+    # How long the motion is followed first, in natural times; this is then doubled until it comes
+    # back.
     first_duration: float = 8.0
     most_duration: float = (
         # Near a saddle the period grows as the logarithm of the distance from it: with rounding 1e5
         # is never reached.
         1e5
     )
-    # The distance from the start, relative to the amplitude, at which a motion has come back.
+    # The distance from the start, relative to that of the turning points, at which a motion has come
+    # back.
     returned: float = 1e-9
     # The sign of the velocity is compared at the ends of so many parts of each step, which takes a
     # third of the period at most.
@@ -43,6 +45,7 @@ class FreeOrbitSettings:
 
 
 SETTINGS = FreeOrbitSettings()
+ROUNDING = 1e-13
 
 
 class NoFreeOrbit(Sentence):
@@ -51,7 +54,7 @@ class NoFreeOrbit(Sentence):
     EQUILIBRIUM = "it stays where it is"
     LOST = "it does not come back to where it began: energy is lost or gained"
     ENDED = "it is ended by a margin of the model, or cannot go on"
-    AWAY = "it does not turn round within a time of 1e5"
+    AWAY = "it does not turn round within 1e5 natural times"
 
 
 @dataclass(frozen=True)
@@ -256,8 +259,9 @@ def _found(system: System, amplitude: float) -> FreeOrbit | NoFreeOrbit:
     """The free orbit that begins at rest at the coordinate `amplitude`, or the reason why the
     motion is not periodic.
     """
-    duration = SETTINGS.first_duration
-    while duration <= SETTINGS.most_duration:
+    unit = time_without_period(system) or 1.0
+    duration = SETTINGS.first_duration * unit
+    while duration <= SETTINGS.most_duration * unit:
         motion = _followed(system, amplitude, duration)
         turns = _turning_times(motion)
         if len(turns) >= 2:
@@ -284,8 +288,8 @@ def _closed(
     """
     turning, back = (float(motion.at(time)[0]) for time in (half, period))
     defect = abs(back - amplitude)
-    size = max(abs(amplitude), abs(turning))
-    if defect > SETTINGS.returned * size:
+    # the positions themselves have rounding, far from the origin
+    if defect > SETTINGS.returned * abs(amplitude - turning) + ROUNDING * abs(amplitude):
         return NoFreeOrbit.LOST
     inside = motion.impacts.time <= period
     speeds = np.abs(motion.impacts.velocity_before[inside])
