@@ -1,9 +1,10 @@
-"""What a card gains: throughput, a chart and a basin, beside the lanes of the same machine.
+"""What a card gains: throughput, a chart, a basin and the fragility of a block, beside the lanes of
+the same machine; first whether both agree.
 
     python benchmarks/card.py            # on a machine with a card, under four minutes
     python benchmarks/card.py --small    # a thousandth of the work, to try the script
 
-Agreement with the lanes is a test: `python -m pytest -m gpu tests/flow/test_cuda.py`.
+Agreement of more models is a test: `python -m pytest -m gpu tests/flow/test_cuda.py`.
 """
 
 from __future__ import annotations
@@ -49,6 +50,39 @@ def measured(what: str, device: str, **arguments: object) -> None:
     )
 
 
+def agreement(device: str) -> None:
+    """Print how far the ends of motions are from those of the lanes, and whether counts differ."""
+    many = {"periods": 20, "sample": (), **grid(30)}
+    here = saltus.simulate_many(metainterface(0.9), **many)
+    there = saltus.simulate_many(metainterface(0.9), device=device, **many)
+    apart = max(float(abs(here[name] - there[name]).max()) for name in ("theta", "velocity"))
+    counts = int((here.impact_count != there.impact_count).sum())
+    print(f"900 motions: apart by {apart:.1e}, {counts} counts of impacts differ", flush=True)
+
+
+def shaken_blocks(device: str, count: int) -> None:
+    """Print the time for blocks under a record, each with its own scale and slenderness."""
+    time_of = np.linspace(0.0, 20.0, 1001)
+    shaking = np.random.default_rng(1).normal(size=time_of.size) * np.exp(-((time_of / 8 - 1) ** 2))
+    record = saltus.Record(time_of, shaking, quantity="acceleration")
+    block = saltus.System(
+        model=saltus.RockingBlock(alpha=0.2), load=saltus.Load(ground_horizontal=record)
+    )
+    rng = np.random.default_rng(2)
+    columns = {
+        "model.alpha": rng.uniform(0.1, 0.3, count),
+        "load.ground_horizontal.scale": rng.uniform(0.1, 1.0, count),
+    }
+    begin = time.perf_counter()
+    ends = saltus.simulate_many(
+        block, theta=0.0, parameters=columns, duration=25.0, sample=(), device=device
+    )
+    taken = time.perf_counter() - begin
+    names = list(ends.stop.attrs["flag_meanings"].split())
+    fallen = float((ends.stop == names.index("limit")).mean())
+    print(f"{count} blocks under a record: {taken:.3f} s, {fallen:.1%} overturn", flush=True)
+
+
 def main() -> None:
     """Measure all."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -56,6 +90,7 @@ def main() -> None:
     parser.add_argument("--small", action="store_true")
     given = parser.parse_args()
     shrunk = 30 if given.small else 1
+    agreement(given.device)
     for tol in (1e-6, 1e-9, 1e-12):
         for side in (100, 316, 1000):
             states = grid(max(4, side // shrunk))
@@ -69,6 +104,7 @@ def main() -> None:
     columns = {"load.horizontal.amplitude": amplitude, "load.vertical": vertical}
     chart = {"parameters": columns, "theta": 0.3, "until": ("rest",), "periods": PERIODS}
     measured("a chart of 10^6 cells", given.device, system=metainterface(0.9), **chart)
+    shaken_blocks(given.device, 10**5 // shrunk)
     measured("a basin of 4000 x 4000", given.device, periods=50, **grid(4000 // shrunk))
 
 

@@ -335,3 +335,19 @@ def test_a_card_agrees_with_the_lanes(monkeypatch):
         pytest.skip(f"no card was seen: {error}")
     for name in ("paper", "records", "rocking"):
         agree(name, monkeypatch, card, count=1000, **ALL, **EARLY)
+
+
+def test_the_doctor_tells_the_rate_of_a_card(monkeypatch, host):
+    from saltus.cli.doctor_command import _rate_of_card
+
+    system = saltus.System(
+        model=saltus.WallOscillator(wall=0.5),
+        load=saltus.Load(frequency=1.0, force=saltus.Harmonic(0.0)),
+    )
+
+    def failing():
+        raise SaltusError("no card was found")
+
+    monkeypatch.setattr(devices, "card", failing)
+    assert _rate_of_card(system) == "has failed: no card was found"
+    assert not devices.has_card()

@@ -17,7 +17,7 @@ from rich.console import Console
 
 from saltus.cli.guard import BAD_INPUT, stop
 from saltus.cli.info_command import Block, Row, block_table
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -240,7 +240,7 @@ def _trial(console: Console, wrong: list[str]) -> Block:
     """
     import numpy as np
 
-    from saltus.flow import simulate, simulate_many
+    from saltus.flow import has_card, simulate, simulate_many
     from saltus.systems import Harmonic, Load, System, VelocityReduction, WallOscillator
 
     system = System(
@@ -268,4 +268,27 @@ def _trial(console: Console, wrong: list[str]) -> Block:
     rows: list[Row] = [
         (name, f"differs from the closed form by {error:.1e}") for name, error in errors.items()
     ]
+    if has_card():
+        with console.status("trying the card"):
+            rows.append(("card", _rate_of_card(system)))
     return Block("Trial", rows)
+
+
+def _rate_of_card(system: Any) -> str:
+    """How fast the card follows motions of a system, copies included; or why it does not."""
+    import time
+
+    import numpy as np
+
+    from saltus.flow import simulate_many
+
+    x = np.linspace(-0.5, 0.4, 100_000)
+    taken = math.inf
+    try:
+        for _ in range(2):  # its code is made in the first one
+            begin = time.perf_counter()
+            simulate_many(system, x=x, periods=100, sample=(), device="cuda")
+            taken = min(taken, time.perf_counter() - begin)
+    except SaltusError as error:
+        return f"has failed: {error}"
+    return f"{x.size * 100 / taken / 1e6:.0f} million forcing periods a second"

@@ -4,6 +4,7 @@ from .contacts.layout import SegmentPlan as SegmentPlan
 from .contacts.surface_regularity import continuous_surfaces as continuous_surfaces
 from .cuda.devices import card_seen as card_seen
 from .cuda.devices import check_device as check_device
+from .cuda.devices import has_card as has_card
 from .cuda.devices import on_device as on_device
 from .kernel.compiled import program as program
 from .kernel.layout import EventCode as EventCode

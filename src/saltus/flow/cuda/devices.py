@@ -173,6 +173,11 @@ def _card_if_any() -> Card | None:
         return None
 
 
+def has_card() -> bool:
+    """Whether this machine has a card that follows motions."""
+    return _card_if_any() is not None
+
+
 def card_seen() -> str:
     """The card that this machine has, or why none is used.
 
