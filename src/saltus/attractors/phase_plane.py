@@ -30,7 +30,9 @@ from saltus.systems import (
     Window,
     check_system,
     check_window,
+    natural_units,
     reversed_system,
+    time_without_period,
 )
 
 if TYPE_CHECKING:
@@ -42,7 +44,9 @@ class EquilibriumSettings:
     """How equilibria are found, and their eigenvalues."""
 
     grid: int = 2001  # Number of points of the window between which equilibria are looked for.
-    difference: float = 1e-3  # Derivatives are central differences of sixth order with this step.
+    # All of these are in natural units. Derivatives are central differences of sixth order with this
+    # step.
+    difference: float = 1e-3
     # Real parts up to this count as 0: where no energy is lost the differences leave such an error.
     neutral: float = 1e-9
     # If the acceleration at the contact is 0, its sign is that at this distance inside the side.
@@ -119,6 +123,7 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     area = check_window(window, system)
     model, low, high = system.model, *area[0]
     touches = model.has_one_contact
+    neutral = EQUILIBRIA.neutral / _units(system)[1]
     found = []
     for side in model.every_side:
         grid = np.linspace(low, high, EQUILIBRIA.grid)
@@ -132,7 +137,7 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
         pull = _pull(system, side)
         for place in _zeros(pull, grid[(grid >= low) & (grid <= high)]):
             values = _eigenvalues(system, place, side)
-            found.append(Equilibrium(place, side, values, values[0].real <= EQUILIBRIA.neutral))
+            found.append(Equilibrium(place, side, values, values[0].real <= neutral))
     if touches and low <= float(model.contact) <= high:
         found += _at_contact(system)
     return tuple(sorted(found, key=lambda one: one.place))
@@ -158,7 +163,13 @@ def _pull(system: System, side: int) -> Callable[[float], float]:
 
 def _beside(system: System, side: int) -> float:
     """A coordinate just inside a side."""
-    return float(system.model.contact) + EQUILIBRIA.inside * system.one_contact.inward(side)
+    inside = EQUILIBRIA.inside * _units(system)[0]
+    return float(system.model.contact) + inside * system.one_contact.inward(side)
+
+
+def _units(system: System) -> tuple[float, float]:
+    """The natural length and time of a system under a constant load; 1 where it has none."""
+    return natural_units(system).length, time_without_period(system) or 1.0
 
 
 def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
@@ -168,18 +179,20 @@ def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
     values = np.array([pull(place) for place in grid])
     yield from (float(place) for place in grid[values == 0.0])
     for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-        yield float(brentq(pull, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-15))
+        yield float(brentq(pull, grid[i], grid[i + 1], xtol=1e-300, rtol=1e-15))
 
 
 def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, complex]:
     def pull(q: float, v: float) -> float:
         return float(system.model.acceleration(0.0, q, v, float(side), system.load))
 
-    h = EQUILIBRIA.difference
+    length, time = _units(system)
+    h = EQUILIBRIA.difference * length
+    u = h / time
     slope = (
         sum(w * (pull(place + j * h, 0.0) - pull(place - j * h, 0.0)) for j, w in SIXTH_ORDER) / h
     )
-    loss = sum(w * (pull(place, j * h) - pull(place, -j * h)) for j, w in SIXTH_ORDER) / h
+    loss = sum(w * (pull(place, j * u) - pull(place, -j * u)) for j, w in SIXTH_ORDER) / u
     root = cmath.sqrt(0.25 * loss * loss + slope)
     return 0.5 * loss + root, 0.5 * loss - root
 
@@ -202,7 +215,8 @@ def _at_contact(system: System) -> list[Equilibrium]:
 class SeparatrixSettings:
     """How a separatrix is followed."""
 
-    # It ends within this distance of a saddle, once it has been ten times as far from all saddles.
+    # It ends within this distance of a saddle, in natural units, once it has been ten times as far
+    # from all saddles.
     close: float = 1e-4
     span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
 
@@ -350,8 +364,10 @@ def _branch(
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
     span, step = times
-    theta = saddle.place + away * MANIFOLDS.offset
-    velocity = -away * MANIFOLDS.offset * saddle.eigenvalues[1].real
+    length, unit_time = _units(system)
+    offset = away * MANIFOLDS.offset * length
+    theta = saddle.place + offset
+    velocity = -offset * saddle.eigenvalues[1].real
     now = 0.0
     end = SeparatrixEnd.SPAN
     left = False
@@ -361,7 +377,8 @@ def _branch(
         start: dict[str, Any] = {backward.model.coordinates[0]: theta, "velocity": velocity}
         motion = simulate(backward, **start, duration=SEPARATRICES.span, tol=1e-13)
         part = _sampled(motion, now, step)
-        apart = np.min(np.hypot(part[1] - saddles[:, None], part[2]), axis=0)
+        distances = np.hypot((part[1] - saddles[:, None]) / length, part[2] * unit_time / length)
+        apart = np.min(distances, axis=0)
         back = np.flatnonzero(apart < SEPARATRICES.close)
         if left and back.size:
             part, end = part[:, : back[0] + 1], SeparatrixEnd.SADDLE
