@@ -298,14 +298,14 @@ class _Walk:
         if start is None:
             return "its first orbit is not proved"
         reached = self.first
-        tangent = self._towards(shooting, start)
+        row, tangent = _along(shooting, start.middle, self._towards(shooting, start))
         half = SETTINGS.first
         reason = ""
         while reached < self.last:
             if len(self.boxes) >= most_boxes:
                 reason = f"{most_boxes} boxes were used up"
                 break
-            box = self._next(shooting, start, tangent, half)
+            box = self._next(shooting, start, row, tangent, half)
             if box is None or (box.turn == 0 and half > SETTINGS.sign):
                 half *= 0.5
                 if half < SETTINGS.least:
@@ -319,14 +319,15 @@ class _Walk:
                 reason = "a box's end has no enclosure inside it"
                 break
             start = end
-            tangent = box.row
+            forward = box.row
             half *= SETTINGS.longer
             if self._uneven(box):
                 following = self._set_anew(shooting, box, end)
                 if following is None:
                     reason = "boxes with other nodes could not be glued"
                     break
-                shooting, start, tangent = following
+                shooting, start, forward = following
+            row, tangent = _along(shooting, start.middle, forward)
         if not self.boxes:
             return reason
         return ProvedPiece((self.first, reached), tuple(self.boxes), reason)
@@ -369,16 +370,10 @@ class _Walk:
         return np.asarray(row * np.sign(there - here))
 
     def _next(
-        self, shooting: Shooting, start: Ball, tangent: np.ndarray, half: float
+        self, shooting: Shooting, start: Ball, row: np.ndarray, tangent: np.ndarray, half: float
     ) -> ArcBox | None:
         """The box that begins at an enclosed zero, with open contacts and impacts with a speed."""
-        row = _row_along(shooting, start.middle, tangent)
-        direction = _tangent(shooting, start.middle, row)
-        if direction is None:
-            return None
-        box = arc_box(
-            shooting, start.middle + direction * half, row, half * (1.0 + SETTINGS.overlap)
-        )
+        box = arc_box(shooting, start.middle + tangent * half, row, half * (1.0 + SETTINGS.overlap))
         if box is None or not box.holds(start) or not self._speeds(shooting, box) > 0.0:
             return None
         return box if shooting.is_open(box.enclosure, box.hull) else None
@@ -469,23 +464,19 @@ def _unit(size: int) -> np.ndarray:
     return row
 
 
-def _row_along(shooting: Shooting, x: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """The row of the arclength of events and parameter, in the direction of the last one."""
+def _along(shooting: Shooting, x: np.ndarray, forward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The row of the arclength of events and parameter, in the direction of another row, and the
+    direction of the curve, whose product with the row is 1.
+    """
     enclosure = shooting.enclose(Ball(x))
     jacobian = shooting.system_rows(enclosure, Ball(x))[1].middle[:-1]
-    along = np.linalg.svd(jacobian * shooting.scales)[2][-1]
+    along = np.linalg.svd(jacobian * shooting.scales / shooting.row_scales[:-1, None])[2][-1]
+    if float((along * shooting.scales) @ forward) < 0.0:
+        along = -along
     row = np.zeros(len(x))
     count = shooting.event_unknowns
     row[:count] = along[:count]
     row[-1] = along[-1]
     row /= np.linalg.norm(row)
-    row /= shooting.scales
-    return np.asarray(row if float((along * shooting.scales) @ tangent) > 0.0 else -row)
-
-
-def _tangent(shooting: Shooting, x: np.ndarray, row: np.ndarray) -> np.ndarray | None:
-    """The direction of the curve with row . direction = 1."""
-    shooting.pins = [(row, float(row @ x))]
-    enclosure = shooting.enclose(Ball(x))
-    inverse = shooting.nearly_inverse(shooting.system_rows(enclosure, Ball(x))[1].middle)
-    return None if inverse is None else inverse[:, -1]
+    tangent = along / float(row @ along)
+    return row / shooting.scales, tangent * shooting.scales
