@@ -343,8 +343,8 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
     ------
     ParameterError
         Another model, a force that is not one harmonic of order 1, damping that is not below
-        critical, a period below 1, or another impact law than v+ = -e v-; a resonance without
-        damping, at which no speed or every speed is a solution.
+        critical, a period below 1, or another law than v+ = -e v- at impacts. Also a resonance
+        without damping, at which no speed or every speed is a solution.
 
     Examples
     --------

@@ -511,9 +511,9 @@ def note_hit(motion, bits, tau):
 
 @lean_jit
 def passes(motion, bits, rubs, tau):
-    """Whether, at the end of a step of the length `tau`, the motion is beyond an open contact, or
-    away from those in `bits` that close, or from the surface `rubs` that it reaches, by more than
-    rounding.
+    """Whether, at the end of a step of the length `tau`, the motion is somewhere else by more than
+    rounding: beyond an open contact, away from a contact in `bits` that closes, or away from the
+    surface `rubs` that it reaches.
     """
     for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
         i = row

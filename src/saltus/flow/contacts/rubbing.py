@@ -321,8 +321,9 @@ def turns_with(motion, i):
 
 @lean_jit
 def rubbed_accumulation(motion, t, near, i, limit):
-    """The time in which a contact loses its speed by impacts if a friction along its coordinate
-    turns at the top of each flight, with constant accelerations b before it and c after it:
+    """The time in which a contact loses its speed by impacts, where a friction along its coordinate
+    turns at the top of each flight. The accelerations are constant, b before the top and c after
+    it:
 
         (u / b + u / sqrt(b c)) / (1 - e sqrt(c / b))    for a speed u.
 

@@ -54,7 +54,7 @@ def advance(numbers, state, env, functions, rows, buffers):
     reason.
 
     All of the motion's state is in `numbers`, a record MOTION, in `state`, and in the `rows` of
-    contacts and frictions, so that a call goes on where the last one stopped. `env` = (parameters,
+    contacts and frictions. So a call goes on where the last one stopped. `env` = (parameters,
     constants, record breakpoints, record table); `buffers` are those of steps and of events.
     """
     record = numbers[0]

@@ -176,7 +176,7 @@ def step_size(coefficients, order, size, tol):
 
 @lean_jit
 def leaps(motion, t, side, h, size, terms):
-    """Whether a step passes a feature of the acceleration that its series cannot show, such as the
+    """Whether a step passes a feature of the acceleration that its series cannot show. Such is the
     bend of a saturated tanh, whose coefficients are below rounding far away from it.
 
     It is noticed because the model's acceleration at the end of the step then differs from that of
@@ -343,9 +343,8 @@ def natural_speed(motion):
 
 @lean_jit
 def slow_share(motion):
-    """The speed of an impact as a share of the fastest one so far, below which the end of an
-    accumulation is looked for, where an impact takes all of the speed; where it takes less, as
-    much less.
+    """The speed of an impact as a share of the fastest one so far, where an impact takes all of the
+    speed. The end of an accumulation is looked for below it; where it takes less, as much less.
 
     It has no unit, and what does not act on the impacts does not change it.
     """

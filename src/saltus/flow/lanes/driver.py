@@ -9,10 +9,10 @@ through pointers. For models with several contacts there is a second module with
 
 A step of all lanes computes the Taylor series; the length of the step in each lane; the end of the
 step and bounds of the gap, by one sweep of Horner's rule; the root in the lanes whose gap certainly
-has one; and the impacts. If anything else may happen in the step of a lane -- rest, slow impacts
-that may accumulate, a gap that cannot be decided, a limit, a number out of range -- the scalar
-kernel moves this lane from the start of the step on (`handoff.py`). Lanes do not affect one
-another, so that results depend neither on the width nor on the order.
+has one; and the impacts. If anything else may happen in the step of a lane, the scalar kernel moves
+this lane from the start of the step on (`handoff.py`). Such are rest, slow impacts that may
+accumulate, a gap that cannot be decided, a limit, and a number out of range. Lanes do not affect
+one another, so that results depend neither on the width nor on the order.
 
 A step may go past the end of a forcing period. The state there is then evaluated from the step's
 series (`sampling.pass_ends`), and the next period begins: for all lanes at once (`begin_together`),
@@ -85,8 +85,8 @@ def fill_all(lanes, following):
 @inline_jit
 def go_on(lane, away, captured, checked, past):
     """Go on in one lane after a step of all lanes; the arguments say whether the scalar kernel
-    moves it, whether it is captured, whether its number of impacts is checked, and whether the step
-    went past the end of its forcing period."""
+    moves it, and whether it is captured. They also say whether its number of impacts is checked,
+    and whether the step went past the end of its forcing period."""
     status = Status.PAUSED
     detail = 0
     control = lane.work.control

@@ -271,8 +271,8 @@ def shape(cubic, bend, skip):
     """Properties that a gap p0 + p1 u + p2 u^2 + p3 u^3 + ... certainly has for u in [0, 1], from
     its cubic and the bound B of the other terms (see `sweep`).
 
-    Returns bits of the lanes in which it has no root (apart from the one at 0 where `skip` is set),
-    in which it falls, in which it is concave, and in which it is convex; by the Bernstein
+    Returns bits of the lanes in which it has no root, in which it falls, in which it is concave,
+    and in which it is convex. The root at 0 does not count where `skip` is set; by the Bernstein
     coefficients of the cubic, of its derivatives, or of the gap over u.
     """
     g0, g1, g2, g3 = cubic

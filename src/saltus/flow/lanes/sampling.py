@@ -76,7 +76,7 @@ def bounds_of(lanes, row, stretch):
     stretch, from six terms of its series and a bound of the others.
 
     Returns bits of the lanes in which the velocity is monotonic, bits of those in which it keeps
-    its sign, and upper and lower bounds of the coordinate, all by Bernstein coefficients.
+    its sign, and bounds of the coordinate. All are found by Bernstein coefficients.
     """
     series = lanes.positions[row]
     end = stretch.end

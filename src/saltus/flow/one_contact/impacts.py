@@ -167,11 +167,11 @@ def accumulation(motion, speed, t, tol, seen):
     REST: impacts accumulate soon. From the gap's speed v on side s the time left is 2 v (1/abs(a_s)
     + e1/abs(a_n)) / (1 - e1 e2), with a_s, a_n the contact accelerations on this and on the next
     side and e1, e2 the factors of the next two impacts; its error is of the order of the square of
-    the time left times the relative rate of change of the accelerations, here in units of the time
-    of this change. Where they do not change the time left is exact. No breakpoint of the records may
-    come before, and v must be less than `seen` times the lost share of the speed, above which impacts
-    are to be seen. CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations
-    change slowly over two of them. ARC: neither of these.
+    the time left. Times are counted in units of the time in which the accelerations change. Where
+    they do not change the time left is exact. No breakpoint of the records may come before, and v
+    must be less than `seen` times the lost share of the speed, above which impacts are to be seen.
+    CHATTER: impacts lose nothing, are slower than CHATTER_SPEED, and the accelerations change
+    slowly over two of them. ARC: neither of these.
     """
     side = float(motion.side)
     piece = motion.piece
