@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 
-def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
+def eigenmodes_of(structure: Any, spacing: int, derivatives: bool = False) -> np.ndarray:
     """The table of a structure's eigenmodes that the kernel reads; empty where its own Taylor
     series are faster or more accurate.
 
@@ -45,21 +45,28 @@ def eigenmodes_of(structure: Any, spacing: int) -> np.ndarray:
         The structure.
     spacing
         The most coefficients that a series has.
+    derivatives
+        Whether the derivatives of its motions follow from the eigenmodes, too.
     """
-    return _table(structure, spacing)
+    # The eigenmodes of all sets are kept.
+    if len(structure.contacts) + len(structure.surfaces) > MOST_PARTS:
+        return np.zeros(0)
+    fewer = longer_steps(structure)
+    size = len(structure.names)
+    # A step takes as long as 3 of the other kind for 12 coordinates, 5 for 40, 15 for 100. With
+    # derivatives, which have no series then, it takes less from few coordinates on.
+    worth = fewer >= 1.0 + size / 6.0 or (derivatives and size >= FEWEST)
+    return _table(structure, spacing) if worth else np.zeros(0)
+
+
+MOST_PARTS = 3
+FEWEST = 4  # coordinates
 
 
 @lru_cache(maxsize=8)
 def _table(structure: Any, spacing: int) -> np.ndarray:
     contacts = structure.contacts
     surfaces = structure.surfaces
-    # The eigenmodes of all sets are kept. A step takes as long as 3 of the other kind for 12
-    # coordinates, 5 for 40, 15 for 100.
-    if (
-        len(contacts) + len(surfaces) > 3
-        or longer_steps(structure) < 1.0 + len(structure.names) / 6.0
-    ):
-        return np.zeros(0)
     blocks = [np.array([len(structure.channels), spacing, *(1.0 / np.arange(1, spacing + 1))])]
     for bits in range(1 << len(contacts) + len(surfaces)):
         closed = [c for i, c in enumerate(contacts) if bits >> i & 1]

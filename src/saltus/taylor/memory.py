@@ -356,6 +356,12 @@ class ModeBlock:
     columns: tuple[tuple[ModeInput, ...], ...] = ()
 
     @property
+    def channels(self) -> int:
+        """The number of the load's channels (see `ModeRecord` of structures)."""
+        end = self.record if self.damping is None else self.damping
+        return end - 1 - self.first
+
+    @property
     def data(self) -> int:
         """How many numbers there are."""
         return 1 + self.record * self.count + (self.count**2 if self.coupled else 0)

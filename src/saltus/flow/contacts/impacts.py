@@ -93,13 +93,14 @@ def open_gap_series(motion, i, order, g):
 
 
 @lean_jit
-def contact_step_size(motion, t, target, size):
-    """The step that the series of the free coordinates and of the reactions allow."""
+def contact_step_size(motion, t, target, size, with_columns):
+    """The step that the series of the free coordinates and of the reactions allow, and those of the
+    tangent's columns if they are followed in them."""
     order = motion.order
     tol = motion.tolerance
     own = motion.own
     natural = step_size(motion.velocity_series[:own], order, size, tol)
-    if motion.columns > 0:
+    if with_columns and motion.columns > 0:
         natural = min(natural, column_step(motion))
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for i in range(motion.contacts.shape[0]):

@@ -78,6 +78,13 @@ from saltus.flow.contacts.layout import (
     ground_speed,
     solver_arrays,
 )
+from saltus.flow.contacts.propagators import (
+    carries_columns,
+    carry_columns,
+    carry_on,
+    columns_from_modes,
+    input_step,
+)
 from saltus.flow.contacts.rubbing import (
     free_pulls,
     frozen_limit,
@@ -281,6 +288,15 @@ def first_press(motion, t):
 
 
 @lean_jit
+def settle(motion):
+    """Put columns that are carried in eigenmodes into the state, before anything reads them."""
+    if motion.carried.size > 0 and motion.carried[0] > 0.0:
+        carry_columns(motion, motion.carried[1])
+        columns_from_modes(motion)
+        motion.carried[0] = 0.0
+
+
+@lean_jit
 def decide_contacts(motion):
     """Decide which contacts are closed and which frictions stick from here on.
 
@@ -289,6 +305,7 @@ def decide_contacts(motion):
     t = motion.time
     count = motion.contacts.shape[0]
     rested = motion.rested == 1
+    settle(motion)
     event_shifts(motion)
     if motion.press == 0.0:
         first_press(motion, t)
@@ -443,12 +460,16 @@ def seek_event(motion, t, target):
     order = motion.order
     count = motion.contacts.shape[0]
     margins = motion.margin_count
-    size = (
-        expand(motion, t, 1.0, order) if motion.eigenmodes.size == 0 else in_modes(motion, t, order)
-    )
+    carried = carries_columns(motion)
+    if motion.eigenmodes.size > 0 and (carried or motion.columns == 0):
+        size = in_modes(motion, t, order)
+    else:
+        size = expand(motion, t, 1.0, order)
     note_press(motion)
     note_rubs(motion)
-    natural = contact_step_size(motion, t, target, size)
+    natural = contact_step_size(motion, t, target, size, not carried)
+    if carried and natural > 0.0:
+        natural = min(natural, input_step(motion, order, min(natural, target - t)))
     natural = friction_step_size(motion, count, natural)
     h = min(natural, target - t)
     whole = h == natural
@@ -557,7 +578,12 @@ def contact_arc(motion, target):
         bits = contacts_closing_with(motion, hit, tau)
     note_hit(motion, bits, tau)
     keep_gaps(motion, tau)
-    finite = move(motion, tau)
+    carried = carries_columns(motion)
+    if carried:
+        carry_on(motion, tau)
+    finite = move(motion, tau, motion.own if carried else motion.dof)
+    if found or limit >= 0:
+        settle(motion)
     measure_gaps(motion)
     passed = passes(motion, bits, rubs if which == 2 else -1, tau)
     for i in range(motion.dof):

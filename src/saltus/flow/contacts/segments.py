@@ -40,6 +40,16 @@ from saltus.flow.contacts.layout import (
     restitution,
     solver_arrays,
 )
+from saltus.flow.contacts.propagators import (
+    begin_remainders,
+    carry_columns,
+    columns_from_modes,
+    columns_into_modes,
+    input_step,
+    parameter_remainders,
+    push_columns,
+    state_remainders,
+)
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     gap_derivative,
@@ -50,7 +60,15 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory
-from saltus.flow.kernel.steps import columns_at_event, expand, move, state_arrays, step_arrays
+from saltus.flow.kernel.steps import (
+    columns_at_event,
+    expand,
+    in_modes,
+    mode_arrays,
+    move,
+    state_arrays,
+    step_arrays,
+)
 from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -90,25 +108,63 @@ def hold_contacts(motion, closed):
 
 
 @lean_jit
-def follow_segment(motion, begin, end, units, seen):
+def in_propagators(motion, power, begin, end):
+    """Whether the columns of a segment are carried by propagators: those of a structure, but for
+    an excursion of one step, whose guard is made of their series.
+    """
+    if motion.eigenmodes.size == 0 or end < begin:
+        return False
+    if power == 0:
+        return True
+    size = expand(motion, begin, 1.0, motion.order)
+    return contact_step_size(motion, begin, end, size, True) < abs(end - begin)
+
+
+@lean_jit
+def follow_segment(motion, begin, end, carried, contact, power, slopes, units, seen):
     """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it
-    cannot be followed.
+    cannot be followed. Whether the columns are `carried` by propagators was decided before.
+
+    Of an excursion of a contact, with `power` > 0, the integrals of `end_excursion` are taken, in
+    `slopes` for the columns.
     """
     order = motion.order
     t = begin
     forwards = end >= begin
+    if carried:
+        columns_into_modes(motion)
+    if power > 0:
+        for k in range(motion.excursion.size):
+            motion.excursion[k] = 0.0
+        for j in range(motion.columns):
+            slopes[j] = 0.0
+        if carried:
+            begin_remainders(motion, contact, power, slopes)
     for count in range(MOST_STEPS):
-        size = expand(motion, t, 1.0, order)
+        size = in_modes(motion, t, order) if carried else expand(motion, t, 1.0, order)
         note_press(motion)
-        natural = contact_step_size(motion, t, t + abs(end - t), size)
+        natural = contact_step_size(motion, t, t + abs(end - t), size, not carried)
+        if carried:
+            natural = input_step(motion, order, min(natural, end - t))
         if not natural > 0.0:
             return 0
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if seen.size > 1 and h > 0.0:
             extremes_at_step(motion, t, h, begin, end, units, seen)
-        move(motion, h)
+        if power > 0 and not (last and count == 0 and not carried):
+            along_excursion(motion, contact, power, end - t, h, carried, slopes)
+        if carried:
+            push_columns(motion, order, h)
+        move(motion, h, motion.own if carried else motion.dof)
         if last:
+            if carried:
+                if power > 0:
+                    state_remainders(motion, contact, power, end - begin, slopes)
+                carry_columns(motion, end - begin)
+                columns_from_modes(motion)
+                if power > 0:
+                    parameter_remainders(motion, contact, end - begin, slopes)
             return count + 1
         t += h
     return 0
@@ -233,17 +289,60 @@ def excursion_guard(motion, contact, power, h, ends, slopes):
 
 
 @lean_jit
-def divide_guard(motion, power, h, ends, slopes):
-    """Divide the guard of an excursion of several steps, and its derivatives, as `excursion_guard`
-    does for one step.
+def remainder(c, derivative, power, order, left, h):
+    """The integral over a step of the length h of (T - s)^(p-1) / (p-1)! times a derivative of a
+    series; T is `left` at its start, and p, 1 to 3, is `power`.
     """
+    total = 0.0
+    for k in range(order + 1 - derivative, -1, -1):
+        rate = c[k + derivative]
+        for i in range(derivative):
+            rate *= k + derivative - i
+        weight = 1.0 / (k + 1)
+        if power == 2:
+            weight = left / (k + 1) - h / (k + 2)
+        if power == 3:
+            weight = 0.5 * (left * left / (k + 1) - 2.0 * left * h / (k + 2) + h * h / (k + 3))
+        total = total * h + rate * weight
+    return total * h
+
+
+@lean_jit
+def along_excursion(motion, contact, power, left, h, carried, slopes):
+    """Add a step of an excursion of several steps to what `end_excursion` divides."""
+    own = motion.own
+    order = motion.order
+    place = motion.contacts[contact, ContactColumn.COORDINATE]
+    q = motion.coordinate_series[place]
+    motion.excursion[0] += remainder(q, power, power, order, left, h)
+    motion.excursion[1] += remainder(q, power, power - 1, order, left, h)
+    motion.excursion[2] += remainder(q, power + 1, power, order, left, h)
+    if not carried:
+        for j in range(motion.columns):
+            u = motion.coordinate_series[own * (1 + j) + place]
+            slopes[j] += remainder(u, power, power, order, left, h)
+
+
+@lean_jit
+def end_excursion(motion, contact, power, h, ends, slopes):
+    """The guard of an excursion of several steps and its derivatives, as those of
+    `excursion_guard`: without the first p terms, which are 0,
+
+        Q = 1 / h^p times the integral over s of (h - s)^(p-1) / (p-1)! q^(p)(s),
+
+    which has no differences of nearly equal numbers, however short the excursion is.
+    """
+    sign = motion.signs[contact]
     divisor = h**power
-    ends[SegmentEnd.GUARD] /= divisor
-    turned = power * ends[SegmentEnd.GUARD] / h
-    ends[SegmentEnd.BY_END] = ends[SegmentEnd.BY_END] / divisor - turned
-    ends[SegmentEnd.BY_START] = ends[SegmentEnd.BY_START] / divisor + turned
+    value = sign * motion.excursion[0] / divisor
+    rate = sign * motion.excursion[1] * h / divisor
+    by_length = (rate - power * value) / h
     for j in range(motion.columns):
-        slopes[j] /= divisor
+        slopes[j] *= sign / divisor
+    ends[SegmentEnd.GUARD] = value
+    ends[SegmentEnd.BY_END] = by_length
+    by_start = sign * motion.excursion[2] / divisor
+    ends[SegmentEnd.BY_START] = by_start + start_slope(motion, ends, slopes) - by_length
 
 
 @lean_jit
@@ -316,13 +415,18 @@ def follow_with(numbers, parts, request, results):
             extremes_at_start(motion, plan[s, SegmentPlan.HIT], units, seen)
             if kind < 0:
                 extremes_at_section(motion, begin, units, seen)
-        steps = follow_segment(motion, begin, end, units, seen)
+        power = plan[s, SegmentPlan.POWER]
+        carried = in_propagators(motion, power, begin, end)
+        steps = follow_segment(
+            motion, begin, end, carried, contact, power, columns[s, 2 * own], units, seen
+        )
         if steps == 0:
             return s
-        power = plan[s, SegmentPlan.POWER]
-        single = power > 0 and steps == 1
+        single = power > 0 and steps == 1 and not carried
         if single:
             excursion_guard(motion, contact, power, end - begin, ends[s], columns[s, 2 * own])
+        elif power > 0:
+            end_excursion(motion, contact, power, end - begin, ends[s], columns[s, 2 * own])
         expand(motion, end, 1.0, 1)
         copy_numbers(motion, ends[s], SegmentEnd.NUMBERS + 4 * own)
         copy_columns(motion, columns[s])
@@ -331,14 +435,12 @@ def follow_with(numbers, parts, request, results):
         if extremes.shape[0] > 0:
             extremes_at_end(motion, contact if kind == EventCode.RELEASE else -1, units, seen)
         if kind >= 0:
-            if single:
+            if power > 0:
                 velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
                 ends[s, SegmentEnd.RATE] = motion.signs[contact] * velocity
             else:
                 guard_at_end(motion, end, kind, contact, ends[s], columns[s, 2 * own])
                 ends[s, SegmentEnd.BY_START] = start_slope(motion, ends[s], columns[s, 2 * own])
-                if power > 0:
-                    divide_guard(motion, power, end - begin, ends[s], columns[s, 2 * own])
             if not pass_event(motion, plan[s], ends[s], maps[s]):
                 return s
             if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
@@ -368,9 +470,12 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
         env[0],
         functions,
         contacts,
+        contacts[:0],
         step_arrays(record),
+        mode_arrays(record, functions.eigenmodes),
         solver,
         np.zeros(record.order + 2),
         np.zeros(2),
+        np.zeros(3),
     )
     return follow_with(record, parts, request, results)

@@ -15,7 +15,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from saltus.checks import check_names
-from saltus.flow.contacts import closings, complementarity, frictions, rubbing, tangent
+from saltus.flow.contacts import (
+    closings,
+    complementarity,
+    frictions,
+    propagators,
+    rubbing,
+    tangent,
+)
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import kernel as contacts_kernel
 from saltus.flow.contacts import layout as contact_layout
@@ -192,6 +199,7 @@ def contacts_text() -> str:
         complementarity,
         contact_impacts,
         tangent,
+        propagators,
         rubbing,
         frictions,
         closings,
@@ -241,14 +249,8 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
         _table("constants", Places(("parameters", "constants"), ENV), list(known), {}),
     ]
     if trace.several:
-        inputs = () if trace.modes is None or trace.columns else trace.modes.inputs
-        loads = {
-            MOST_COEFFICIENTS * (each.place - 1 - trace.local): each.of
-            for each in inputs
-            if not each.local
-        }
         events = _matrices(trace, known), _matrix_slopes(trace, known), _tangent(trace, known)
-        return [*functions, *events, _in_time("load_series", loads, known)]
+        return [*functions, *events, _in_time("load_series", _loads(trace), known)]
     return [
         *functions,
         _in_time(
@@ -261,6 +263,26 @@ def structure_functions(trace: Trace) -> list[WrittenFunction]:
         _tangent(trace, known),
         _table("geometry", Places(("env", "out"), ENV), _geometry(trace), known),
     ]
+
+
+def _loads(trace: Trace) -> dict[int, Expr]:
+    """The channels of a structure's load and, for each parameter of the tangent's columns, their
+    derivatives to it, by the places of their series.
+    """
+    if trace.modes is None:
+        return {}
+    channels = trace.modes.channels
+    found = dict[int, Expr]()
+    for each in trace.modes.inputs:
+        if each.local:
+            continue
+        place = each.place - 1 - trace.local
+        found[MOST_COEFFICIENTS * place] = each.of
+        for p in range(trace.columns and len(trace.paths)):
+            slope = trace.partial_derivative(each.of, 2 * trace.dof + p)
+            if slope is not number(0.0):
+                found[MOST_COEFFICIENTS * (channels * (1 + p) + place)] = slope
+    return found
 
 
 def _function(name: str, places: Places, content: Sequence[Any]) -> WrittenFunction:
@@ -476,7 +498,11 @@ class Program:
         self, parameters: np.ndarray, records: tuple[np.ndarray, np.ndarray]
     ) -> Program:
         """The same with other numbers."""
-        env, model = self.structure.prepare(parameters, records, self.data)
+        other = [i for i, path in enumerate(self.trace.parameters) if not _drives(path)]
+        kept: Any = ()
+        if self.structure.several and np.array_equal(parameters[other], self.env[0][other]):
+            kept = self.model.eigenmodes
+        env, model = self.structure.prepare(parameters, records, self.data, kept)
         return replace(self, env=env, model=model)
 
 
@@ -517,10 +543,23 @@ def _made(
     parameters = np.array([value for _, value in numbers(system)])
     model: Any = system.in_gap_coordinates.model
     data = model.records.array if traced.modes is not None else ()
-    other = traced.modes is None or traced.columns or traced.margins or model.frictions
-    eigenmodes = () if other else model.eigenmodes(MOST_COEFFICIENTS)
+    other = traced.modes is None or traced.margins or model.frictions
+    carried = all(map(_drives, traced.paths))
+    eigenmodes = (
+        () if other or not carried else model.eigenmodes(MOST_COEFFICIENTS, traced.columns > 0)
+    )
     made = structure.prepare(parameters, record_table(system, traced.records), data, eigenmodes)
     return Program(traced, structure, *made, tuple(traced.margins))
+
+
+def _drives(path: str) -> bool:
+    """Whether a structure between its events depends on a number by its inputs alone, or not at
+    all.
+    """
+    owner, _, name = path.rpartition(".")
+    return owner.partition(".")[0] in ("load", "impact") or (
+        owner.startswith("model.contacts.") and name == "position"
+    )
 
 
 _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}

@@ -14,6 +14,7 @@ from saltus.flow.one_contact.kernel import (
     is_smooth,
     one_pass,
     parts_of,
+    settle,
     spare_events,
     waits,
 )
@@ -23,10 +24,8 @@ from saltus.taylor import by_reference, cached_jit, lean_jit
 
 
 @lean_jit
-def advance_with(numbers, parts):
-    """`advance` with the parts of its memory in one named tuple."""
-    motion = by_reference(MotionMemory(numbers, parts))
-    begin(motion)
+def advance_batch(motion):
+    """Advance a motion by a batch of steps at most; returns why it stops."""
     for batch in range(BATCH):
         if motion.until_smooth > 0 and batch > 0 and is_smooth(motion):
             return Status.SMOOTH
@@ -46,6 +45,16 @@ def advance_with(numbers, parts):
         if status != Status.PAUSED:
             return status
     return Status.PAUSED
+
+
+@lean_jit
+def advance_with(numbers, parts):
+    """`advance` with the parts of its memory in one named tuple."""
+    motion = by_reference(MotionMemory(numbers, parts))
+    begin(motion)
+    status = advance_batch(motion)
+    settle(motion)
+    return status
 
 
 @cached_jit(ADVANCE)

@@ -211,6 +211,11 @@ class ModeArrays(NamedTuple):
 
     mode_series: Any
     input_series: Any
+    # the columns of the tangent in eigenmodes, and the rates of those of parameters
+    mode_columns: Any
+    mode_rates: Any
+    # whether they are ahead of the columns in the state, and by what time
+    carried: Any
 
 
 class OneContactParts(NamedTuple):
@@ -329,10 +334,13 @@ class ContactsSegmentParts(NamedTuple):
     parameters: Any
     functions: ContactsFunctions
     contacts: Any
+    frictions: Any  # none
     step_arrays: StepArrays
+    mode_arrays: ModeArrays
     solver: SolverArrays
     turns: Any  # the times of the extrema in a step, as shares of it
     least: Any  # an inner minimum and its time
+    excursion: Any  # integrals along an excursion
 
 
 class ContactsSegmentRequest(NamedTuple):

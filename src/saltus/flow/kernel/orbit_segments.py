@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts import complementarity, extremes, tangent
+from saltus.flow.contacts import complementarity, extremes, propagators, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts import segments as contact_segments
@@ -36,7 +36,15 @@ def load_contact_segments() -> Callable[..., int]:
     """The function with which orbits with several contacts are solved, `follow_contact_segments` of
     `contacts/segments.py`.
     """
-    parts = (contact_layout, complementarity, contact_impacts, tangent, extremes, contact_segments)
+    parts = (
+        contact_layout,
+        complementarity,
+        contact_impacts,
+        tangent,
+        extremes,
+        propagators,
+        contact_segments,
+    )
     return entry_point(
         load_module(
             "contact_segments", kernel_text(layout, roots, steps, *parts)

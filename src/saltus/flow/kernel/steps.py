@@ -214,15 +214,15 @@ def leaps(motion, t, side, h, size, terms):
 
 
 @lean_jit
-def move(motion, tau):
-    """Take the state at `tau` from the series of a step; returns whether the model's own part of it
-    is finite.
+def move(motion, tau, count):
+    """Take `count` coordinates and their velocities at `tau` from the series of a step; returns
+    whether the model's own part of them is finite.
     """
     q = motion.coordinate_series
     v = motion.velocity_series
     order = motion.order
     finite = True
-    for i in range(motion.dof):
+    for i in range(count):
         motion.coordinates[i], motion.velocities[i] = both_sums(q[i], v[i], order, tau)
         if i < motion.own:
             finite = (
@@ -415,39 +415,59 @@ def motion_end(motion):
 
 # Structures in eigenmodes (`systems/eigenmodes.py`).
 
+# The share of the tolerance up to which a mode is taken as dead where derivatives are asked for.
+DEAD = 1e-4
+
 
 @jit
 def mode_arrays(numbers, table):
-    """The series of eigenmodes, with two rows for what drives one of them, and those of their
-    inputs.
+    """The series of eigenmodes, with two rows for what drives one of them; those of their inputs,
+    and of the derivatives of these to the parameters of the tangent's columns; and the columns and
+    their rates in eigenmodes.
     """
     rows = 0
     inputs = 0
+    states = 0
     if table.size > 0:
-        rows = 2 * numbers.own + 2
-        inputs = int(table[0] * table[1])
-    return ModeArrays(np.zeros((rows, numbers.order + 2)), np.zeros(inputs))
+        states = 2 * numbers.own
+        rows = states + 2
+        pushed = max(numbers.columns - states, 0)
+        inputs = int(table[0] * table[1]) * (1 + pushed)
+    columns = np.zeros((2 * numbers.columns if rows > 0 else 0, states))
+    return ModeArrays(
+        np.zeros((rows, numbers.order + 2)),
+        np.zeros(inputs),
+        columns[: numbers.columns],
+        columns[numbers.columns :],
+        np.zeros(2),
+    )
 
 
 @lean_jit
-def drive_mode(motion, factors, row, order):
+def drive_mode(motion, factors, row, order, column):
     """Put the series of what drives a row of the eigenmodes into a row; `factors` is the place of
     the first input's.
+
+    It drives the motion if `column` is -1, else that column of the tangent: the derivatives of the
+    inputs to its parameter.
     """
     table = motion.eigenmodes
     driven = motion.mode_series[row]
     inputs = motion.input_series
     channels = int(table[0])
     spacing = int(table[1])
+    series = channels * spacing * (1 + column - 2 * motion.own) if column >= 0 else 0
+    held = motion.own * (1 + column)
     for k in range(order + 2):
         driven[k] = 0.0
     for c in range(channels):
         factor = table[factors + c]
         for k in range(order + 2):
-            driven[k] += factor * inputs[c * spacing + k]
-    driven[0] += table[factors + channels]
+            driven[k] += factor * inputs[series + c * spacing + k]
+    if column < 0:
+        driven[0] += table[factors + channels]
     for i in range(motion.local):
-        driven[0] += table[factors + channels + 1 + i] * motion.coordinates[i]
+        driven[0] += table[factors + channels + 1 + i] * motion.coordinates[held + i]
 
 
 @lean_jit
@@ -541,6 +561,46 @@ def add_modes(motion, factors, states, order, series):
 
 
 @lean_jit
+def closed_rows(motion):
+    """The closed contacts and, behind them, the surfaces on whose side +1 the motion is, as bits:
+    the number of a block of the eigenmodes' table.
+    """
+    count = motion.contacts.shape[0]
+    bits = 0
+    for i in range(count):
+        bits |= motion.contacts[i, ContactColumn.CLOSED] << i
+    for k in range(motion.frictions.shape[0]):  # the rows of surfaces
+        bits |= (1 if motion.frictions[k, FrictionColumn.SLIDES] > 0 else 0) << (count + k)
+    return bits
+
+
+@lean_jit
+def inputs_of_modes(motion):
+    """The number of inputs of eigenmodes: channels, 1, and the local displacements."""
+    return int(motion.eigenmodes[0]) + 1 + motion.local
+
+
+@lean_jit
+def places_of_modes(motion):
+    """The places in the eigenmodes' table of the present block: its eigenvalues, the reaches of its
+    modes, the inverse of the eigenvectors, these, the factors of the inputs, and the reactions by
+    eigenmodes and by inputs.
+    """
+    own = motion.own
+    count = motion.contacts.shape[0]
+    states = 2 * own
+    given = inputs_of_modes(motion)
+    length = states * (3 + states + own + given + count) + count * given
+    values = 2 + int(motion.eigenmodes[1]) + closed_rows(motion) * length
+    reach = values + 2 * states
+    inverse = reach + states
+    vectors = inverse + states * states
+    inputs = vectors + own * states
+    reactions = inputs + states * given
+    return values, reach, inverse, vectors, inputs, reactions, reactions + count * states
+
+
+@lean_jit
 def in_modes(motion, t, order):
     """Fill the series of the coordinates, their rates and the reactions of closed contacts; returns
     the size of the state.
@@ -550,20 +610,9 @@ def in_modes(motion, t, order):
     count = motion.contacts.shape[0]
     size = 0.0
     states = 2 * own
-    given = int(table[0]) + 1 + motion.local
-    bits = 0
-    for i in range(count):
-        bits |= motion.contacts[i, ContactColumn.CLOSED] << i
-    for k in range(motion.frictions.shape[0]):  # the rows of surfaces
-        bits |= (1 if motion.frictions[k, FrictionColumn.SLIDES] > 0 else 0) << (count + k)
-    length = states * (3 + states + own + given + count) + count * given
-    values = 2 + int(table[1]) + bits * length
-    reach = values + 2 * states
-    inverse = reach + states
-    vectors = inverse + states * states
-    inputs = vectors + own * states
-    reactions = inputs + states * given
-    by_inputs = reactions + count * states
+    given = inputs_of_modes(motion)
+    values, reach, inverse, vectors, inputs, reactions, by_inputs = places_of_modes(motion)
+    bits = closed_rows(motion)
     for i in range(own):
         size = max(size, abs(motion.coordinates[i]), abs(motion.velocities[i]))
     motion.load_series(
@@ -576,13 +625,15 @@ def in_modes(motion, t, order):
         motion.recurrences,
         order + 1,
     )
-    allowed = motion.tolerance * max(size, SMALLEST)
+    # equations of orbits are solved to rounding, and jump where a mode is taken as dead
+    share = DEAD if motion.columns > 0 else 1.0
+    allowed = share * motion.tolerance * max(size, SMALLEST)
     j = 0
     while j < states:
         width = 1 if table[values + 2 * j + 1] == 0.0 else 2
         enough = allowed / (table[reach + j] + SMALLEST)
         for i in range(width):
-            drive_mode(motion, inputs + (j + i) * given, states + i, order)
+            drive_mode(motion, inputs + (j + i) * given, states + i, order, -1)
             motion.mode_series[j + i, 0], terms = in_mode(
                 motion, inverse + (j + i) * states, states
             )
@@ -606,7 +657,7 @@ def in_modes(motion, t, order):
     for i in range(count):
         if bits >> i & 1:
             add_modes(motion, reactions + i * states, states, order, motion.margin_series[i])
-            drive_mode(motion, by_inputs + i * given, states, order)
+            drive_mode(motion, by_inputs + i * given, states, order, -1)
             for k in range(order + 2):
                 motion.margin_series[i, k] += motion.mode_series[states, k]
     return state_size(motion, 0, own)

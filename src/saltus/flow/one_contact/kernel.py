@@ -153,7 +153,7 @@ def arc(motion, target):
         rate = rate_of(motion, float(side))
         speed, pull = value_and_slope(motion.velocity_series[0], order, tau)
         note_impact(motion, rate * speed, rate * pull)
-    if not move(motion, tau) or not h >= 0.0:
+    if not move(motion, tau, motion.dof) or not h >= 0.0:
         return Status.NOT_FINITE
     if motion.sides > 0 and passes(motion, hit == motion.margin_count, tau):
         return Status.PASSED
@@ -235,6 +235,11 @@ def wait_at_contact(motion, target):
 @lean_jit
 def begin(motion):
     """Nothing has to be prepared for the steps of a call."""
+
+
+@lean_jit
+def settle(motion):
+    """Nothing is left to do before a call returns."""
 
 
 @lean_jit

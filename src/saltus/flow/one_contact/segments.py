@@ -209,7 +209,7 @@ def follow(motion, begin, end, side, roots, seen):
         # from the series itself, because x - contact loses digits in short segments
         if count == 0 and last:
             quotient = horner(motion.coordinate_series[0, 1:], order - 1, h)
-        move(motion, h)
+        move(motion, h, motion.dof)
         if last:
             x = motion.coordinates[0]
             if recording:
@@ -257,7 +257,7 @@ def follow_through(motion, begin, end, side, roots, seen):
         tau = u * h if kind == SIMPLE else h
         if recording:
             extremes_in_step(motion, side, t, tau, roots, seen)
-        move(motion, tau)
+        move(motion, tau, motion.dof)
         last, t, skip = kind != SIMPLE and h == end - t, t + tau, 0
         if kind == SIMPLE:
             following = pass_contact(motion, t, side)

@@ -643,7 +643,8 @@ class ContactsEquations(OrbitEquations):
         """
         parameters = self._values.copy()
         parameters[self._places] = values
-        numbers = self._run.structure.prepare(parameters, self._records, self._run.data)
+        run = self._run
+        numbers = run.structure.prepare(parameters, self._records, run.data, run.model.eigenmodes)
         request = (plan, times, state, self._units_of_extremes)
         return self._follower.follow_contacts(numbers, request, with_extremes)
 
