@@ -59,6 +59,7 @@ MODEL_ROUNDING = 1e-9
 # The least eigenvalue of a mass matrix whose diagonal is scaled to 1; of a smaller one it is rounding.
 SINGULAR = 1e-14
 MOST_SHOWN = 4  # of the masses, in an error
+FEW = 6  # coordinates, whose matrix is eliminated without an array, which takes microseconds
 # time, coordinate and velocity at which a model's answers are counted: any numbers would do
 PROBE = (0.37, 0.21, 0.13)
 
@@ -532,6 +533,8 @@ def _check_definite(model: ContactModel, found: Any) -> None:
     if type(model).__module__.partition(".")[0] == "saltus":
         return  # these check their numbers themselves
     size = len(model.coordinates)
+    if size <= FEW and has_pivots(found, size):
+        return
     matrix = as_matrix(found, size)
     if matrix is None or is_definite(matrix):
         return
@@ -552,6 +555,32 @@ def _check_definite(model: ContactModel, found: Any) -> None:
         f" got one that is not, with {entries} on its diagonal",
         "model",
     )
+
+
+def has_pivots(found: Any, size: int) -> bool:
+    """Whether the elimination of a few numbers finds all pivots above rounding, without an array.
+
+    Parameters
+    ----------
+    found
+        A number or rows of numbers.
+    size
+        The number of coordinates.
+    """
+    try:
+        rows = [[float(found)]] if size == 1 else [[float(x) for x in row] for row in found]
+    except (TypeError, ValueError):
+        return False
+    least = [SINGULAR * abs(rows[k][k]) for k in range(size)]
+    for k in range(size):
+        pivot = rows[k][k]
+        if not least[k] < pivot < math.inf:
+            return False
+        for i in range(k + 1, size):
+            factor = rows[i][k] / pivot
+            for j in range(k + 1, size):
+                rows[i][j] -= factor * rows[k][j]
+    return True
 
 
 def as_matrix(found: Any, size: int) -> np.ndarray | None:
