@@ -17,7 +17,11 @@ from saltus.errors import ParameterError, shown
 from saltus.orbits.branches.begun_at_special import from_a_change, with_special_start
 from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.branch import START, Branch
-from saltus.orbits.branches.branch_events import BranchEvents, restarted
+from saltus.orbits.branches.branch_events import (
+    BranchEvents,
+    ended_where_grazings_accumulate,
+    restarted,
+)
 from saltus.orbits.branches.orbit_curve import OrbitPoint, start
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.branches.symmetry import divide, full_period, half, keeps_symmetry
@@ -117,6 +121,7 @@ def continue_orbit(
         cut,
     )
     course = replace(course, special=with_special_start(course, first, events(functions or {})))
+    course = ended_where_grazings_accumulate(course, first)
     branch = Branch(**vars(course), path=path)
     show(branch)
     return branch

@@ -6,11 +6,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.continuation import Continuation, Corrected, Cut, End, Events, Missed, Zero, located
+from saltus.continuation import (
+    Continuation,
+    Corrected,
+    Course,
+    Cut,
+    End,
+    Events,
+    Missed,
+    Zero,
+    located,
+)
 from saltus.errors import SaltusError
 from saltus.flow import simulate
 from saltus.orbits.branches.orbit_curve import (
@@ -25,7 +35,13 @@ from saltus.orbits.branches.orbit_curve import (
     never_torus,
 )
 from saltus.orbits.branches.retrace import comes_along_itself
-from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, UserFunction
+from saltus.orbits.branches.special_point import (
+    OrbitEnd,
+    OrbitMissed,
+    SpecialKind,
+    SpecialPoint,
+    UserFunction,
+)
 from saltus.orbits.branches.symmetry import (
     beside_image,
     falls_onto_image,
@@ -54,7 +70,7 @@ class BranchLimits:
     # Grazings are taken to accumulate when this many in a row have each added impacts, and one of
     # the next two conditions holds.
     accumulating: int = 5
-    # Either all of them lie within this share of the parameter's range,
+    # Either all of them lie within this share of the parameter's value,
     accumulation_width: float = 1e-3
     # or the amplitude has shrunk below this share of the largest one, with more impacts than
     # `shrunk_impacts`.
@@ -341,16 +357,70 @@ def _accumulate(run: Run, following: OrbitPoint) -> bool:
     parameter or on the way to rest."""
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
     counts = [point.orbit.counted_impacts for point in (*grazings, following)]
-    if len(grazings) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
+    return _gather([point.parameter for point in grazings], counts, run.points, following)
+
+
+def _gather(
+    places: list[float], counts: list[int], points: Sequence[OrbitPoint], following: OrbitPoint
+) -> bool:
+    """Whether grazings at these places accumulate. `counts` are the impacts before each of them and
+    beyond the last one, where `following` lies; `points` are those of the branch up to there.
+    """
+    if len(places) < SETTINGS.accumulating or not (np.diff(counts) > 0).all():
         return False
-    span = float(np.ptp([point.parameter for point in grazings]))
-    small = following.orbit.amplitude < SETTINGS.shrunk * max(
-        point.orbit.amplitude for point in run.points
-    )
-    return bool(
-        span < SETTINGS.accumulation_width * following.curve.scales[0]
-        or (small and counts[-1] > SETTINGS.shrunk_impacts)
-    )
+    if np.ptp(places) < SETTINGS.accumulation_width * abs(following.parameter):
+        return True
+    largest = max(point.orbit.amplitude for point in points)
+    small = following.orbit.amplitude < SETTINGS.shrunk * largest
+    return small and counts[-1] > SETTINGS.shrunk_impacts
+
+
+BranchCourse = Course[OrbitPoint, SpecialPoint]
+
+
+def ended_where_grazings_accumulate(course: BranchCourse, first: OrbitPoint) -> BranchCourse:
+    """A branch that was followed from its point `first` both ways, with the ends at accumulations
+    of grazings that it has from any of its points: where it is begun among these grazings, it was
+    followed farther.
+    """
+    for backwards in (True, False):
+        if course.ends[not backwards].reason is OrbitEnd.ACCUMULATES:
+            course = _ended(course, first, backwards)
+    return course
+
+
+def _ended(course: BranchCourse, first: OrbitPoint, backwards: bool) -> BranchCourse:
+    """`ended_where_grazings_accumulate` for the first or the last end."""
+    way = slice(None, None, -1 if backwards else 1)
+    points = course.points[way]
+    special = course.special[way]
+    # a point that is followed the other way keeps the array of its place
+    index = {id(point.place): i for i, point in enumerate(points)}
+    begun = index.get(id(first.place), len(points))
+    passed = [
+        (number, index[id(zero.point.place)])
+        for number, zero in enumerate(special)
+        if zero.kind == SpecialKind.GR and id(zero.point.place) in index
+    ]
+    for i in range(SETTINGS.accumulating - 1, len(passed)):
+        number, last = passed[i]
+        if not begun <= last < len(points) - 1 or last == 0:
+            continue
+        places = [at for _, at in passed[i + 1 - SETTINGS.accumulating : i + 1]]
+        counts = [points[at - 1].orbit.counted_impacts for at in places]
+        following = points[last + 1]
+        counts.append(following.orbit.counted_impacts)
+        parameters = [points[at].parameter for at in places]
+        if _gather(parameters, counts, points[: last + 1], following):
+            value = points[last].parameter
+            end = End(OrbitEnd.ACCUMULATES, value, detail=str(counts[-1]))
+            return replace(
+                course,
+                points=points[: last + 1][way],
+                special=special[: number + 1][way],
+                ends=(end, course.ends[1]) if backwards else (course.ends[0], end),
+            )
+    return course
 
 
 def _same_place(a: Zero, b: Zero) -> bool:
