@@ -191,6 +191,25 @@ def test_branches_and_verdicts_are_the_same_in_all_units(kind: str, seed: int) -
 
 
 @pytest.mark.thorough
+def test_a_branch_ends_at_one_place_where_grazings_accumulate() -> None:
+    """Begun beyond the grazings and among them, and over two ranges."""
+    case = random_case("absorber", 9)
+    found = []
+    for frequency, bounds in ((None, (0.9, 1.2)), (None, (1.0, 1.04)), (1.038, (0.9, 1.2))):
+        numbers = list(case.numbers)
+        numbers[3] = frequency or 1.039
+        begun = replace(case, numbers=tuple(numbers))
+        orbit = saltus.find_orbit(begun.system, **begun.start)
+        branch = saltus.continue_orbit(orbit, "load.frequency", bounds)
+        end = next(end for end in branch.ends if str(end.reason.code) == "accumulates")
+        inside = sorted((p.parameter, str(p.kind)) for p in branch.special if p.parameter < 1.04)
+        found.append((end.parameter, inside))
+    for parameter, inside in found[1:]:
+        assert parameter == pytest.approx(found[0][0], abs=1e-10)
+        assert [kind for _, kind in inside] == [kind for _, kind in found[0][1]]
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", [ELEVEN, FAMILY], ids=["eleven", "family"])
 def test_long_branches_are_the_same_in_all_units(case: Case) -> None:
     check(case)
