@@ -60,6 +60,8 @@ class Units:
     # True for all; others, such as the coordinates of a large orbit, by as much as the largest of
     # them is.
     bounded: Any = True
+    # Whether linear equations are solved in these units, as they must be where units differ much.
+    scaled: bool = True
 
     def residual(self, values: np.ndarray) -> float:
         """The largest of residuals (m,) in their units."""
@@ -155,13 +157,20 @@ def _step(
 ) -> np.ndarray | None:
     """Newton's step, shortened where it is too long; None where there is none."""
     try:
-        step = solved_in_units(matrix, right, units.unknowns)
+        step = (
+            solved_in_units(matrix, right, units.unknowns)
+            if units.scaled
+            else np.linalg.solve(matrix, right)
+        )
     except np.linalg.LinAlgError:
         return None
     longest = units.length(step, place)
     if not np.isfinite(longest):
         return None
     return np.asarray(step * (NEWTON.longest / longest) if longest > NEWTON.longest else step)
+
+
+WIDE = math.log(1e3)  # Units that differ by more than this factor differ much.
 
 
 class EquationCurve(Curve[P]):
@@ -193,7 +202,15 @@ class EquationCurve(Curve[P]):
         units = np.empty(len(place))
         units[:inner] = own.unknowns
         units[inner:] = np.maximum(np.abs(place[inner:]), 3.0 / self.weights[inner:])
-        return Units(units, own.residuals, self._bounded)
+        return Units(units, own.residuals, self._bounded, self._scaled)
+
+    @cached_property
+    def _scaled(self) -> bool:
+        """Whether the units differ so much that linear equations have to be solved in them; else
+        only rounding, and some time, would change."""
+        sizes = 1.0 / self.weights
+        residuals = np.atleast_1d(self.units.residuals)
+        return bool(max(np.ptp(np.log(sizes)), np.ptp(np.log(residuals))) > WIDE)
 
     @cached_property
     def _bounded(self) -> np.ndarray:
@@ -314,7 +331,7 @@ class EquationCurve(Curve[P]):
             return found.derivatives()[:, free], -found.residual
 
         units = self.units_at(guess)
-        of_free = Units(units.unknowns[free], units.residuals, units.bounded[free])
+        of_free = Units(units.unknowns[free], units.residuals, units.bounded[free], units.scaled)
         floor = self.residual_floor
         found = newton(evaluate, linear, guess[free], self.iterations_at, floor, units=of_free)
         if found is None:
@@ -342,7 +359,11 @@ class EquationCurve(Curve[P]):
         right = np.zeros(len(matrix))
         right[-1] = 1.0
         try:
-            tangent = solved_in_units(matrix, right, 1.0 / self.weights)
+            tangent = (
+                solved_in_units(matrix, right, 1.0 / self.weights)
+                if self._scaled
+                else np.linalg.solve(matrix, right)
+            )
         except np.linalg.LinAlgError:
             return None
         length = self.norm(tangent)
@@ -386,10 +407,13 @@ def solved_in_units(matrix: np.ndarray, right: np.ndarray, units: Any) -> np.nda
         The matrix is singular.
     """
     scaled = matrix * units
-    sizes = np.abs(scaled).max(axis=1)
-    if not sizes.min() > 0.0:
+    sizes = np.maximum.reduce(np.abs(scaled), axis=1)
+    if not np.minimum.reduce(sizes) > 0.0:
         raise np.linalg.LinAlgError("a row is 0")
-    return np.asarray(units * np.linalg.solve(scaled / sizes[:, None], right / sizes))
+    scaled /= sizes[:, None]
+    solved: np.ndarray = np.linalg.solve(scaled, right / sizes)
+    solved *= units
+    return solved
 
 
 def bordered(rows: np.ndarray, last: Any) -> np.ndarray:

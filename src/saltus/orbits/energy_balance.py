@@ -180,7 +180,7 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
         motion, begin, end = _round(of)
     if (
         motion.dense is None
-        or begin < motion.start - 1e-9 * max(1.0, abs(motion.time))
+        or begin < motion.start - 1e-9 * max(abs(motion.start), abs(motion.time))
         or not end > begin
     ):
         raise ParameterError(

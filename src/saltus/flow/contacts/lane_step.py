@@ -52,7 +52,8 @@ from saltus.taylor.lane_vectors import (
 COST_OF_SEVERAL = 3
 # Gaps that close within this share of a step may close together, which the scalar kernel decides.
 TOGETHER = 1e-6
-SMALL_GAP = 1e-9  # A gap smaller than this, when another one closes, may close together with it.
+# A gap smaller than this, in natural units, when another one closes, may close together with it.
+SMALL_GAP = 1e-9
 
 
 @lean_jit
@@ -188,6 +189,7 @@ def put_new_state(lanes, tau, hit, which):
     """Put the state at `tau`, with the contact that closes exactly at its position. Returns bits of
     the lanes in which another gap is nearly 0 as well."""
     near = 0
+    small = splat(SMALL_GAP * lanes.settings.natural_length)
     for row in range(lanes.sizes.rows):
         x, v = both_at(lanes, row, tau)
         lanes.new_position[row] = x
@@ -198,9 +200,8 @@ def put_new_state(lanes, tau, hit, which):
         x = lanes.new_position[row]
         this = hit & bits(absolute(which - 1.0 * i) < 0.5)
         opened = bits(lanes.free[row] > 0.5)
-        near |= (
-            hit & ~this & opened & bits((x - contact) * (1.0 * lanes.sizes.signs[i]) < SMALL_GAP)
-        )
+        gap = (x - contact) * (1.0 * lanes.sizes.signs[i])
+        near |= hit & ~this & opened & bits(gap < small)
         lanes.new_position[row] = select(mask(this), contact, x)
     return near
 
