@@ -27,6 +27,7 @@ HALVES = {
     "ten impacts",
     "rocking block",
     "smoothed",
+    "a user's model",  # symmetric about its edge
 }
 
 
