@@ -76,6 +76,9 @@ from saltus.taylor import by_reference, cached_jit, jit, lean_jit
 # of one segment: only near a singular mass matrix do steps become so short that more would be
 # needed
 MOST_STEPS = 10_000
+# The duration, in natural times, below which the guard of an excursion is an integral. That of a
+# longer one is its gap, which says that it begins at the contact, too: it may last a whole period.
+SHORT_EXCURSION = 0.05
 
 
 @lean_jit
@@ -325,7 +328,7 @@ def along_excursion(motion, contact, power, left, h, carried, slopes):
 
 @lean_jit
 def end_excursion(motion, contact, power, h, ends, slopes):
-    """The guard of an excursion of several steps and its derivatives, as those of
+    """The guard of a short excursion of several steps and its derivatives, as those of
     `excursion_guard`: without the first p terms, which are 0,
 
         Q = 1 / h^p times the integral over s of (h - s)^(p-1) / (p-1)! q^(p)(s),
@@ -343,6 +346,18 @@ def end_excursion(motion, contact, power, h, ends, slopes):
     ends[SegmentEnd.BY_END] = by_length
     by_start = sign * motion.excursion[2] / divisor
     ends[SegmentEnd.BY_START] = by_start + start_slope(motion, ends, slopes) - by_length
+
+
+@lean_jit
+def divide_guard(motion, power, h, ends, slopes):
+    """Divide the guard of a long excursion, and its derivatives, by the power of its duration."""
+    divisor = h**power
+    ends[SegmentEnd.GUARD] /= divisor
+    turned = power * ends[SegmentEnd.GUARD] / h
+    ends[SegmentEnd.BY_END] = ends[SegmentEnd.BY_END] / divisor - turned
+    ends[SegmentEnd.BY_START] = ends[SegmentEnd.BY_START] / divisor + turned
+    for j in range(motion.columns):
+        slopes[j] /= divisor
 
 
 @lean_jit
@@ -425,7 +440,8 @@ def follow_with(numbers, parts, request, results):
         single = power > 0 and steps == 1 and not carried
         if single:
             excursion_guard(motion, contact, power, end - begin, ends[s], columns[s, 2 * own])
-        elif power > 0:
+        short = power > 0 and abs(end - begin) < SHORT_EXCURSION * units[1]
+        if short and not single:
             end_excursion(motion, contact, power, end - begin, ends[s], columns[s, 2 * own])
         expand(motion, end, 1.0, 1)
         copy_numbers(motion, ends[s], SegmentEnd.NUMBERS + 4 * own)
@@ -435,12 +451,14 @@ def follow_with(numbers, parts, request, results):
         if extremes.shape[0] > 0:
             extremes_at_end(motion, contact if kind == EventCode.RELEASE else -1, units, seen)
         if kind >= 0:
-            if power > 0:
+            if single or short:
                 velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
                 ends[s, SegmentEnd.RATE] = motion.signs[contact] * velocity
             else:
                 guard_at_end(motion, end, kind, contact, ends[s], columns[s, 2 * own])
                 ends[s, SegmentEnd.BY_START] = start_slope(motion, ends[s], columns[s, 2 * own])
+                if power > 0:
+                    divide_guard(motion, power, end - begin, ends[s], columns[s, 2 * own])
             if not pass_event(motion, plan[s], ends[s], maps[s]):
                 return s
             if extremes.shape[0] > 0 and kind == EventCode.IMPACT:
