@@ -18,7 +18,7 @@ HERE, LIBRARY = Path(saltus_paper.__file__).parent, Path(saltus.__file__).parent
 FILES = sorted(HERE.rglob("*.py"))
 ROOT = Path(__file__).parents[2]
 # each a page of the reference
-DOORS = ("systems", "flow", "orbits", "attractors", "studies", "plots", "theory", "cli")
+DOORS = ("systems", "flow", "bounds", "orbits", "attractors", "studies", "plots", "theory", "cli")
 
 
 @cache

@@ -83,7 +83,12 @@ def test_they_are_the_eigenvalues_of_a_damped_pendulum_at_rest(frequency):
     found = lyapunov_spectrum(system, theta=equilibrium.theta, periods=300, transient=0)
     np.testing.assert_allclose(found.values, np.real(equilibrium.eigenvalues), rtol=0, atol=1e-8)
     assert found.duration == pytest.approx(
-        300 * (1.0 if frequency is None else 2 * math.pi / frequency)
+        300
+        * (
+            natural_units(system).powers_of_two.time
+            if frequency is None
+            else 2 * math.pi / frequency
+        )
     )
 
 

@@ -54,13 +54,14 @@ def eigenmodes_of(structure: Any, spacing: int, derivatives: bool = False) -> np
     fewer = longer_steps(structure)
     size = len(structure.names)
     # A step takes as long as 3 of the other kind for 12 coordinates, 5 for 40, 15 for 100. With
-    # derivatives, which have no series then, it takes less from few coordinates on.
+    # derivatives, which have no series then, it takes less from some 10 coordinates on. But
+    # reactions have ten times the rounding, so that branches of small structures end sooner.
     worth = fewer >= 1.0 + size / 6.0 or (derivatives and size >= FEWEST)
     return _table(structure, spacing) if worth else np.zeros(0)
 
 
 MOST_PARTS = 3
-FEWEST = 4  # coordinates
+FEWEST = 24  # coordinates
 
 
 @lru_cache(maxsize=8)
