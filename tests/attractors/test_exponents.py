@@ -332,7 +332,7 @@ def test_results_are_labelled_and_do_not_depend_on_what_else_is_computed():
 def test_threads_do_not_get_in_each_others_way_in_a_fresh_process():
     """Where nothing has been compiled or loaded before."""
     script = (
-        "import numpy as np, saltus\nfrom saltus.attractors import lyapunov_many\nload ="
+        "import numpy as np, saltus\nfrom saltus import lyapunov_many\nload ="
         " saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(amplitude=0.5),"
         " vertical=-0.5)\nsystem = saltus.System(model=saltus.Metainterface(beta0=1.4,"
         " damping=0.1), load=load)\nfound = lyapunov_many(system, theta=np.linspace(0.3, 0.9, 40),"

@@ -71,7 +71,8 @@ def test_settled_motions_of_random_systems():
     @FEW
     @given(
         theta=st.floats(-2.0, 2.0),
-        velocity=st.floats(-1.0, 1.0),
+        # speeds below 1e-30 beside forces of 1 are refused: steps shrink to nothing
+        velocity=st.floats(-1.0, 1.0).map(lambda v: v if abs(v) > 1e-30 else 0.0),
         system=st.builds(forced, **numbers),
     )
     def settled(system, theta, velocity):

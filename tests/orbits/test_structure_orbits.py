@@ -241,6 +241,8 @@ def test_special_points_of_ten_masses_are_those_of_their_monodromy_by_matrix_exp
     for point in branch.special:
         if str(point.kind) in apart:
             assert apart[str(point.kind)](np.linalg.eigvals(monodromy(point.orbit))) < 1e-6
-    for point in branch.points[::10]:
+    # at a grazing they are infinite
+    regular = [point for point in branch.points if np.isfinite(point.orbit.multipliers).all()]
+    for point in regular[::10]:
         expected = np.linalg.eigvals(monodromy(point.orbit))
         assert abs(point.orbit.multipliers[0]) == pytest.approx(np.abs(expected).max(), rel=1e-6)

@@ -389,6 +389,10 @@ def note_impact(motion, speed, pull):
     motion.pull = max(motion.pull, abs(pull))
 
 
+# Instants of events at one instant differ by so many roundings of their times.
+UNTOLD = 64.0
+
+
 @lean_jit
 def is_away(motion, gap, place, position, tau):
     """Whether the distance of a coordinate from a position, at the end of a step, is more than the
@@ -400,7 +404,7 @@ def is_away(motion, gap, place, position, tau):
         terms = terms * tau + abs(series[k])
     # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed, and no
     # time is told from another one below its rounding
-    span = max(tau, INSTANT * time_scale(motion))
+    span = max(tau, UNTOLD * INSTANT * max(time_scale(motion), abs(motion.time)))
     terms += abs(position) + max(motion.press, motion.pull) * span * span
     return abs(gap) > (PENETRATED + 10.0 * motion.tolerance) * terms
 
