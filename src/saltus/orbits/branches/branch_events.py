@@ -432,6 +432,9 @@ def _same_place(a: Zero, b: Zero) -> bool:
     return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
 
 
+TURN = 10.0
+
+
 def _forget_turns(run: Run, parent: Zero) -> None:
     """Forget the folds and crossings at which a family turns back along its images at its parent.
 
@@ -439,12 +442,15 @@ def _forget_turns(run: Run, parent: Zero) -> None:
     zeros are seen.
     """
 
+    # a family leaves its parent as the root of the parameter
+    apart = TURN * math.sqrt(SETTINGS.same_fold)
+
     def is_turn(zero: Zero) -> bool:
         near = SETTINGS.same_fold * zero.point.curve.scales[0]
         return (
             zero.kind in (SpecialKind.LP, SpecialKind.BPC)
             and abs(zero.parameter - parent.parameter) < near
-            and is_image(zero.point, TOLERANCES.grazing_orbits)
+            and is_image(zero.point, apart)
         )
 
     turns = [zero for zero in run.special if is_turn(zero)]
