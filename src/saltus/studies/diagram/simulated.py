@@ -375,7 +375,8 @@ def as_chart_motions(motions: SimulatedMotions, middle: float) -> np.ndarray:
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
     for name in ("period", "impact_count", "slowest"):
         table[name] = getattr(motions, name)
-    high, low = motions.highest - middle, middle - motions.lowest
+    high = motions.highest - middle
+    low = middle - motions.lowest
     table["amplitude"] = np.maximum(high, low)
     table["other"] = np.minimum(high, low)
     table["state"] = motions.last
