@@ -386,7 +386,8 @@ def test_impacts_that_die_away_are_not_counted_where_chaos_is_looked_for():
     """How many are followed changes along a parameter, and nothing else does: intervals would be
     halved there.
     """
-    work = SimpleNamespace(system=SimpleNamespace(dimension=4))
+    load = saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5))
+    work = SimpleNamespace(system=saltus.System(model=saltus.ImpactPair(), load=load))
     search, n, none = BandSearch(work, (0.0, 1.0)), 4, np.full((4, 1), np.nan)
     search._settle(
         SimulatedMotions(

@@ -19,5 +19,6 @@ from .phase_plane import Separatrix as Separatrix
 from .phase_plane import equilibria as equilibria
 from .phase_plane import separatrices as separatrices
 from .saddle_manifolds import Manifold as Manifold
+from .saddle_manifolds import plane_window as plane_window
 from .saddle_manifolds import unstable_manifold as unstable_manifold
 from .stroboscopic_section import approached_orbit as approached_orbit

@@ -212,7 +212,7 @@ class _Followed:
 
 def set_distance(one: Target, other: Target) -> float:
     """Hausdorff's distance between two sets of states, relative to their largest absolute value of
-    a variable.
+    a variable, both in natural units.
 
     If one of the sets is a sample, 5 % of the states may lie farther away.
     """
@@ -220,7 +220,7 @@ def set_distance(one: Target, other: Target) -> float:
     back = one.distance(other.states)
     share = SETTINGS.share if one.dense or other.dense else 1.0
     apart = max(float(np.quantile(forth, share)), float(np.quantile(back, share)))
-    size = max(float(np.abs(target.states).max()) for target in (one, other))
+    size = max(float(np.abs(target.states / target.units).max()) for target in (one, other))
     return apart / size if size > 0.0 else 0.0 if apart == 0.0 else np.inf
 
 

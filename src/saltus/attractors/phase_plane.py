@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors.saddle_manifolds import MANIFOLDS, PLANE, has_left
+from saltus.attractors.saddle_manifolds import MANIFOLDS, has_left, plane_window
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_number
 from saltus.errors import ParameterError
@@ -29,10 +29,9 @@ from saltus.systems import (
     System,
     Window,
     check_system,
-    check_window,
     natural_units,
     reversed_system,
-    time_without_period,
+    unit_of_time,
 )
 
 if TYPE_CHECKING:
@@ -94,7 +93,7 @@ class Equilibrium:
         )
 
 
-def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
+def equilibria(system: System, window: Box | None = None) -> tuple[Equilibrium, ...]:
     """The equilibria in a window of the phase plane, by their coordinate, including the contact if
     the system can rest there.
 
@@ -106,7 +105,8 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     system
         What moves, under a constant load.
     window
-        A pair (low, high) for the coordinate and one for the velocity.
+        A pair (low, high) for the coordinate and one for the velocity; by default 3 natural units to
+        both sides of the contact, or of 0 without one.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def equilibria(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
     [True, False, True, False, True]
     """
     check_constant(system)
-    area = check_window(window, system)
+    area = plane_window(window, system)
     model, low, high = system.model, *area[0]
     touches = model.has_one_contact
     neutral = EQUILIBRIA.neutral / _units(system)[1]
@@ -169,7 +169,7 @@ def _beside(system: System, side: int) -> float:
 
 def _units(system: System) -> tuple[float, float]:
     """The natural length and time of a system under a constant load; 1 where it has none."""
-    return natural_units(system).length, time_without_period(system) or 1.0
+    return natural_units(system).length, unit_of_time(system)
 
 
 def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
@@ -218,7 +218,11 @@ class SeparatrixSettings:
     # It ends within this distance of a saddle, in natural units, once it has been ten times as far
     # from all saddles.
     close: float = 1e-4
-    span: float = 2.0  # The dimensionless time for which one call of `simulate` follows it.
+    # All of these are in times of the saddle: for how long it is followed, for how long by one call
+    # of `simulate`, and the time between its points.
+    whole: float = 60.0
+    span: float = 2.0
+    step: float = 0.02
 
 
 SEPARATRICES = SeparatrixSettings()
@@ -296,7 +300,7 @@ class Separatrix(Result):
         return result_dataset("separatrix", columns, {"time": self.time}, self.system, **facts)
 
 
-def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
+def saddles(system: System, window: Box | None = None) -> tuple[Equilibrium, ...]:
     """The saddle equilibria in a window of the phase plane, by their coordinate.
 
     Raises
@@ -308,7 +312,11 @@ def saddles(system: System, window: Box = PLANE) -> tuple[Equilibrium, ...]:
 
 
 def separatrices(
-    system: System, window: Box = PLANE, *, span: float = 60.0, step: float = 0.02
+    system: System,
+    window: Box | None = None,
+    *,
+    span: float | None = None,
+    step: float | None = None,
 ) -> tuple[Separatrix, ...]:
     """The stable manifolds of all saddles in a window: the curves that separate the basins under a
     constant load.
@@ -322,11 +330,13 @@ def separatrices(
     system
         What moves, under a constant load.
     window
-        A pair (low, high) for the coordinate and one for the velocity.
+        A pair (low, high) for the coordinate and one for the velocity; by default 3 natural units to
+        both sides of the contact, or of 0 without one.
     span
-        For how long each branch is followed back, in dimensionless time.
+        For how long each branch is followed back; by default 60 times in which motions approach the
+        saddle by a factor of e, or 60 of a model without units of time.
     step
-        The time between the points that are given.
+        The time between the points that are given; by default 0.02 such times.
 
     Raises
     ------
@@ -338,9 +348,10 @@ def separatrices(
     >>> len(saltus.separatrices(tristable, window=((-2.0, 2.0), (-2.0, 2.0))))  # of two saddles
     4
     """
-    area = check_window(window, system)
-    check_number("span", span, above=0.0)
-    check_number("step", step, above=0.0)
+    area = plane_window(window, system)
+    for name, value in (("span", span), ("step", step)):
+        if value is not None:
+            check_number(name, value, above=0.0)
     points = saddles(system, window)
     places = np.array([point.place for point in points])
     return tuple(
@@ -356,15 +367,19 @@ def _branch(
     away: float,
     saddles: np.ndarray,
     window: Window,
-    times: tuple[float, float],
+    times: tuple[float | None, float | None],
 ) -> Separatrix:
     """The branch to one side of a saddle; `saddles` are the coordinates of all saddles, (n,),
-    `times` are `span` and `step`.
+    `times` are `span` and `step`, None in the times of the saddle.
     """
     assert saddle.eigenvalues is not None
     backward = reversed_system(system)
-    span, step = times
     length, unit_time = _units(system)
+    own_time = 1.0 if system.model.dimensionless else -1.0 / saddle.eigenvalues[1].real
+    span, step = times
+    span = SEPARATRICES.whole * own_time if span is None else span
+    step = SEPARATRICES.step * own_time if step is None else step
+    stretch = SEPARATRICES.span * own_time
     offset = away * MANIFOLDS.offset * length
     theta = saddle.place + offset
     velocity = -offset * saddle.eigenvalues[1].real
@@ -375,8 +390,8 @@ def _branch(
     impacts: list[np.ndarray] = []
     while now < span and end is SeparatrixEnd.SPAN:
         start: dict[str, Any] = {backward.model.coordinates[0]: theta, "velocity": velocity}
-        motion = simulate(backward, **start, duration=SEPARATRICES.span, tol=1e-13)
-        part = _sampled(motion, now, step)
+        motion = simulate(backward, **start, duration=stretch, tol=1e-13)
+        part = _sampled(motion, now, stretch, step)
         distances = np.hypot((part[1] - saddles[:, None]) / length, part[2] * unit_time / length)
         apart = np.min(distances, axis=0)
         back = np.flatnonzero(apart < SEPARATRICES.close)
@@ -392,17 +407,17 @@ def _branch(
             np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within]
         )
         parts.append(part)
-        now, theta, velocity = now + SEPARATRICES.span, motion.position, motion.velocity
+        now, theta, velocity = now + stretch, motion.position, motion.velocity
     time, thetas, velocities = np.concatenate(parts, axis=1)
     contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
     return Separatrix(system, saddle.place, -time, thetas, -velocities, contacts, end)
 
 
-def _sampled(motion: Motion, begin: float, step: float) -> np.ndarray:
+def _sampled(motion: Motion, begin: float, span: float, step: float) -> np.ndarray:
     """Rows (time, coordinate, velocity) of a motion, with both sides of every impact, and nan
     between them where they differ.
     """
-    times = np.linspace(0.0, SEPARATRICES.span, round(SEPARATRICES.span / step) + 1)
+    times = np.linspace(0.0, span, round(span / step) + 1)
     times = np.append(times[times < motion.time], motion.time)
     theta, velocity = motion.at(times)
     impacts = motion.impacts

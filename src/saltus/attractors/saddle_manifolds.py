@@ -29,7 +29,15 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow import last_states, motions_from, sensitivities
 from saltus.orbits import PeriodicOrbit
 from saltus.result import Result, result_dataset
-from saltus.systems import Box, System, Window, arguments_of, check_window, reversed_system
+from saltus.systems import (
+    Box,
+    System,
+    Window,
+    arguments_of,
+    check_window,
+    natural_units,
+    reversed_system,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -193,15 +201,21 @@ def _may_cross(scaled: np.ndarray) -> np.ndarray:
 class ManifoldSettings:
     """Where manifolds begin, and how exactly they are followed."""
 
-    # d, from the saddle: the tangent misses the manifold by about d^2, and its images by less and
-    # less.
+    # d, from the saddle, in natural units: the tangent misses the manifold by about d^2, and its
+    # images by less and less.
     offset: float = 1e-6
     tolerance: float = 1e-13  # The error of a step of the motions along a manifold.
     hyperbolic: float = 1e-6  # The least difference of the multipliers' moduli from 1.
 
 
 MANIFOLDS = ManifoldSettings()
-PLANE = ((-3.0, 3.0), (-3.0, 3.0))  # the window of the state plane if none is given
+HALF_WIDTH = 3.0  # of the window of the state plane if none is given, in natural units
+
+
+def plane_window(window: Box | None, system: System) -> Window:
+    """A window of the state plane; for None that with half widths of 3 natural units around the
+    contact, or around 0 without one."""
+    return check_window(window, system, HALF_WIDTH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +323,7 @@ class Manifold(Result):
 def stable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: Box = PLANE,
+    window: Box | None = None,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,
@@ -323,7 +337,8 @@ def stable_manifold(
         A saddle orbit: one multiplier is inside the unit circle and one outside.
     window
         ((least, largest coordinate), (least, largest velocity)), in which the curves are wanted;
-        they are followed outside it up to three half widths from its middle.
+        they are followed outside it up to three half widths from its middle. By default 3 natural
+        units to both sides of the contact.
     periods
         The number of forcing periods for which the curves are followed backward.
     step
@@ -354,7 +369,7 @@ def stable_manifold(
 def unstable_manifold(
     orbit: PeriodicOrbit,
     *,
-    window: Box = PLANE,
+    window: Box | None = None,
     periods: int = 40,
     step: float = 0.01,
     points: int = 100_000,
@@ -367,7 +382,8 @@ def unstable_manifold(
     orbit
         A saddle orbit.
     window
-        A pair (low, high) for the coordinate and one for the velocity.
+        A pair (low, high) for the coordinate and one for the velocity; by default 3 natural units to
+        both sides of the contact.
     periods
         For how many forcing periods it is followed.
     step
@@ -398,14 +414,16 @@ def _manifold(
         )
     system = orbit.system
     q = orbit.period
-    area = check_window(window, system)
+    area = plane_window(window, system)
     flow = _flow(reversed_system(system) if stable else system, stable)
     states = np.roll(section_states(system, np.array([orbit.state]), q)[0], 1, axis=0)
     multiplier, directions = _directions(system, states, stable)
     ratio = 1.0 / abs(multiplier) if stable else abs(multiplier)
+    size = np.hypot(*(directions[0] / natural_units(system).state))
+    offset = MANIFOLDS.offset / size * directions[0]
     branches: list[ManifoldBranch] = []
     for side in (1, -1):
-        segment = _segment(states[0], side * directions[0], ratio)
+        segment = _segment(states[0], side * offset, ratio)
         levels, end = Growth(segment, flow, area, step, points).levels(periods)
         branches += _branches(levels, q, side, stable, multiplier < 0.0, end)
     return Manifold(orbit, stable, multiplier, states, directions, tuple(branches))
@@ -441,10 +459,8 @@ def _directions(system: System, states: np.ndarray, stable: bool) -> tuple[float
     return float(np.real(values[chosen])), unit
 
 
-def _segment(point: np.ndarray, direction: np.ndarray, ratio: float) -> Segment:
-    return lambda places: (
-        point + MANIFOLDS.offset * ratio ** np.asarray(places)[:, None] * direction
-    )
+def _segment(point: np.ndarray, offset: np.ndarray, ratio: float) -> Segment:
+    return lambda places: point + ratio ** np.asarray(places)[:, None] * offset
 
 
 def _flow(system: System, backward: bool) -> Any:

@@ -132,7 +132,7 @@ class Certificate:
                 "the orbit there does not attract: its largest multiplier is "
                 f"{abs(orbit.multipliers[0]):.9g}"
             )
-        if not orbit.defect < SETTINGS.defect * orbit.equations.natural.state.max():
+        if not orbit.defect < SETTINGS.defect:
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
         if not self.distance < self.within:
             return f"the orbit found passes {self.distance:.1g} beside the motion"

@@ -19,7 +19,7 @@ from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, So
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result
-from saltus.systems import System, arguments_of, middle_of, state_of
+from saltus.systems import System, arguments_of, middle_of, natural_units, state_of
 
 if TYPE_CHECKING:
     import xarray
@@ -473,8 +473,8 @@ class PeriodicOrbit(Result):
 
     @cached_property
     def defect(self) -> float:
-        """The distance between its state and the one a period later, by direct simulation; inf if
-        the motion has another number of impacts, or cannot be followed, as where an event appears
+        """The distance between its state and the one a period later, by direct simulation, as the
+        largest difference of a state variable in its natural unit; inf if the motion has another number of impacts, or cannot be followed, as where an event appears
         or is lost. If the orbit grazes, rounding decides whether the motion has an impact there,
         and the defect is the square root of rounding.
         """
@@ -484,9 +484,13 @@ class PeriodicOrbit(Result):
             return math.inf
         start = self.start()
         begin = np.array([start[name] for name in self.system.model.coordinates])
+        units = natural_units(self.system).state
         if self.signature.sides:  # the motion ends at an impact: before or after it
-            ends = [np.abs(np.append(np.atleast_1d(motion.position) - begin, np.abs(motion.velocity) - np.abs(v))).max()
-                    for v in (start["velocity"], self.speeds[0])]  # fmt: skip
+            moved = np.atleast_1d(motion.position) - begin
+            ends = [
+                float(np.abs(np.append(moved, np.abs(motion.velocity) - np.abs(v)) / units).max())
+                for v in (start["velocity"], self.speeds[0])
+            ]
             return (
                 min(ends)
                 if self.grazes or abs(len(motion.impacts) - self.signature.impact_count) <= 1
@@ -495,8 +499,8 @@ class PeriodicOrbit(Result):
         return self.defect_after(1)
 
     def defect_after(self, rounds: int) -> float:
-        """The distance between its state and the one after several of its periods, for orbits that
-        do not start at an impact.
+        """The distance between its state and the one after several of its periods, as `defect`, for
+        orbits that do not start at an impact.
 
         Parameters
         ----------
@@ -507,6 +511,7 @@ class PeriodicOrbit(Result):
         start = self.start()
         motion = self.motion(rounds * self.period)
         apart = np.subtract(motion.final_state, state_of(self.system, start))
+        apart /= natural_units(self.system).state
         return float(np.abs(apart[: len(apart) - len(self.system.model.first_order)]).max())
 
     @cached_property

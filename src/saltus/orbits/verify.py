@@ -11,7 +11,7 @@ from saltus.flow import simulate_many
 from saltus.orbits.equations.sampled_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
-from saltus.systems import System
+from saltus.systems import System, natural_units
 
 
 def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> bool:
@@ -43,7 +43,7 @@ def _same_speeds(one: np.ndarray, other: np.ndarray) -> bool:
 @answered
 def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) -> np.ndarray:
     """The distance of each orbit's state from itself after `rounds` of its periods, by the
-    event-driven flow, (n,).
+    event-driven flow, (n,), in natural units of the state variables.
 
     All orbits must belong to one system, which may differ in the parameter along their common path,
     if they have one. An orbit that starts after its first impact ends at this impact, and rounding
@@ -98,8 +98,9 @@ def closing_distances(
     system: System, path: str | None, rows: np.ndarray, tol: float = 1e-13
 ) -> np.ndarray:
     """The distance of each orbit's state from itself at the end of its motion, from rows that
-    `closing_rows` gives, (n,).
+    `closing_rows` gives, (n,), in natural units of the state variables.
     """
+    units = natural_units(system)
     names = system.model.coordinates
     moving = system.model.moving
     count = len(names)
@@ -123,15 +124,25 @@ def closing_distances(
             sample=(),
             tol=tol,
         )
-        apart = np.max([np.abs(ends[name].values - begin[name]) for name in names], axis=0)
+        apart = np.max(
+            [
+                np.abs(ends[name].values - begin[name]) / unit
+                for name, unit in zip(names, units.lengths, strict=True)
+            ],
+            axis=0,
+        )
         if moving == names and count == 1:
             after = ends["velocity"].values
             before = np.where(speeds < 0.0, np.inf, speeds)
             either = np.minimum(np.abs(after - velocity), np.abs(np.abs(after) - before))
+            either /= units.speed
         else:
             speeds_after = [ends[f"{name}_velocity"].values for name in moving]
             either = np.max(
-                [np.abs(a - b) for a, b in zip(speeds_after, velocities, strict=False)]
+                [
+                    np.abs(a - b) / unit
+                    for a, b, unit in zip(speeds_after, velocities, units.speeds, strict=False)
+                ]
                 or [0.0 * apart],
                 axis=0,
             )

@@ -21,7 +21,7 @@ from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import Motion, Stop, check_device, on_device, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.result import result_dataset
-from saltus.studies.shaken import OVERTURNING, WINDOW, Outcomes, Shaken, end_of
+from saltus.studies.shaken import OVERTURNING, Outcomes, Shaken, end_of
 from saltus.systems import Box, Record, System
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ class OverturningRequest:
     amplitude: Any
     frequency: Any
     curves: bool = True
-    window: Box = WINDOW
+    window: Box | None = None
     shaken: Shaken = field(init=False)
 
     def __post_init__(self) -> None:
@@ -192,7 +192,7 @@ def overturning_spectrum(
     amplitude: Iterable[float],
     frequency: Iterable[float],
     curves: bool = True,
-    window: Box = WINDOW,
+    window: Box | None = None,
     device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.Dataset:
@@ -401,7 +401,7 @@ def fragility(
     systems: Iterable[System],
     scales: Iterable[float],
     *,
-    window: Box = WINDOW,
+    window: Box | None = None,
     device: str = "cpu",
     progress: Progress = silent,
 ) -> xarray.Dataset:

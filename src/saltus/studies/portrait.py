@@ -4,24 +4,23 @@ them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.attractors import Equilibrium, Separatrix, equilibria, separatrices
+from saltus.attractors import Equilibrium, Separatrix, equilibria, plane_window, separatrices
 from saltus.checks import check_count, check_number, check_states, checked_by
 from saltus.errors import ParameterError
 from saltus.flow import simulate
 from saltus.progress import Progress, silent
 from saltus.result import provenance
-from saltus.systems import Box, System, VelocityReduction, check_window, even_steps
+from saltus.systems import Box, System, VelocityReduction, Window, even_steps, unit_of_time
 
 if TYPE_CHECKING:
     import xarray
-
-WINDOW: Box = ((-3.0, 3.0), (-3.0, 3.0))
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ class StartSettings:
     tried: int = 100
     # Beside each stable equilibrium, at these shares of the way to the next one.
     beside: tuple[float, ...] = (0.35, 0.75)
+    duration: float = 30.0  # of the motions, in the time of the slowest equilibrium
 
 
 PORTRAIT_STARTS = StartSettings()
@@ -40,27 +40,29 @@ PORTRAIT_STARTS = StartSettings()
 
 def _check(
     system: System,
-    window: Box,
+    window: Box | None,
     starts: Any,
-    duration: float,
+    duration: float | None,
     samples: int,
     seed: int,
     progress: object = None,
 ) -> None:
-    check_number("duration", duration, above=0.0)
+    if duration is not None:
+        check_number("duration", duration, above=0.0)
     check_count("samples", samples, 2)
     check_count("seed", seed, 0)
     points = equilibria(system, window)  # refuses a system without a phase plane
-    _ = _spread(system, window, points, seed) if starts is None else _states(system, starts)
+    area = plane_window(window, system)
+    _ = _spread(system, area, points, seed) if starts is None else _states(system, starts)
 
 
 @checked_by(_check)
 def phase_portrait(
     system: System,
     *,
-    window: Box = WINDOW,
+    window: Box | None = None,
     starts: Iterable[tuple[float, float]] | None = None,
-    duration: float = 30.0,
+    duration: float | None = None,
     samples: int = 1500,
     seed: int = 0,
     progress: Progress = silent,
@@ -73,12 +75,14 @@ def phase_portrait(
     system
         What moves.
     window
-        ((least, largest coordinate), (least, largest velocity)).
+        ((least, largest coordinate), (least, largest velocity)); by default 3 natural units to both
+        sides of the contact, or of 0 without one.
     starts
         States (coordinate, velocity) from which motions are followed; by default two beside each
         stable equilibrium, and 24 spread over the window.
     duration
-        How long, in dimensionless time.
+        How long; by default 30 times of the slowest equilibrium, or 30 of a model without units of
+        time.
     samples
         Number of instants at which each motion is given, besides its impacts.
     seed
@@ -111,17 +115,21 @@ def phase_portrait(
     >>> portrait.attrs["saltus_version"] == saltus.__version__
     True
     """
-    points = equilibria(system, window)
-    states = _spread(system, window, points, seed) if starts is None else _states(system, starts)
+    area = plane_window(window, system)
+    points = equilibria(system, area)
+    duration = (
+        PORTRAIT_STARTS.duration * _own_time(system, points) if duration is None else duration
+    )
+    states = _spread(system, area, points, seed) if starts is None else _states(system, starts)
     rows = []
     for i, state in enumerate(states):
         progress(0.8 * i / len(states), "following motions")
         rows.append(_sampled(system, state, duration, samples))
     progress(0.8, "separatrices")
     why = _no_inverse(system)
-    curves = () if why else separatrices(system, window)
+    curves = () if why else separatrices(system, area)
     progress(1.0, "done")
-    facts = {"window": np.ravel(window).astype(float).tolist(), "duration": float(duration)}
+    facts = {"window": np.ravel(area).astype(float).tolist(), "duration": float(duration)}
     begun = "spread" if starts is None else "given"
     return _dataset(
         system,
@@ -134,11 +142,22 @@ def phase_portrait(
     )
 
 
-def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
+def _own_time(system: System, points: tuple[Equilibrium, ...]) -> float:
+    """The longest time in which motions move beside an equilibrium; 1 of a model without units of
+    time, and the natural time where there is none."""
+    if system.model.dimensionless:
+        return 1.0
+    products = [
+        abs(point.eigenvalues[0] * point.eigenvalues[1]) for point in points if point.eigenvalues
+    ]
+    slowest = min((product for product in products if product > 0.0), default=0.0)
+    return 1.0 / math.sqrt(slowest) if slowest else unit_of_time(system)
+
+
+def _spread(system: System, area: Window, points: tuple[Equilibrium, ...], seed: int) -> np.ndarray:
     """States (n, 2) beside the stable equilibria, and spread evenly over the part of the window in
     which the system can be.
     """
-    area = check_window(window, system)
     tried = PORTRAIT_STARTS.tried * PORTRAIT_STARTS.spread
     shifts = np.arange(1, tried + 1)[:, None] * even_steps(2)
     states = area.centre + area.half * (
@@ -149,7 +168,7 @@ def _spread(system: System, window: Box, points: tuple[Equilibrium, ...], seed: 
     ]
     if not len(states):
         raise ParameterError(
-            f"window must reach to where the system can be, got {window!r}: all of it is beyond "
+            f"window must reach to where the system can be, got {tuple(area)!r}: all of it is beyond "
             "the contact",
             "window",
         )

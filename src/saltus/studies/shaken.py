@@ -17,8 +17,6 @@ from saltus.systems import Box, Constant, Pulse, Record, System, check_system
 if TYPE_CHECKING:
     import xarray
 
-WINDOW: Box = ((-3.0, 3.0), (-3.0, 3.0))  # in which the unstable equilibria are looked for
-
 
 @dataclass(frozen=True)
 class OverturningSettings:
@@ -55,7 +53,7 @@ class Shaken:
     saddles: tuple[Equilibrium, ...]
 
     @classmethod
-    def of(cls, system: System, window: Box = WINDOW) -> Shaken:
+    def of(cls, system: System, window: Box | None = None) -> Shaken:
         """The system with its one load that varies, and its saddles once this is over."""
         check_system(system, "overturning", coordinates=1)
         varied = [

@@ -73,6 +73,7 @@ from .states import read_starts as read_starts
 from .states import rest_state as rest_state
 from .states import state_of as state_of
 from .states import states_beside as states_beside
+from .states import unit_of_time as unit_of_time
 from .states import within_window as within_window
 from .structure import mode_sums as mode_sums
 from .system import System as System

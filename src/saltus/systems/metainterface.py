@@ -29,6 +29,7 @@ class LayeredCell(Model):
     mass_ratio: float = 0.0  # m = M1 / M2, at least 0
     dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
 
+    dimensionless: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = (
         "horizontal",
         "vertical",

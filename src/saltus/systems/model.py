@@ -85,6 +85,8 @@ class Model:
     coordinates: ClassVar[tuple[str, ...]] = ("theta",)
     first_order: ClassVar[tuple[str, ...]] = ()
     units: ClassVar[tuple[str, ...]] = ()
+    # whether its equations are without units of time, so that 1 is the natural unit
+    dimensionless: ClassVar[bool] = False
     channels: ClassVar[tuple[str, ...]] = ()
     margin_kinds: ClassVar[Mapping[str, MarginKind]] = {}
     stops: ClassVar[tuple[str, ...]] = ()

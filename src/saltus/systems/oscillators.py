@@ -337,6 +337,7 @@ class RockingBlock(OneContactModel):
     alpha: float = field(metadata=RADIANS)
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
+    dimensionless: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ("ground_horizontal", "ground_vertical")
     margin_kinds: ClassVar[dict[str, MarginKind]] = {"overturned": MarginKind.LIMIT}
     stops: ClassVar[tuple[str, ...]] = ("overturned",)

@@ -5,6 +5,7 @@ its contacts.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
@@ -17,7 +18,7 @@ from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.gap_places import CLOSED_BELOW, held_exactly, led, normal_of, pushed, reflected
 from saltus.systems.model import Model
 from saltus.systems.system import System
-from saltus.systems.system_units import ANGLES, natural_units
+from saltus.systems.system_units import ANGLES, natural_units, time_without_period
 
 
 def read_start(
@@ -222,9 +223,9 @@ class Window(Box):
         return np.asarray((states - self.centre) / self.half)
 
 
-def check_window(window: Any, system: System) -> Window:
-    """A window of the states; for None the default window, with half widths of 1.5 natural units
-    around the contact, or around 0 without one.
+def check_window(window: Any, system: System, half_width: float = HALF_WIDTH) -> Window:
+    """A window of the states; for None the default window, with half widths of so many natural
+    units around the contact, or around 0 without one.
 
     With several contacts the default window ends at these. With several coordinates both bounds of
     a state variable may be equal; it then has one value. Velocities of coordinates of first order
@@ -238,13 +239,13 @@ def check_window(window: Any, system: System) -> Window:
     """
     names = system.model.coordinates
     if window is None:
-        return _default_window(system)
+        return _default_window(system, half_width)
     bounds = as_numbers(window, "window")
     moving = system.model.moving
     following = len(system.model.first_order)
     # velocities that follow from the state may have any bounds
     if following and bounds.shape == (2 * len(names) - following, 2):
-        free = _default_half_widths(system)[-following:, None] * (-1.0, 1.0)
+        free = _default_half_widths(system, half_width)[-following:, None] * (-1.0, 1.0)
         bounds = np.concatenate([bounds, free])
     single = len(names) == 1
     sound = bounds.shape == (2 * len(names), 2) and (np.abs(bounds) <= LIMITS.value).all()
@@ -275,12 +276,21 @@ def check_window(window: Any, system: System) -> Window:
     return Window(map(tuple, bounds.tolist()))
 
 
-def _default_window(system: System) -> Window:
-    """The window with half widths of 1.5 natural units around the contact, or around 0 without one,
-    cut off at the contacts.
+def unit_of_time(system: System) -> float:
+    """The time in which default windows and spans are measured: 1 of a model without units of time,
+    else the natural one."""
+    if system.model.dimensionless:
+        return 1.0
+    time = time_without_period(system)
+    return time if 0.0 < time < math.inf else natural_units(system).time
+
+
+def _default_window(system: System, half_width: float) -> Window:
+    """The window with half widths of so many natural units around the contact, or around 0 without
+    one, cut off at the contacts.
     """
     model = system.model
-    half = _default_half_widths(system).tolist()
+    half = _default_half_widths(system, half_width).tolist()
     if model.sides:
         middle = float(model.contact)
         return Window(((middle - half[0], middle + half[0]), (-half[1], half[1])))
@@ -300,15 +310,15 @@ def _default_window(system: System) -> Window:
     )
 
 
-def _default_half_widths(system: System) -> np.ndarray:
-    """The half widths of the default window, of coordinates and then of velocities, (2 n,): natural
-    units, but for angles and their rates radians and the time of the model.
+def _default_half_widths(system: System, half_width: float) -> np.ndarray:
+    """The half widths of the default window, of coordinates and then of velocities, (2 n,), in
+    natural units. An angle has the unit of 1 rad, also in a model without units of time.
     """
     units = natural_units(system)
     names = system.model.coordinates
     angular = np.array([system.model.unit_of(name) in ANGLES for name in names])
-    speeds = np.where(angular, 1.0, units.speeds)
-    return HALF_WIDTH * np.concatenate([np.where(angular, 1.0, units.lengths), speeds])
+    speeds = np.where(angular & system.model.dimensionless, 1.0, units.speeds)
+    return half_width * np.concatenate([np.where(angular, 1.0, units.lengths), speeds])
 
 
 @cache

@@ -219,7 +219,8 @@ class BasinSettings:
     """The numbers of a picture of basins."""
 
     cells: int = 201  # Number of cells along an axis whose values are not given.
-    narrowest: float = 1e-6  # The half width of the window around a grid of one point.
+    # The half width of the window around a grid of one point, as a share of the default one.
+    narrowest: float = 1e-6
     periods: int = 500  # The largest number of forcing periods for which a motion is followed.
     within: float = 1e-2  # The distance from an attractor within which a motion has reached it.
     rows: int = 25  # Number of rows of the grid in a chunk of a store, which then takes seconds.
@@ -474,7 +475,7 @@ def _around(system: System, grid: Grid) -> Window:
     for name, values in zip(grid.plane, (grid.horizontal, grid.vertical), strict=True):
         i = names.index(name)
         middle = area.centre[i]
-        wide = float(max(np.abs(values - middle).max(), SETTINGS.narrowest))
+        wide = float(max(np.abs(values - middle).max(), SETTINGS.narrowest * area.half[i]))
         bounds[i] = [middle - wide, middle + wide]
     return check_window(bounds, system)
 

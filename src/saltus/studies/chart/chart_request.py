@@ -25,13 +25,21 @@ from saltus.errors import ParameterError, shown
 from saltus.flow import RECURRENCE, Ending, state_names
 from saltus.result import check_provenance, identity, provenance
 from saltus.studies.chart.motions import KEPT, CellOutcome
-from saltus.systems import System, check_along, check_path, check_system, check_window
+from saltus.systems import (
+    System,
+    check_along,
+    check_path,
+    check_system,
+    check_window,
+    natural_units,
+)
 from saltus.theory import amplitude_limits
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan, Variable
 
 CELLS = "saltus.studies.chart.cells:cells"
+LEAST = 1e-3  # the smallest amplitude that counts if none is given, in natural units
 NUMBERS = ("max_period", "starts", "least", "periods", "tol", "seed")
 
 
@@ -66,7 +74,7 @@ class ChartRequest:
     max_period: int
     starts: int
     window: Any  # None: a window around the contact
-    least: float
+    least: Any  # None: LEAST natural lengths
     periods: Any  # None: the time in which motions settle by the damping of the model
     tol: float
     seed: int
@@ -91,6 +99,8 @@ class ChartRequest:
         check_memory("horizontal", 8.0 * numbers * cells, f"{cells} cells")
         check_count("max_period", self.max_period, 1, RECURRENCE.compiled_max_period)
         check_count("seed", self.seed, 0)
+        if self.least is None:
+            object.__setattr__(self, "least", LEAST * natural_units(self.system).length)
         check_number("least", self.least, above=0.0)
         check_number("tol", self.tol, at_least=1e-15, at_most=1e-6)
         object.__setattr__(self, "window", check_window(self.window, self.system))

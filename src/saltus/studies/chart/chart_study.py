@@ -322,7 +322,7 @@ def stability_chart(
     max_period: int = 6,
     starts: int = 12,
     window: Box | None = None,
-    least: float = 1e-3,
+    least: float | None = None,
     periods: int | None = None,
     tol: float = 1e-10,
     seed: int = 0,
@@ -356,7 +356,7 @@ def stability_chart(
     starts, window, seed
         Initial states, as `search_orbits` takes them.
     least
-        The smallest amplitude that counts: below Hcr small motions of 6, 10, 14, ... impacts
+        The smallest amplitude that counts, by default 1e-3 in natural units: below Hcr small motions of 6, 10, 14, ... impacts
         accumulate towards rest.
     periods
         Forcing periods after which a motion that has not settled counts as unsettled; by default it
@@ -422,7 +422,7 @@ def bordered_chart(
     max_period: int = 6,
     starts: int = 12,
     window: Box | None = None,
-    least: float = 1e-3,
+    least: float | None = None,
     periods: int | None = None,
     tol: float = 1e-10,
     seed: int = 0,

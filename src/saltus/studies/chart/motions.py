@@ -13,7 +13,7 @@ import numpy as np
 
 from saltus.enumerations import NumberedSentence
 from saltus.flow import Ending, Recurrence, approached, find_recurrence, return_period, state_names
-from saltus.systems import System
+from saltus.systems import System, natural_units
 
 if TYPE_CHECKING:
     import xarray
@@ -104,14 +104,17 @@ def motions_later(
         speed=True,
         tol=tol,
     )
+    units = natural_units(system)
     ahead = ends.last
     period = np.zeros(len(ends), dtype=int)
     if system.model.has_state_plane:  # else an extrapolated state may lie beyond a contact
-        ahead, period = approached(ends.states, max_period)
+        ahead, period = approached(ends.states / units.state, max_period)
+        ahead *= units.state
     if slow:
         own = len(system.model.coordinates)
-        size = np.nanmax(np.abs(ends.states[:, :, :own]), axis=(1, 2), initial=0.0)[:, None]
-        period = return_period(ends.states, max_period, slow * size)
+        places = np.abs(ends.states[:, :, :own]) / units.length
+        size = np.nanmax(places, axis=(1, 2), initial=0.0)[:, None]
+        period = return_period(ends.states, max_period, slow * size, units.state)
     seen = replace(ends, period=np.where(ends.unsettled, period, ends.period))
     later = motions.copy()
     high = seen.highest

@@ -16,7 +16,7 @@ from saltus.flow import Ending, Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.result import Result, provenance
 from saltus.studies.diagram.simulated import SimulatedMotions
-from saltus.systems import System, image_of
+from saltus.systems import System, image_of, natural_units
 
 if TYPE_CHECKING:
     import xarray
@@ -470,9 +470,11 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
     point itself do not count.
     """
     away = np.abs(branch.parameters - special.parameter)
-    apart = away + np.abs(branch.amplitudes - special.amplitude)
+    scale = max(abs(special.parameter), float(np.ptp(branch.parameters)))
+    length = natural_units(special.orbit.system).length
+    apart = away / scale + np.abs(branch.amplitudes - special.amplitude) / length
     nearest = int(apart.argmin())
-    there = away > SETTINGS.same_place * max(1.0, abs(special.parameter))
+    there = away > SETTINGS.same_place * scale
     below = np.flatnonzero(there[:nearest])[-1:]
     above = nearest + np.flatnonzero(there[nearest:])[:1]
     beside = branch.stable[np.concatenate([below, above])]

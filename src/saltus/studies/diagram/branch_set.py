@@ -15,15 +15,15 @@ from saltus.progress import Progress, part_of, silent
 from saltus.studies.chart.motions import motion_type
 from saltus.studies.diagram.diagram_work import DiagramWork, Request
 from saltus.studies.diagram.simulated import SimulatedMotions
-from saltus.systems import System
+from saltus.systems import NaturalUnits, System, natural_units
 
 
 @dataclass(frozen=True)
 class PlacementSettings:
     """When a simulated motion is the orbit of a branch."""
 
-    # The extrema of a settled motion and of its orbit agree to this share of the amplitude, or of
-    # `least` if that is larger.
+    # Lengths and speeds are in natural units. The extrema of a settled motion and of its orbit
+    # agree to this share of the amplitude, or of `least` if that is larger.
     same: float = 1e-5
     least: float = 1e-3
     # Extrema between two points of a branch are interpolated by a cubic and by a quadratic through
@@ -52,13 +52,19 @@ class PlacedBranch:
     @cached_property
     def columns(self) -> np.ndarray:
         """Parameter, highest, lowest, stability, period, impacts and slowest impact of each point,
-        (7, n).
+        (7, n), the latter as a length: in natural times.
         """
+        units = self.units
         rows = [
-            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _seen(o)[2])
+            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _seen(o, units)[2])
             for value, o in zip(self.branch.parameters.tolist(), self.branch.orbits, strict=True)
         ]
         return np.array(rows, dtype=float).reshape(-1, 7).T
+
+    @cached_property
+    def units(self) -> NaturalUnits:
+        """The natural units of the first system of the branch, for all of its orbits."""
+        return natural_units(self.branch.orbits[0].system)
 
     @cached_property
     def joined(self) -> np.ndarray:
@@ -176,12 +182,12 @@ class PlacedBranch:
         """
         if not self.may_hold(value, value, {orbit.period}):
             return False
-        seen = _seen(orbit)
+        seen = _seen(orbit, self.units)
         for before in self.crossings(np.array([value]), stable=False)[1].tolist():
             # a cubic may be far off beside narrow peaks
             ends = self.columns[SEEN][:, before : before + 2].T
             near = (
-                PLACEMENT.near * max(orbit.amplitude, PLACEMENT.least)
+                PLACEMENT.near * max(orbit.amplitude, PLACEMENT.least * self.units.length)
                 + 2.0 * np.abs(ends[1] - ends[0]).max()
             )
             if (
@@ -219,34 +225,36 @@ def _lagrange(nodes: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     return result
 
 
-def _least_speed(system: System) -> float:
-    """The least speed of an impact by which motions and orbits are told apart; 0 where motions are
-    told by their extrema.
+def _least_speed(system: System, units: NaturalUnits) -> float:
+    """The least speed of an impact by which motions and orbits are told apart, times the natural
+    time; 0 where motions are told by their extrema.
     """
-    return PLACEMENT.slow if system.model.names_its_contacts else 0.0
+    return PLACEMENT.slow * units.length if system.model.names_its_contacts else 0.0
 
 
-def _seen(orbit: PeriodicOrbit) -> np.ndarray:
-    """The quantities by which motions and orbits are compared: the extrema and the slowest
-    impact.
+def _seen(orbit: PeriodicOrbit, units: NaturalUnits) -> np.ndarray:
+    """The quantities by which motions and orbits are compared, as lengths: the extrema, and the
+    slowest impact in the natural time.
     """
-    least = _least_speed(orbit.system)
+    least = _least_speed(orbit.system, units)
+    slowest = orbit.slowest * units.time
     return np.array(
         [
             orbit.highest,
             orbit.lowest,
-            max(orbit.slowest, least) if least and orbit.slowest < np.inf else least,
+            max(slowest, least) if least and slowest < np.inf else least,
         ]
     )
 
 
 def stable_motions(
-    branches: list[PlacedBranch], grid: np.ndarray, dimension: int, middle: float
+    branches: list[PlacedBranch], grid: np.ndarray, system: System, middle: float
 ) -> np.ndarray:
     """The stable orbits of branches at the values of a grid, by interpolation, as records of a
-    chart, with extrema from the `middle` on; their states are nan.
+    chart, with extrema from the `middle` on and speeds in natural times; their states are nan.
     """
-    record = motion_type(dimension)
+    record = motion_type(system.dimension)
+    time = natural_units(system).time
     parts = [np.zeros(0, record)]
     for branch in branches:
         cells, before = branch.crossings(grid)
@@ -258,7 +266,7 @@ def stable_motions(
         high, low = extrema[:, 0] - middle, middle - extrema[:, 1]
         part["amplitude"] = np.maximum(high, low)
         part["other"] = np.minimum(high, low)
-        part["slowest"] = extrema[:, 2]
+        part["slowest"] = extrema[:, 2] * (time / branch.units.time)
         parts.append(part)
     return np.concatenate(parts)
 
@@ -280,9 +288,6 @@ def placed(
         not.
     """
     result = np.zeros(len(motions), dtype=bool)
-    least = _least_speed(branches[0].branch.orbits[0].system) if branches else 0.0
-    every = np.stack([motions.highest, motions.lowest, np.maximum(motions.slowest, least)], axis=1)
-    sizes = np.maximum(motions.amplitude, PLACEMENT.least)
     low = motions.value.min(initial=np.inf)
     high = motions.value.max(initial=-np.inf)
     periods = set(motions.period.tolist())
@@ -293,8 +298,14 @@ def placed(
             for each in (rows, before)
         )
         expected, uncertain, change = branch.extrema(motions.value[rows], before)
-        apart = _apart(every[rows], expected, middle)
-        size = sizes[rows]
+        units = branch.units
+        slowest = motions.slowest[rows] * units.time
+        least = _least_speed(branch.branch.orbits[0].system, units)
+        seen = np.stack(
+            [motions.highest[rows], motions.lowest[rows], np.maximum(slowest, least)], axis=1
+        )
+        apart = _apart(seen, expected, middle)
+        size = np.maximum(motions.amplitude[rows], PLACEMENT.least * units.length)
         both_stable = (branch.columns[3, before] > 0) & (branch.columns[3, before + 1] > 0)
         sure = (
             both_stable
@@ -307,7 +318,7 @@ def placed(
                 orbit = branch.solved(float(motions.value[rows[i]]), int(before[i]))
                 if orbit is not None and (orbit.stable or both_stable[i]):
                     result[rows[i]] = (
-                        _apart(every[rows[i]], _seen(orbit), middle) < PLACEMENT.same * size[i]
+                        _apart(seen[i], _seen(orbit, units), middle) < PLACEMENT.same * size[i]
                     )
     return result
 
@@ -345,8 +356,8 @@ class BranchSettings:
     # orbit: near rest a branch has infinitely many special points, each at a smaller orbit than the
     # one before.
     visible: float = 0.01
-    # The end of a branch is the special point of another one if parameters and amplitudes differ by
-    # no more than this.
+    # The end of a branch is the special point of another one if parameters differ by no more than
+    # this share, and amplitudes by no more than this in natural units.
     same_place: float = 1e-6
     # Step along a parent's branch from the special point at which a family ends on it: at the point
     # itself test functions vanish.
@@ -541,7 +552,7 @@ class BranchSet:
                 if (
                     special.kind == end.kind
                     and family.period == _period_born(special)
-                    and _meet(last, special)
+                    and _meet(last, special, self.bounds)
                 ):
                     return True
         return False
@@ -560,12 +571,14 @@ def _period_born(special: SpecialPoint) -> int:
     return special.orbit.period * (2 if special.kind == SpecialKind.PD else 1)
 
 
-def _meet(end: PeriodicOrbit, special: SpecialPoint) -> bool:
-    """Whether the orbit at a branch's end is the special point of another one."""
-    near = BRANCHES.same_place * max(1.0, abs(special.parameter))
+def _meet(end: PeriodicOrbit, special: SpecialPoint, bounds: tuple[float, float]) -> bool:
+    """Whether the orbit at a branch's end is the special point of another one, in a diagram between
+    these bounds."""
+    near = BRANCHES.same_place * max(map(abs, (special.parameter, *bounds)))
+    length = natural_units(special.orbit.system).length
     return (
         abs(end.solution.values[0] - special.parameter) < near
-        and abs(end.amplitude - special.amplitude) < near
+        and abs(end.amplitude - special.amplitude) < BRANCHES.same_place * length
     )
 
 

@@ -26,7 +26,7 @@ from saltus.studies.diagram.simulated import (
     SimulatedMotions,
     starts_at,
 )
-from saltus.systems import System, Window, middle_of, within_window
+from saltus.systems import System, Window, middle_of, natural_units, within_window
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class DiagramSearch:
             states.reshape(-1, self.system.dimension),
             progress,
         )
-        self.found = AttractorsFound(motions, self.max_period, self.middle)
+        self.found = AttractorsFound(motions, self.max_period, self.middle, self.time)
 
     def simulated(
         self, values: np.ndarray, states: np.ndarray, progress: Progress = silent
@@ -131,6 +131,11 @@ class DiagramSearch:
     def middle(self) -> float:
         """The place from which extrema are compared, so that mirror images have equal ones."""
         return middle_of(self.system) or 0.0
+
+    @cached_property
+    def time(self) -> float:
+        """The natural time, in which speeds of impacts are compared with lengths."""
+        return natural_units(self.system).time
 
     @cached_property
     def image_middle(self) -> float | None:
@@ -291,9 +296,7 @@ class DiagramSearch:
         ended = 0
         watch = part_of(progress, 1.0, 1.0, "following motions from neighbouring values")
         for number in range(SETTINGS.rounds):
-            known = stable_motions(
-                self.branches.placed, self.grid, self.system.dimension, self.middle
-            )
+            known = stable_motions(self.branches.placed, self.grid, self.system, self.middle)
             values, states = self.found.seeds(self.system, self.grid, known, since)
             more_values, more_states = self._beyond_ends(
                 self.branches.placed[ended:] if number < self.effort.jumps else []
@@ -355,13 +358,14 @@ class DiagramSearch:
         assert self.band_search is not None
         search = self.band_search
         known = len(self.found.motions)
-        begin = partial(search.begin, _without_repetition(motions, self.middle))
+        begin = partial(search.begin, _without_repetition(motions, self.middle, self.time))
         self._beside(self.follow_motions, begin, part_of(progress, 0.0, 0.3))
         if more is not None:
             look = partial(search.beside_special_points, band_origins(self.branches.branches))
             self._beside(more, look, part_of(progress, 0.3, 0.4))
         # without those that the search knows already
-        later = _without_repetition(self.found.motions.only(slice(known, None)), self.middle)
+        fresh = self.found.motions.only(slice(known, None))
+        later = _without_repetition(fresh, self.middle, self.time)
         self._take_begun()
         search.locate(later, band_origins(self.branches.branches), part_of(progress, 0.4, 0.7))
         self._take_begun()
@@ -456,9 +460,9 @@ class DiagramSearch:
         return inside
 
 
-def _without_repetition(motions: SimulatedMotions, middle: float) -> SimulatedMotions:
+def _without_repetition(motions: SimulatedMotions, middle: float, time: float) -> SimulatedMotions:
     """Each attractor once, every value, and the motions that have not settled."""
-    found = AttractorsFound(motions, RECURRENCE.compiled_max_period, middle)
+    found = AttractorsFound(motions, RECURRENCE.compiled_max_period, middle, time)
     kept = (
         np.unique(motions.value, return_index=True)[1],
         found.rows,

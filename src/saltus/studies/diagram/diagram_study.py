@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 class ConfirmationSettings:
     """What direct simulation must show of an orbit."""
 
-    distance: float = 1e-8  # A stable orbit must come back to itself within this distance ...
+    # A stable orbit must come back to itself within this distance, in natural units ...
+    distance: float = 1e-8
     rounds: int = 20  # ... after this number of its periods.
 
 

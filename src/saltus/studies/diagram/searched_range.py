@@ -17,6 +17,7 @@ from saltus.studies.diagram.bands import Bands, TriedValues, bands_of
 from saltus.studies.diagram.diagram_work import DiagramWork
 from saltus.studies.diagram.effort import CHAOS, ChaosSettings
 from saltus.studies.diagram.simulated import SimulatedMotions
+from saltus.systems import natural_units
 
 # Of several verdicts, the last one counts.
 RANKS = (Ending.PERIODIC, Ending.QUASI_PERIODIC, Ending.TRANSIENT, Ending.UNDECIDED, Ending.CHAOTIC)
@@ -230,12 +231,9 @@ class SearchedRange:
 
     def _settle(self, motions: SimulatedMotions) -> None:
         """Note at each value on what motions have settled."""
+        dying = self.settings.dying * natural_units(self.work.system).speed
         for i in np.flatnonzero(motions.periodic):
-            impacts = (
-                0
-                if 0.0 < motions.slowest[i] < self.settings.dying
-                else int(motions.impact_count[i])
-            )
+            impacts = 0 if 0.0 < motions.slowest[i] < dying else int(motions.impact_count[i])
             facts = int(motions.period[i]), impacts, float(motions.amplitude[i])
             self.entry(float(motions.value[i])).settle(*facts, motions.last[i])
 

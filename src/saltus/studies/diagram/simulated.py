@@ -17,7 +17,15 @@ from saltus.progress import Progress, silent
 from saltus.studies.chart.cells import CELLS, seeds
 from saltus.studies.chart.motions import ALIKE, by_cell, is_alike, is_same, motion_type
 from saltus.studies.diagram.effort import CHAOS
-from saltus.systems import System, Window, even_steps, is_still, within_window
+from saltus.systems import (
+    NaturalUnits,
+    System,
+    Window,
+    even_steps,
+    is_still,
+    natural_units,
+    within_window,
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,8 @@ class SimulationSettings:
     # round reduces the distance of its return by this factor; otherwise it can hardly settle in the
     # time that is left.
     nearer: float = 0.3
-    still: float = 1e-6  # A motion that stays this near to the contact is at rest.
+    # A motion that stays this near to the contact, in natural units, is at rest.
+    still: float = 1e-6
 
 
 SETTINGS = SimulationSettings()
@@ -150,13 +159,15 @@ def simulate_from(
     """
     follow = follow or partial(followed, system, path)
     found = follow(values, states, periods, progress)
-    slow = np.flatnonzero(found.unsettled & _is_slow(found))
+    units = natural_units(system)
+    slow = np.flatnonzero(found.unsettled & _is_slow(found, units))
     for _ in range(SETTINGS.patience):
         if slow.size:
-            before = _return_distance(found.only(slow))
+            before = _return_distance(found.only(slow), units)
             found.gone_on(slow, follow(values[slow], found.last[slow], periods, silent))
             later = found.only(slow)
-            slow = slow[later.unsettled & (_return_distance(later) <= SETTINGS.nearer * before)]
+            apart = _return_distance(later, units)
+            slow = slow[later.unsettled & (apart <= SETTINGS.nearer * before)]
     return found
 
 
@@ -195,9 +206,8 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
     lowest = ends.lowest
     period = ends.period.copy()
     outcome = ends.outcome.copy()
-    still = is_still(system, highest, lowest, SETTINGS.still) & (
-        (period > 0) | (outcome == Ending.UNDECIDED)
-    )
+    near = SETTINGS.still * natural_units(system).length
+    still = is_still(system, highest, lowest, near) & ((period > 0) | (outcome == Ending.UNDECIDED))
     outcome[still] = Ending.HELD
     period[still] = 0
     shown = ends.within_period & ~ends.rest[:, None]
@@ -216,22 +226,18 @@ def _motions(system: System, values: np.ndarray, ends: Recurrence) -> SimulatedM
     )
 
 
-def _return_distance(motions: SimulatedMotions) -> np.ndarray:
-    """The least distance at which motions return to an earlier state, (n,); inf where that is not
-    known.
+def _return_distance(motions: SimulatedMotions, units: NaturalUnits) -> np.ndarray:
+    """The least distance at which motions return to an earlier state, in natural units, (n,); inf
+    where that is not known.
     """
-    return np.asarray(
-        np.nan_to_num(
-            return_distances(motions.states, RECURRENCE.compiled_max_period).min(axis=1), nan=np.inf
-        )
-    )
+    apart = return_distances(motions.states, RECURRENCE.compiled_max_period, units.state)
+    return np.asarray(np.nan_to_num(apart.min(axis=1), nan=np.inf))
 
 
-def _is_slow(motions: SimulatedMotions) -> np.ndarray:
+def _is_slow(motions: SimulatedMotions, units: NaturalUnits) -> np.ndarray:
     """Which motions return near to an earlier state, (n,)."""
-    return np.asarray(
-        _return_distance(motions) <= SETTINGS.slow * np.maximum(motions.amplitude, SETTINGS.still)
-    )
+    size = np.maximum(motions.amplitude / units.length, SETTINGS.still)
+    return np.asarray(_return_distance(motions, units) <= SETTINGS.slow * size)
 
 
 class BranchAssignment(NumberedSentence):
@@ -264,6 +270,7 @@ class AttractorsFound:
     motions: SimulatedMotions
     max_period: int  # the longest period of orbits that are followed
     middle: float  # the place about which motions may be mirror images
+    time: float  # in which speeds of impacts are lengths
     # (n,): a `BranchAssignment` for each motion, kept up to date for `rows` only
     assignment: np.ndarray = field(init=False)
     # (n,): a motion was compared with so many branches, the first ones
@@ -293,7 +300,7 @@ class AttractorsFound:
         """Find the attractors: motions at one value are on one attractor if they have the same
         period and the same extrema, or those of the mirror image."""
         rows = np.flatnonzero(self.motions.periodic)
-        table = as_chart_motions(self.motions.only(rows), self.middle)
+        table = as_chart_motions(self.motions.only(rows), self.middle, self.time)
         seen = (table[name] for name in ("other", "amplitude", "slowest", "period"))
         order = np.lexsort((rows, *seen, self.motions.value[rows]))
         rows, table = rows[order], table[order]
@@ -336,7 +343,7 @@ class AttractorsFound:
         runs first.
         """
         motions = self.motions.only(rows)
-        table = as_chart_motions(motions, self.middle)
+        table = as_chart_motions(motions, self.middle, self.time)
         order = np.lexsort((motions.value, table["impact_count"], table["period"]))
         alike = is_alike(table[order][1:], table[order][:-1], ALIKE.family)
         runs = np.split(rows[order], 1 + np.flatnonzero(~alike)) if len(rows) else []
@@ -361,20 +368,21 @@ class AttractorsFound:
             Only attractors that were first found by the motion of this row, or later.
         """
         rows = self.rows[np.isin(self.motions.value[self.rows], grid)]
-        mine = as_chart_motions(self.motions.only(rows), self.middle)
+        mine = as_chart_motions(self.motions.only(rows), self.middle, self.time)
         mine["cell"] = np.searchsorted(grid, self.motions.value[rows])
         every = by_cell(np.concatenate([mine, known]))
         cell, states = seeds(system, by_cell(mine[rows >= since]), every, (1, len(grid)))
         return grid[cell], states
 
 
-def as_chart_motions(motions: SimulatedMotions, middle: float) -> np.ndarray:
-    """The motions as records of a chart, all in cell 0 and with extrema from the `middle` on, so
-    that they are compared by the same functions.
+def as_chart_motions(motions: SimulatedMotions, middle: float, time: float) -> np.ndarray:
+    """The motions as records of a chart, all in cell 0, with extrema from the `middle` on and
+    speeds times a unit of time, so that they are compared by the same functions.
     """
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
-    for name in ("period", "impact_count", "slowest"):
+    for name in ("period", "impact_count"):
         table[name] = getattr(motions, name)
+    table["slowest"] = motions.slowest * time
     high = motions.highest - middle
     low = middle - motions.lowest
     table["amplitude"] = np.maximum(high, low)
