@@ -10,10 +10,12 @@ Verified: one zero within `radius` of `middle`, no other one within `unique`; ea
 certificate is open between events; impacts have at least the `least_speed`; the orbit is `stable`,
 or not, and its multipliers have the `moduli`; at each rest all impacts are `over` in time, and the
 contact stays closed until the release.
+Of a special point, whose parameter and kernel vector are unknowns too: its one zero and its gaps.
 The program prints what it verified in its own words and numbers.
 
 Not verified: that the expressions and the gaps of the `segments`, and those of the `rests`, are those
 of the `system`, and that all of its gaps are there (saltus alone can trace a model: `proof.check()`);
+that those of a special point hold the variational equation, and its radii `only`;
 the texts `statement`, `assumptions`, `system` and `names`, which are not used.
 """
 
@@ -265,7 +267,9 @@ def rows_of(certificate, box, with_gaps):
     size = len(box)
     given = certificate["parameters"]
     numbers = [ball(m, r) for m, r in zip(given["middle"], given["radius"], strict=True)]
-    period = 2 * arb.pi() * exact(certificate["span"]) / numbers[given["frequency"]]
+    path = certificate.get("path")
+    if path is not None:
+        numbers[path] = box[-1]
     values, jacobian, opened = [], [], True
     for row in certificate["steps"]:
         segment = certificate["segments"][row["segment"]]
@@ -274,12 +278,15 @@ def rows_of(certificate, box, with_gaps):
         last = events if row["to_event"] else 2 * d
         places = [*range(row["begin"], row["begin"] + first)]
         places += [*range(row["close"], row["close"] + last)]
+        places += [size - 1] * (path is not None)
         width = len(places)
 
         def unknown(i, width=width, places=places):
             return Dual(box[places[i]], [arb(j == i) for j in range(width)])
 
         known = [constant(value, width) for value in numbers]
+        if path is not None:
+            known[path] = unknown(width - 1)
         if row["from_event"]:
             begin = [unknown(i) for i in range(first)]
             time = begin[0] if free else constant(0, width)
@@ -293,7 +300,8 @@ def rows_of(certificate, box, with_gaps):
             close = [unknown(first + i) for i in range(last)]
             end = close[0] if free else constant(0, width)
             if row["wraps"]:
-                end = end + constant(period, width)
+                turns = 2 * arb.pi() * exact(certificate["span"])
+                end = end + constant(turns, width) / known[given["frequency"]]
         else:
             end = constant(exact(row["close_time"]), width)
         length = end - time
@@ -328,6 +336,10 @@ def rows_of(certificate, box, with_gaps):
             stop = gap["stop"] if row["to_event"] else 0
             own = series[gap["coordinate"]]
             opened = opened and is_open(own, int(gap["sign"]), contact, length.value, start, stop)
+    for pin in certificate.get("pins", []):
+        line = [exact(c) for c in pin["row"]]
+        jacobian.append(line)
+        values.append(sum((c * x for c, x in zip(line, box, strict=True)), -exact(pin["goal"])))
     return values, jacobian, opened
 
 
@@ -335,7 +347,8 @@ def is_whole(certificate):
     """Whether the steps lead from each event to the next one, through all nodes, in time."""
     steps = certificate["steps"]
     events, size = certificate["events"], certificate["event_size"]
-    nodes = iter(range(events * size, len(certificate["middle"]), 2 * certificate["coordinates"]))
+    last_node = len(certificate["middle"]) - len(certificate.get("pins", []))
+    nodes = iter(range(events * size, last_node, 2 * certificate["coordinates"]))
     middle = [float.fromhex(m) for m in certificate["middle"]]
     if events != len(certificate["segments"]) or events < 1:
         return False
@@ -507,9 +520,9 @@ def rest_holds(certificate, rest, box):
 def verified(certificate):
     """For each claim of a certificate, whether it was verified."""
     whole = is_whole(certificate)
-    result = dict.fromkeys(
-        ("steps", "existence", "uniqueness", "gaps", "speeds", "stability"), False
-    )
+    claims = ["steps", "existence", "uniqueness", "gaps", "speeds", "stability"]
+    special = "kind" in certificate
+    result = dict.fromkeys(claims[:4] if special else claims, False)
     if not whole:
         return result
     result["steps"] = True
@@ -525,6 +538,8 @@ def verified(certificate):
     result["uniqueness"] = wider and image(certificate, at_middle, middle, unique) is not None
     box = [arb(m, x.upper()) for m, x in zip(middle, reach, strict=True)]
     _, jacobian, result["gaps"] = rows_of(certificate, box, True)
+    if special:
+        return result
     least = exact(certificate["least_speed"])
     size = certificate["event_size"]
     impacts = set(range(certificate["events"])) - set(certificate["releases"])

@@ -15,7 +15,8 @@ from mutations import mutated, mutations_of
 from saltus.bounds import Ball, arcs, krawczyk
 
 OPERATOR = ("contraction", "_of_two", "_by_discs", "_isolated")
-CURVE = ("ArcBox.hull", "ArcBox.at", "ArcBox.holds", "_turn")
+CURVE = ("Tube.hull", "Tube.at", "Tube.holds", "_Image.__init__", "drift_of", "turn_of")
+TINY = Fraction(1e-14)  # what roundings of doubles may add
 WIDER = 1.3  # the most that a bound may exceed the least one
 # Sites whose change no exact result can show, each with the reason.
 COVERED = "the products before it are rounded upward by UP, which is more than this rounding"
@@ -38,12 +39,14 @@ EQUIVALENT = {
     "_by_discs: sign turned: 1.0 + EPS": MARGIN,
     "_isolated: no rounding: centre: np.ndarray, discs: np.ndarray, index: int": MARGIN,
     "_isolated: sign turned: 1.0 - 4.0 * EPS": MARGIN,
-    "ArcBox.at: no rounding: self, s: float": "it has no bound of rounding",
-    "ArcBox.holds: no rounding: self, zero: Ball": "`inside` rounds upward by more",
-    "_turn: no rounding: inverse: np.ndarray, jacobian: Ball, tangent: np.ndarray, unit: np.ndarray, scales: np.ndarray": (
+    "Tube.at: no rounding: self, s: float": "it has no bound of rounding",
+    "Tube.holds: no rounding: self, zero: Ball": "`inside` rounds upward by more",
+    "_Image.__init__: no rounding: self, centre: Centre, tube: Tube": COVERED,
+    "drift_of: no rounding: inverse: np.ndarray, jacobian: Ball, tangent: np.ndarray": COVERED,
+    "turn_of: no rounding: defect: np.ndarray, drift: np.ndarray, tangent: np.ndarray, scales: np.ndarray": (
         COVERED
     ),
-    "_turn: sign turned: 1.0 + 1e-12": COVERED,
+    "turn_of: sign turned: 1.0 + 1e-12": COVERED,
 }
 
 
@@ -167,7 +170,56 @@ def operator_holds(module: SimpleNamespace) -> bool:
 
 
 def curve_holds(module: SimpleNamespace) -> bool:
-    return tubes_hold(module) and turns_hold(module)
+    return tubes_hold(module) and turns_hold(module) and images_hold(module)
+
+
+def images_hold(module: SimpleNamespace) -> bool:
+    """|I - A J|, |A (J t - e)| and the operator's image of a tube, for all J of their ball, in
+    fractions; a tube is proved where the image is narrower, and only there.
+    """
+    rng = np.random.default_rng(13)
+    verdicts = set()
+    for trial in range(24):
+        inverse = rng.normal(size=(3, 3)) + 2.0 * np.eye(3)
+        spread = 10.0 ** rng.uniform(-4, -1) * np.abs(rng.normal(size=(3, 3)))
+        jacobian = Ball(np.linalg.inv(inverse) + 3e-2 * rng.normal(size=(3, 3)), spread)
+        tangent = inverse[:, -1] + 0.1 * (trial % 2) * rng.normal(size=3)
+        radius = np.abs(rng.normal(size=3)) + 0.1
+        step = 10.0 ** rng.uniform(-4, 0) * np.abs(rng.normal(size=3))
+        half = 0.5
+        a, t, r, y = map(exact, (inverse, tangent, radius, step))
+        jm, jr = exact(jacobian.middle), exact(jacobian.radius)
+        defect, drift = module.drift_of(inverse, jacobian, tangent)
+        tube = module.Tube(np.zeros(3), tangent, radius, np.array([0.0, 0.0, 1.0]), half)
+        centre = SimpleNamespace(
+            inverse=inverse,
+            step=step,
+            shooting=SimpleNamespace(
+                enclose=lambda box: SimpleNamespace(proved=True),
+                system_rows=lambda enclosure, box, jacobian=jacobian: (None, jacobian),
+                scales=np.ones(3),
+            ),
+        )
+        image = module._Image(centre, tube)
+        for i in range(3):
+            least = []
+            for j in range(3):
+                middle = abs(int(i == j) - sum(a[i][k] * jm[k][j] for k in range(3)))
+                least.append(middle + sum(abs(a[i][k]) * jr[k][j] for k in range(3)))
+                if not least[-1] <= Fraction(defect[i][j]) <= least[-1] * Fraction(WIDER) + TINY:
+                    return False
+            moved = sum(a[i][k] * sum(jm[k][j] * t[j] for j in range(3)) for k in range(3))
+            off = abs(moved - a[i][2])
+            off += sum(abs(a[i][k]) * jr[k][j] * abs(t[j]) for k in range(3) for j in range(3))
+            if not off <= Fraction(drift[i]) <= off * Fraction(WIDER) + TINY:
+                return False
+            reach = y[i] + off * Fraction(half) + sum(w * s for w, s in zip(least, r, strict=True))
+            if not reach <= Fraction(image.reach[i]) <= reach * Fraction(WIDER) + TINY:
+                return False
+        verdicts.add(image.proved is not None)
+        if (image.proved is not None) != bool((image.reach < radius).all()):
+            return False
+    return verdicts == {True, False}
 
 
 def tubes_hold(module: SimpleNamespace) -> bool:
@@ -177,7 +229,7 @@ def tubes_hold(module: SimpleNamespace) -> bool:
     radius = np.array([0.1, 0.2, 0.05])
     row = np.array([0.0, 0.0, 1.0])
     half = 0.26
-    box = module.ArcBox(middle, tangent, radius, row, half, 1, None)
+    box = module.Tube(middle, tangent, radius, row, half)
     hull = box.hull
     for place in range(3):
         reach = abs(Fraction(tangent[place])) * Fraction(half) + Fraction(radius[place])
@@ -209,6 +261,11 @@ def tubes_hold(module: SimpleNamespace) -> bool:
             return False
     if not box.holds(Ball(middle, np.array([0.06, 0.0, 0.02]))):
         return False
+    # Where a tube is hardly longer than the roundings of s, nothing is known to lie in it.
+    far = 1e8 * np.ones(3)
+    tiny = module.Tube(far, tangent, radius, np.array([0.6, 0.6, 0.5]), 6e-7)
+    if tiny.holds(Ball(far)):
+        return False
     return not box.holds(Ball(middle, np.array([0.06, 0.0, 0.09])))
 
 
@@ -227,7 +284,7 @@ def turns_hold(module: SimpleNamespace) -> bool:
             inverse = np.linalg.inv(middle)
             for off in (0.0, 0.02, 0.2):
                 tangent = inverse[:, -1] + off * np.array([0.3, -np.sign(slope)])
-                turn = module._turn(inverse, jacobian, tangent, unit, scales)
+                turn = module.turn_of(*module.drift_of(inverse, jacobian, tangent), tangent, scales)
                 corners = corners_of(jacobian)
                 signs = {int(np.sign(np.linalg.solve(corner, unit)[-1])) for corner in corners}
                 if turn and signs != {turn}:
@@ -239,7 +296,8 @@ def turns_hold(module: SimpleNamespace) -> bool:
     inverse = np.array([[-0.75701314, -0.6219635], [0.50019616, -0.62250872]])
     radius = np.array([[0.80240615, 0.15367349], [0.16152955, 0.03148532]])
     jacobian = Ball(np.linalg.inv(inverse), radius)
-    if module._turn(inverse, jacobian, inverse[:, -1], unit, scales):
+    tangent = inverse[:, -1]
+    if module.turn_of(*module.drift_of(inverse, jacobian, tangent), tangent, scales):
         return False
     return decided >= 20
 

@@ -77,8 +77,8 @@ def changed(value: Any) -> Any:
 def changed_entry(value: Any) -> Any:
     """Another entry of a certificate; numbers are hexadecimal."""
     if isinstance(value, dict):
-        name = next(iter(value))
-        return {**value, name: changed_entry(value[name])}
+        name = next(iter(value), "more")
+        return {**value, name: changed_entry(value.get(name, "0x1p0"))}
     if isinstance(value, list):
         return [changed_entry(value[0]), *value[1:]] if value else ["more"]
     if isinstance(value, str) and "0x" in value:

@@ -1,5 +1,7 @@
-from .arcs import ArcBox as ArcBox
-from .arcs import arc_box as arc_box
+from .arcs import ProvedArc as ProvedArc
+from .arcs import Tube as Tube
+from .arcs import arc_along as arc_along
+from .arcs import verified_arc as verified_arc
 from .balls import EPS as EPS
 from .balls import UP as UP
 from .balls import Ball as Ball
@@ -30,6 +32,7 @@ from .shooting import Gap as Gap
 from .shooting import Segment as Segment
 from .shooting import Shooting as Shooting
 from .shooting import ShootingSettings as ShootingSettings
+from .shooting import Step as Step
 from .shooting import Unknowns as Unknowns
 from .shooting import coordinate as coordinate
 from .shooting import varied as varied

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.bounds.balls import EPS, UP, Ball, powers_of_two, product, solve
+from saltus.bounds.precise import has_flint, precise_residual
 from saltus.bounds.shooting import Enclosure, Shooting
+
+EXTRA = 'pip install "saltus[prove]"'
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,10 @@ class KrawczykSettings:
     wide_boxes: int = 12  # tried for uniqueness
     # A box is wide enough if its result fills this share of it.
     filled: float = 0.6
+    # More digits are tried where Newton's step, in natural scales, is longer than a few roundings, and
+    # the condition less than what makes the Jacobian in doubles useless.
+    rounded: float = 1e-14
+    singular: float = 1e13
     halvings: int = 10  # of the box of a singular orbit, see `only_one`
     # A box is told wider than the operator's image of it by this, and its image is narrower than it
     # by `sure`: machines that round in another way verify it too.
@@ -55,6 +62,8 @@ class ProvedZero:
         The radii of a box, as wide as was found, that has no other zero, (unknowns,).
     condition
         How far an unknown moves, in natural scales, where the equations are off by one.
+    precise
+        Whether the residual was computed by FLINT.
     """
 
     middle: np.ndarray
@@ -64,6 +73,7 @@ class ProvedZero:
     enclosure: Enclosure
     unique: np.ndarray
     condition: float
+    precise: bool = False
 
     @property
     def box(self) -> Ball:
@@ -88,35 +98,150 @@ def contraction(
     return np.asarray((y + reach) * UP)
 
 
+@dataclass(frozen=True)
+class Centre:
+    """A point x of doubles near a zero, around which boxes are tried.
+
+    Attributes
+    ----------
+    shooting
+        The equations.
+    x
+        The point.
+    inverse
+        A, the nearly inverse Jacobian there.
+    residual
+        The ball of F there.
+    precise
+        Whether this was computed by FLINT.
+    """
+
+    shooting: Shooting
+    x: np.ndarray
+    inverse: np.ndarray
+    residual: Ball
+    precise: bool
+
+    def zero(self, radius: np.ndarray, enclosure: Enclosure, unique: np.ndarray) -> ProvedZero:
+        """The zero that the operator proves within `radius`, and alone within `unique`."""
+        condition = float(self.weights.max())
+        parts = (self.x, radius, self.inverse, self.residual, enclosure, unique)
+        return ProvedZero(*parts, condition, self.precise)
+
+    @property
+    def step(self) -> np.ndarray:
+        """Y, a bound of Newton's step."""
+        return np.asarray(product(Ball(self.inverse), self.residual.column).magnitude[:, 0])
+
+    @property
+    def weights(self) -> np.ndarray:
+        """How far the unknowns move, in natural scales, where every equation is off by its natural
+        scale: row sums of the inverse Jacobian that depend on no units.
+        """
+        shooting = self.shooting
+        return np.asarray(np.abs(self.inverse) @ shooting.row_scales / shooting.scales)
+
+    def image(self, radius: np.ndarray) -> tuple[np.ndarray, Enclosure] | None:
+        """The radii of the operator's image of x +- radius, and the equations over this box; None
+        where a Taylor step has no enclosure.
+        """
+        box = Ball(self.x, radius)
+        enclosure = self.shooting.enclose(box)
+        if not enclosure.proved:
+            return None
+        jacobian = self.shooting.system_rows(enclosure, box)[1]
+        return contraction(self.inverse, self.residual, jacobian, radius), enclosure
+
+
+def centre_at(shooting: Shooting, x: np.ndarray, precise: bool = False) -> Centre | NotProved:
+    """The equations and the nearly inverse Jacobian at a point; the residual with more digits if it
+    is to be `precise`.
+    """
+    at = shooting.enclose(Ball(x))
+    if not at.proved:
+        return NotProved("a Taylor step at the orbit has no enclosure")
+    residual, jacobian = shooting.system_rows(at, Ball(x))
+    inverse = shooting.nearly_inverse(jacobian.middle)
+    if inverse is None:
+        return NotProved("the equations are singular there")
+    if precise:
+        finer = precise_residual(shooting, x)
+        if finer is None:
+            return NotProved("the equations have no enclosure with more digits than doubles have")
+        residual = finer
+    return Centre(shooting, x, inverse, residual, precise)
+
+
+def newton(
+    shooting: Shooting, x: np.ndarray, steps: int, precise: bool = False
+) -> Centre | NotProved:
+    """A point nearer to the zero, by steps that are taken until they no longer become shorter by
+    half.
+    """
+    last = np.inf
+    for step in range(steps + 1):
+        centre = centre_at(shooting, x, precise)
+        if isinstance(centre, NotProved):
+            return centre
+        change = centre.inverse @ centre.residual.middle
+        length = float((np.abs(change) / np.maximum(shooting.scales, np.abs(x))).max())
+        shorter = length < 0.5 * last or length > SETTINGS.rough
+        if step == steps or not shorter or length < 0.1 * EPS:
+            break
+        x = x - change
+        last = length
+    return centre
+
+
 def prove_zero(
-    shooting: Shooting, settings: KrawczykSettings = SETTINGS, unique: bool = True
+    shooting: Shooting,
+    settings: KrawczykSettings = SETTINGS,
+    unique: bool = True,
+    precise: bool = False,
 ) -> ProvedZero | NotProved:
     """The tightest box around the zero near `shooting.x0` in which Krawczyk's operator proves it.
 
-    Unless `unique`, no wider box is looked for in which it is alone.
+    Unless `unique`, no wider box is looked for in which it is alone. With `precise`, the residual
+    is computed with more digits where doubles are not enough, if FLINT is there.
     """
-    near = _newton(shooting, settings.newton)
-    if isinstance(near, NotProved):
-        return near
-    x, inverse, residual = near
-    y = product(Ball(inverse), residual.column).magnitude[:, 0]
-    condition = float(natural_weights(shooting, inverse).max())
-    floor = settings.least_radius * np.maximum(shooting.scales, np.abs(x))
-    radius = 2.0 * y + floor
+    centre = newton(shooting, shooting.x0, settings.newton)
+    if isinstance(centre, NotProved):
+        return centre
+    zero = _proved_around(centre, settings, unique)
+    if not isinstance(zero, NotProved) or not precise or not _needs_digits(centre, settings):
+        return zero
+    if not has_flint():
+        return NotProved(f"{zero.reason}; more digits may prove it: {EXTRA}")
+    centre = newton(shooting, centre.x, settings.newton, precise=True)
+    if isinstance(centre, NotProved):
+        return centre
+    return _proved_around(centre, settings, unique)
+
+
+def _needs_digits(centre: Centre, settings: KrawczykSettings) -> bool:
+    """Whether the rounding of the residual is what keeps the operator from contracting."""
+    scales = np.maximum(centre.shooting.scales, np.abs(centre.x))
+    rounded = float((centre.step / scales).max()) > settings.rounded
+    return rounded and float(centre.weights.max()) < settings.singular
+
+
+def _proved_around(
+    centre: Centre, settings: KrawczykSettings, unique: bool
+) -> ProvedZero | NotProved:
+    x = centre.x
+    condition = float(centre.weights.max())
+    floor = settings.least_radius * np.maximum(centre.shooting.scales, np.abs(x))
+    radius = 2.0 * centre.step + floor
     reason = ""
     for _ in range(settings.boxes):
-        enclosure = shooting.enclose(Ball(x, radius))
-        if not enclosure.proved:
+        image = centre.image(radius)
+        if image is None:
             return NotProved("a Taylor step over the box of the unknowns has no enclosure")
-        jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
-        reach = contraction(inverse, residual, jacobian, radius)
+        reach, enclosure = image
         if (reach < settings.sure * radius).all():
-            first = (radius, enclosure)
-            tight, inner = _tightened(shooting, x, inverse, residual, first, reach)
-            alone = radius
-            if unique:
-                alone = _widest(shooting, x, inverse, residual, radius, settings)
-            return ProvedZero(x, tight, inverse, residual, inner, alone, condition)
+            tight, inner = _tightened(centre, (radius, enclosure), reach)
+            alone = _widest(centre, radius, settings) if unique else radius
+            return centre.zero(tight, inner, alone)
         share = float((reach / radius).max())
         reason = (
             f"Krawczyk's operator does not contract: its image is {share:.3g} times as wide as the "
@@ -127,111 +252,66 @@ def prove_zero(
 
 
 def _tightened(
-    shooting: Shooting,
-    x: np.ndarray,
-    inverse: np.ndarray,
-    residual: Ball,
-    proved: tuple[np.ndarray, Enclosure],
-    reach: np.ndarray,
+    centre: Centre, proved: tuple[np.ndarray, Enclosure], reach: np.ndarray
 ) -> tuple[np.ndarray, Enclosure]:
     """A smaller box that the operator maps into its interior too, with the equations over it; from
     a box that is `proved`, and its image, as long as images shrink to half.
     """
+    scales = centre.shooting.scales
     while True:
         radius = np.minimum(proved[0], SETTINGS.room * reach)
-        enclosure = shooting.enclose(Ball(x, radius))
-        jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
-        reach = contraction(inverse, residual, jacobian, radius)
-        if not enclosure.proved or not (reach < radius).all():
+        image = centre.image(radius)
+        if image is None or not (image[0] < radius).all():
             return proved
-        if (reach / shooting.scales).sum() >= 0.5 * (radius / shooting.scales).sum():
-            return radius, enclosure
-        proved = (radius, enclosure)
+        reach = image[0]
+        proved = (radius, image[1])
+        if (reach / scales).sum() >= 0.5 * (radius / scales).sum():
+            return proved
 
 
 def verified_zero(
-    shooting: Shooting, middle: np.ndarray, radius: np.ndarray, unique: np.ndarray
+    shooting: Shooting,
+    middle: np.ndarray,
+    radius: np.ndarray,
+    unique: np.ndarray,
+    precise: bool = False,
 ) -> ProvedZero | NotProved:
     """A zero that is said to lie within `radius` of a middle, and to be alone within `unique`:
-    verified anew by the operator, without a search.
+    verified anew by the operator, without a search; by FLINT if it is to be `precise`.
     """
     if not middle.shape == radius.shape == unique.shape == (shooting.size,):
         return NotProved("its unknowns are not those of the equations")
     if not (radius <= unique).all():
         return NotProved("its box is wider than the one in which it is alone")
-    at = shooting.enclose(Ball(middle))
-    residual, jacobian = shooting.system_rows(at, Ball(middle))
-    inverse = shooting.nearly_inverse(jacobian.middle)
-    if not at.proved or inverse is None:
-        return NotProved("the equations have no enclosure there, or are singular")
+    if precise and not has_flint():
+        return NotProved(f"it was proved with more digits: {EXTRA}")
+    centre = centre_at(shooting, middle, precise)
+    if isinstance(centre, NotProved):
+        return centre
     for box in (unique, radius):
-        enclosure = shooting.enclose(Ball(middle, box))
-        jacobian = shooting.system_rows(enclosure, Ball(middle, box))[1]
-        reach = contraction(inverse, residual, jacobian, box)
-        if not enclosure.proved or not (reach < box).all():
+        image = centre.image(box)
+        if image is None or not (image[0] < box).all():
             return NotProved("Krawczyk's operator does not map its box into the interior")
-    condition = float(natural_weights(shooting, inverse).max())
-    return ProvedZero(middle, radius, inverse, residual, enclosure, unique, condition)
+        enclosure = image[1]
+    return centre.zero(radius, enclosure, unique)
 
 
-def _newton(shooting: Shooting, steps: int) -> tuple[np.ndarray, np.ndarray, Ball] | NotProved:
-    """A point nearer to the zero, the inverse of the Jacobian and the ball of F there.
-
-    Steps are taken until they no longer become shorter by half.
-    """
-    x = shooting.x0.copy()
-    last = np.inf
-    for step in range(steps + 1):
-        enclosure = shooting.enclose(Ball(x))
-        residual, jacobian = shooting.system_rows(enclosure, Ball(x))
-        if not enclosure.proved or not np.isfinite(jacobian.middle).all():
-            return NotProved("a Taylor step at the orbit has no enclosure")
-        nearly = shooting.nearly_inverse(jacobian.middle)
-        if nearly is None:
-            return NotProved("the equations are singular there")
-        inverse = nearly
-        change = inverse @ residual.middle
-        length = float((np.abs(change) / np.maximum(shooting.scales, np.abs(x))).max())
-        shorter = length < 0.5 * last or length > SETTINGS.rough
-        if step == steps or not shorter or length < 0.1 * EPS:
-            break
-        x = x - change
-        last = length
-    return x, inverse, residual
-
-
-def natural_weights(shooting: Shooting, inverse: np.ndarray) -> np.ndarray:
-    """How far the unknowns move, in natural scales, where every equation is off by its natural
-    scale: row sums of the inverse Jacobian that depend on no units.
-    """
-    return np.asarray(np.abs(inverse) @ shooting.row_scales / shooting.scales)
-
-
-def _widest(
-    shooting: Shooting,
-    x: np.ndarray,
-    inverse: np.ndarray,
-    residual: Ball,
-    proved: np.ndarray,
-    settings: KrawczykSettings,
-) -> np.ndarray:
+def _widest(centre: Centre, proved: np.ndarray, settings: KrawczykSettings) -> np.ndarray:
     """Radii, nearly the largest ones, in which the operator proves that there is no other zero."""
-    weights = natural_weights(shooting, inverse)
+    weights = centre.weights
     scale = min(1e-3, 1e-2 / float(weights.max()))
-    weights = shooting.scales * np.maximum(weights / weights.max(), 1e-3)
+    weights = centre.shooting.scales * np.maximum(weights / weights.max(), 1e-3)
     best = proved
     found = False
     for attempt in range(settings.wide_boxes):
         radius = np.maximum(scale * weights, proved)
-        enclosure = shooting.enclose(Ball(x, radius))
-        if not enclosure.proved:
+        image = centre.image(radius)
+        if image is None:
             if found:
                 break
             scale *= 0.3
             continue
-        jacobian = shooting.system_rows(enclosure, Ball(x, radius))[1]
-        reach = contraction(inverse, residual, jacobian, radius)
-        worst = float((reach / radius).max())
+        worst = float((image[0] / radius).max())
         if worst < settings.sure:
             best = radius
             found = True

@@ -307,12 +307,12 @@ class Shooting:
         leaf = None if self.path_place is None else Expr("parameter", (), self.path_place)
         leaves = [self.unknowns[j] for j in range(self.event_size)]
         made: dict[Any, _Group] = {}
-        self._groups: list[_Group] = []
+        self.groups: list[_Group] = []
         for segment in self.segments:
             key = (segment.acceleration, segment.start, segment.end)
             if key not in made:
                 made[key] = _Group(segment, leaves, leaf)
-            self._groups.append(made[key])
+            self.groups.append(made[key])
         self._distinct = list(made.values())
         self._layout(guess)
         enclosure = self.enclose(Ball(self.x0))
@@ -435,8 +435,8 @@ class Shooting:
         They grow with the number of steps; if they are `guessed`, each step starts from the middle
         of the last one alone, and they contain nothing.
         """
-        group = self._groups[i]
-        known = self._parameters_at(parameter)
+        group = self.groups[i]
+        known = self.parameters_at(parameter)
         known = _joined(known, event).reshape(1, -1)
         nothing = Ball(np.zeros((1, self.dof)))
         time = event[:1] if self.free_time else Ball(np.zeros(1))
@@ -453,7 +453,7 @@ class Shooting:
             result.append(state.transposed.reshape(width))
         return result
 
-    def _parameters_at(self, parameter: Ball | None) -> Ball:
+    def parameters_at(self, parameter: Ball | None) -> Ball:
         """The system's numbers, with another ball of the one at the path."""
         if parameter is None:
             return self.parameters
@@ -467,12 +467,12 @@ class Shooting:
         """F and its derivatives over a box of unknowns, and a ball of the parameter."""
         if self.pins is not None:
             parameter = x[-1]
-        known = self._parameters_at(parameter)
+        known = self.parameters_at(parameter)
         rows = 2 * self.dof * len(self.steps)
         columns = self.size - (self.pins is not None)
         result = Enclosure(rows, columns, self.event_size, len(self.steps))
         for group in self._distinct:
-            places = [k for k, s in enumerate(self.steps) if self._groups[s.segment] is group]
+            places = [k for k, s in enumerate(self.steps) if self.groups[s.segment] is group]
             self._enclose_group(group, places, x, known, result)
         return result
 
@@ -672,11 +672,11 @@ class Shooting:
 
     def pierced(self, enclosure: Enclosure, x: Ball) -> float | None:
         """A time at which a gap is certainly negative, for all motions of a box; else None."""
-        known = self._parameters_at(x[-1] if self.pins is not None else None)[None]
+        known = self.parameters_at(x[-1] if self.pins is not None else None)[None]
         time = Ball(np.zeros(1))
         nothing = Ball(np.zeros((1, self.dof)))
         for k, step in enumerate(self.steps):
-            tape = self._groups[step.segment].positions
+            tape = self.groups[step.segment].positions
             positions = tape.values(known, time, nothing, nothing)[0]
             length = enclosure.lengths[k]
             begin = x[step.begin] if step.from_event else Ball(step.begin_time)
@@ -695,12 +695,12 @@ class Shooting:
         """Whether every gap is open inside every step, for all motions of a box."""
         if self.pins is not None:
             parameter = x[-1]
-        known = self._parameters_at(parameter)[None]
+        known = self.parameters_at(parameter)[None]
         time = Ball(np.zeros(1))
         nothing = Ball(np.zeros((1, self.dof)))
         for k, step in enumerate(self.steps):
             segment = self.segments[step.segment]
-            tape = self._groups[step.segment].positions
+            tape = self.groups[step.segment].positions
             positions = tape.values(known, time, nothing, nothing)[0]
             for at, gap in enumerate(segment.gaps):
                 coefficients = enclosure.coefficients[k][gap.coordinate]

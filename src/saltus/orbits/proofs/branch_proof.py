@@ -12,22 +12,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.bounds import (
-    ArcBox,
     Ball,
     NotProved,
+    ProvedArc,
     Shooting,
     ShootingSettings,
-    arc_box,
+    Tube,
+    arc_along,
     multipliers_of,
     prove_zero,
     return_map,
     rounded_down,
     rounded_up,
+    verified_arc,
+    verified_zero,
 )
 from saltus.orbits.branches.branch import Branch
 from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.proofs.orbit_proof import ASSUMPTIONS, MIRROR, with_proof
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.proofs.orbit_proof import assumptions_of, of_radii, shooting_of, with_proof
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments, least_speed
 from saltus.orbits.proofs.special_proof import MEANINGS, prove_special
 from saltus.progress import Progress, silent
 from saltus.result import Result
@@ -59,13 +62,25 @@ SETTINGS = BranchProofSettings()
 
 @dataclass(frozen=True)
 class ProvedBox:
-    """One box of a piece: its parameters, whether its orbits are stable, and how they turn."""
+    """One box of a piece: its parameters, whether its orbits are stable, and how they turn.
+
+    `tube` is the box itself, and `start` encloses the orbit with which it begins, in the unknowns of
+    the piece's nodes of number `nodes`.
+    """
 
     low: float
     high: float
     stable: bool | None
     turn: int
     least_speed: float
+    tube: Tube = field(repr=False)
+    start: Ball = field(repr=False)
+    nodes: int = field(repr=False)
+
+    @property
+    def told(self) -> tuple[float, float, bool | None, int, float]:
+        """What is said of its orbits."""
+        return self.low, self.high, self.stable, self.turn, self.least_speed
 
 
 @dataclass(frozen=True)
@@ -73,12 +88,14 @@ class ProvedPiece:
     """A connected curve of orbits of one signature, each alone in its box and with open contacts.
 
     `ends` are the numbers of the first and of the last point of the branch that lie on it; `reason`
-    says why it ends before the last point that it was asked for.
+    says why it ends before the last point that it was asked for. `guesses` are the events and the
+    parameters from which nodes were set.
     """
 
     ends: tuple[int, int]
     boxes: tuple[ProvedBox, ...]
     reason: str
+    guesses: tuple[tuple[np.ndarray, float], ...] = field(repr=False)
 
     @property
     def turns(self) -> list[int]:
@@ -109,6 +126,8 @@ class BranchProof(Result):
         The processor time.
     branch
         The branch; its special points have their proofs in `evidence.proof`.
+    radii
+        How far numbers of the system may lie from their doubles.
 
     Examples
     --------
@@ -124,6 +143,8 @@ class BranchProof(Result):
     assumptions: tuple[str, ...]
     seconds: float
     branch: Branch = field(repr=False)
+    radii: dict[str, float] = field(default_factory=dict, repr=False)
+    steps: ShootingSettings | None = field(default=None, repr=False)
 
     @property
     def proved_special(self) -> int:
@@ -156,6 +177,7 @@ class BranchProof(Result):
             told.append(
                 f"{self.proved_special} of {len(self.branch.special)} special points are proved."
             )
+        told += of_radii(self.radii)
         told += [f"Not proved: {reason}." for reason in self.reasons]
         return " ".join(told) or "Nothing is proved."
 
@@ -183,6 +205,28 @@ class BranchProof(Result):
             "assumptions": "; ".join(self.assumptions),
         }
         return with_proof(self.branch.to_xarray(), "branch_proof", columns, facts)
+
+    def check(self) -> bool:
+        """Whether all that the proof says of its pieces and special points holds when it is computed
+        anew, from the branch and the boxes of the pieces, without a search. The `reasons` say what
+        was not proved, and are not looked at.
+        """
+        points = self.branch.points
+        orbit = points[0].orbit
+        lies = np.zeros(len(points), dtype=bool)
+        for piece in self.pieces:
+            lies[piece.ends[0] : piece.ends[1] + 1] = True
+        proofs = [point.evidence.proof for point in self.branch.special]
+        return bool(
+            self.path == orbit.equations.paths[0]
+            and self.assumptions == assumptions_of(any(p.orbit.symmetric for p in points))
+            and np.array_equal(self.proved, lies)
+            and all(proof.check() for proof in proofs if proof is not None and proof.proved)
+            and all(
+                _Walk(self.branch, *piece.ends, self.path, self.radii, self.steps).confirms(piece)
+                for piece in self.pieces
+            )
+        )
 
 
 def _of_piece(piece: ProvedPiece, path: str) -> str:
@@ -239,15 +283,16 @@ def prove_branch(
         proved[walked.ends[0] : walked.ends[1] + 1] = True
         if walked.reason:
             reasons.append(f"from point {walked.ends[1]} on: {walked.reason}")
-    symmetric = any(point.orbit.symmetric for point in points)
     return BranchProof(
         pieces=tuple(pieces),
         proved=proved,
         path=path,
         reasons=tuple(reasons),
-        assumptions=(*ASSUMPTIONS, *((MIRROR,) * symmetric)),
+        assumptions=assumptions_of(any(point.orbit.symmetric for point in points)),
         seconds=time.process_time() - began,
         branch=replace(branch, special=special),
+        radii=dict(radii or {}),
+        steps=steps,
     )
 
 
@@ -285,6 +330,7 @@ class _Walk:
         self.radii = radii
         self.steps = steps
         self.boxes: list[ProvedBox] = []
+        self.guesses: list[tuple[np.ndarray, float]] = []
 
     def walk(self, most_boxes: int) -> ProvedPiece | str:
         """The piece, or why there is none."""
@@ -292,9 +338,10 @@ class _Walk:
         made = orbit.equations.segments_to_prove(orbit.solution)
         if isinstance(made, CannotProve):
             return made.reason
-        self.made = made
-        shooting = self._laid_out(made, orbit.solution.values[0])
-        start = self._pinned_zero(shooting, shooting.x0, _unit(shooting.size))
+        if made.rests:
+            return "orbits that rest are proved one by one, not yet along a branch"
+        shooting = self._laid_out(made, made.guess, float(orbit.solution.values[0]))
+        start = self._start(shooting, shooting.x0, None)
         if start is None:
             return "its first orbit is not proved"
         reached = self.first
@@ -305,56 +352,91 @@ class _Walk:
             if len(self.boxes) >= most_boxes:
                 reason = f"{most_boxes} boxes were used up"
                 break
-            box = self._next(shooting, start, row, tangent, half)
-            if box is None or (box.turn == 0 and half > SETTINGS.sign):
+            longer = half * (1.0 + SETTINGS.overlap)
+            arc = arc_along(shooting, start.middle + tangent * half, row, longer)
+            box = None if arc is None else self._judged(shooting, made, arc, start)
+            if arc is None or box is None or (box.turn == 0 and half > SETTINGS.sign):
                 half *= 0.5
                 if half < SETTINGS.least:
                     reason = "a box shrinks to nothing, as beside a grazing or another branch"
                     break
                 continue
-            self.boxes.append(self._told(shooting, box))
-            reached = self._passed(shooting, box, reached)
-            end = self._pinned_zero(shooting, box.at(box.half * (1.0 - SETTINGS.overlap)), box.row)
-            if end is None or not box.holds(end):
+            self.boxes.append(box)
+            tube = box.tube
+            reached = self._passed(shooting, tube, reached)
+            end = self._start(shooting, tube.at(tube.half * (1.0 - SETTINGS.overlap)), tube)
+            if end is None or not tube.holds(end):
                 reason = "a box's end has no enclosure inside it"
                 break
             start = end
-            forward = box.row
             half *= SETTINGS.longer
-            if self._uneven(box):
-                following = self._set_anew(shooting, box, end)
-                if following is None:
+            if self._uneven(arc):
+                before = shooting
+                guess = end.middle[: before.event_unknowns].reshape(-1, before.event_size)
+                shooting = self._laid_out(made, guess, float(end.middle[-1]))
+                x = shooting.x0.copy()
+                x[-1] = end.middle[-1]
+                anew = self._start(shooting, x, tube)
+                if anew is None or not tube.holds(_with_nodes_of(before, anew)):
                     reason = "boxes with other nodes could not be glued"
                     break
-                shooting, start, forward = following
-            row, tangent = _along(shooting, start.middle, forward)
+                start = anew
+            row, tangent = _along(shooting, start.middle, _row_of(tube, shooting))
         if not self.boxes:
             return reason
-        return ProvedPiece((self.first, reached), tuple(self.boxes), reason)
+        ends = (self.first, reached)
+        return ProvedPiece(ends, tuple(self.boxes), reason, tuple(self.guesses))
 
-    def _laid_out(self, made: OrbitSegments, parameter: float) -> Shooting:
-        """The equations with nodes that fit an orbit at a parameter."""
+    def confirms(self, piece: ProvedPiece) -> bool:
+        """Whether a piece holds when it is computed anew, from its boxes, without a search."""
         orbit = self.points[self.first].orbit
-        equations = orbit.equations
-        values = np.array([parameter])
-        system = equations.system_at(values)
-        return Shooting(
-            system,
-            made.segments,
-            made.guess,
-            made.event_names,
-            made.state_names,
-            orbit.signature.span,
+        made = orbit.equations.segments_to_prove(orbit.solution)
+        if isinstance(made, CannotProve) or made.rests or not piece.boxes:
+            return False
+        reached = self.first
+        before: tuple[Tube, Shooting] | None = None
+        shooting: Shooting | None = None
+        for box in piece.boxes:
+            if shooting is None or box.nodes != len(self.guesses) - 1:
+                if len(self.guesses) == len(piece.guesses):
+                    return False
+                shooting = self._laid_out(made, *piece.guesses[len(self.guesses)])
+            size = (shooting.size,)
+            if box.nodes != len(self.guesses) - 1 or box.tube.middle.shape != size:
+                return False
+            shooting.pins = [_pin(box.start.middle, before and before[0], shooting)]
+            start = verified_zero(shooting, box.start.middle, box.start.radius, box.start.radius)
+            arc = verified_arc(shooting, box.tube)
+            if isinstance(start, NotProved) or arc is None:
+                return False
+            again = self._judged(shooting, made, arc, box.start)
+            if again is None or again.told != box.told:
+                return False
+            if before is not None:
+                same = before[1] is shooting
+                shared = box.start if same else _with_nodes_of(before[1], box.start)
+                if not before[0].holds(shared):
+                    return False
+            before = box.tube, shooting
+            reached = self._passed(shooting, box.tube, reached)
+        return reached == self.last and len(piece.guesses) == len(self.guesses)
+
+    def _laid_out(self, made: OrbitSegments, guess: np.ndarray, parameter: float) -> Shooting:
+        """The equations with nodes that fit an orbit at a parameter."""
+        self.guesses.append((guess, parameter))
+        return shooting_of(
+            self.points[self.first].orbit,
+            replace(made, guess=guess),
+            values=np.array([parameter]),
             path=self.path,
             radii=self.radii,
             pins=[],
-            free_time=made.free_time,
             settings=self.steps,
         )
 
-    def _pinned_zero(self, shooting: Shooting, x: np.ndarray, row: np.ndarray) -> Ball | None:
-        """The enclosure of the zero near x on its hyperplane."""
-        shooting.pins = [(row, float(row @ x))]
+    def _start(self, shooting: Shooting, x: np.ndarray, before: Tube | None) -> Ball | None:
+        """The enclosure of the zero near x with which a box begins, behind another one."""
+        shooting.pins = [_pin(x, before, shooting)]
         shooting.x0 = x
         zero = prove_zero(shooting, unique=False)
         return None if isinstance(zero, NotProved) else zero.box
@@ -369,93 +451,95 @@ class _Walk:
             return row
         return np.asarray(row * np.sign(there - here))
 
-    def _next(
-        self, shooting: Shooting, start: Ball, row: np.ndarray, tangent: np.ndarray, half: float
-    ) -> ArcBox | None:
-        """The box that begins at an enclosed zero, with open contacts and impacts with a speed."""
-        box = arc_box(shooting, start.middle + tangent * half, row, half * (1.0 + SETTINGS.overlap))
-        if box is None or not box.holds(start) or not self._speeds(shooting, box) > 0.0:
+    def _judged(
+        self, shooting: Shooting, made: OrbitSegments, arc: ProvedArc, start: Ball
+    ) -> ProvedBox | None:
+        """The box that begins at an enclosed zero, if its contacts are open and all of its impacts
+        have a speed.
+        """
+        hull = arc.tube.hull
+        slowest = least_speed(shooting, hull, made)
+        if not (arc.tube.holds(start) and slowest > 0.0):
             return None
-        return box if shooting.is_open(box.enclosure, box.hull) else None
-
-    def _speeds(self, shooting: Shooting, box: ArcBox) -> float:
-        """A lower bound of the speeds of all impacts in a box; inf without impacts."""
-        if not shooting.free_time:
-            return np.inf
-        events = box.hull[: shooting.event_unknowns].reshape(-1, shooting.event_size)
-        return float(events[:, 1].low.min())
-
-    def _told(self, shooting: Shooting, box: ArcBox) -> ProvedBox:
-        multipliers = multipliers_of(return_map(shooting, box.enclosure))
-        parameter = box.hull[-1]
+        if not shooting.is_open(arc.enclosure, hull):
+            return None
+        parameter = hull[-1]
         return ProvedBox(
             low=float(parameter.low),
             high=float(parameter.high),
-            stable=multipliers.stable,
-            turn=box.turn,
-            least_speed=self._speeds(shooting, box),
+            stable=multipliers_of(return_map(shooting, arc.enclosure)).stable,
+            turn=arc.turn,
+            least_speed=slowest,
+            tube=arc.tube,
+            start=start,
+            nodes=len(self.guesses) - 1,
         )
 
-    def _passed(self, shooting: Shooting, box: ArcBox, reached: int) -> int:
+    def _passed(self, shooting: Shooting, tube: Tube, reached: int) -> int:
         """The last point of the branch whose events lie in a box."""
         count = shooting.event_unknowns
+        columns = [*range(count), -1]
         while reached < self.last:
             point = self.points[reached + 1]
             made = point.orbit.equations.segments_to_prove(point.solution)
             if isinstance(made, CannotProve):
                 return reached
             place = np.append(made.guess.ravel(), point.solution.values[0])
-            columns = [*range(count), -1]
-            distance = place - box.middle[columns]
-            s = float(box.row[columns] @ distance)
-            if s > box.half:
+            distance = place - tube.middle[columns]
+            s = float(tube.row[columns] @ distance)
+            if s > tube.half:
                 return reached
-            off = np.abs(distance - box.tangent[columns] * s)
-            if s < -box.half or not (off < box.radius[columns]).all():
+            off = np.abs(distance - tube.tangent[columns] * s)
+            if s < -tube.half or not (off < tube.radius[columns]).all():
                 return reached
             reached += 1
         return reached
 
-    def _uneven(self, box: ArcBox) -> bool:
+    def _uneven(self, arc: ProvedArc) -> bool:
         """Whether nodes no longer fit."""
-        lengths = np.array([float(h.middle) for h in box.enclosure.lengths])
+        lengths = np.array([float(h.middle) for h in arc.enclosure.lengths])
         return bool(
             lengths.min() < SETTINGS.short * lengths.max()
             or lengths.max() > SETTINGS.long * np.median(lengths)
         )
 
-    def _set_anew(
-        self, shooting: Shooting, box: ArcBox, end: Ball
-    ) -> tuple[Shooting, Ball, np.ndarray] | None:
-        """The equations with new nodes, the zero at a box's end, and the direction, if the states
-        at the old nodes lie in the box."""
-        count = shooting.event_unknowns
-        guess = end.middle[:count].reshape(-1, shooting.event_size)
-        other = self._laid_out(replace(self.made, guess=guess), float(end.middle[-1]))
-        row = np.zeros(other.size)
-        row[:count] = box.row[:count]
-        row[-1] = box.row[-1]
-        x = other.x0.copy()
-        x[-1] = end.middle[-1]
-        now = self._pinned_zero(other, x, row)
-        if now is None:
-            return None
-        found = [now[:count], *_old_nodes(shooting, now, count), now[-1:]]
-        whole = Ball(
-            np.concatenate([part.middle for part in found]),
-            np.concatenate([part.radius for part in found]),
-        )
-        return (other, now, row) if box.holds(whole) else None
 
-
-def _old_nodes(shooting: Shooting, zero: Ball, count: int) -> Iterator[Ball]:
-    """Balls of the states at a shooting's nodes, from the events of an enclosed zero."""
+def _with_nodes_of(shooting: Shooting, zero: Ball) -> Ball:
+    """An enclosed zero with the states at the nodes of other equations, which follow from its
+    events.
+    """
+    count = shooting.event_unknowns
     size = shooting.event_size
+    parts = [zero[:count]]
     for i in range(shooting.event_count):
         nodes = [
             step.begin_time for step in shooting.steps if step.segment == i and not step.from_event
         ]
-        yield from shooting.follow(i, zero[size * i : size * (i + 1)], nodes, zero[-1])
+        parts += shooting.follow(i, zero[size * i : size * (i + 1)], nodes, zero[-1])
+    parts.append(zero[-1:])
+    return Ball(
+        np.concatenate([part.middle for part in parts]),
+        np.concatenate([part.radius for part in parts]),
+    )
+
+
+def _pin(x: np.ndarray, before: Tube | None, shooting: Shooting) -> tuple[np.ndarray, float]:
+    """The hyperplane through x on which a box's first zero lies: the parameter's, or that of the
+    tube before.
+    """
+    row = _unit(shooting.size) if before is None else _row_of(before, shooting)
+    return row, float(row @ x)
+
+
+def _row_of(tube: Tube, shooting: Shooting) -> np.ndarray:
+    """The row of a tube, which is one of events and the parameter, for equations with other
+    nodes.
+    """
+    count = shooting.event_unknowns
+    row = np.zeros(shooting.size)
+    row[:count] = tube.row[:count]
+    row[-1] = tube.row[-1]
+    return row
 
 
 def _unit(size: int) -> np.ndarray:

@@ -16,19 +16,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.bounds import UP, Segment
+from saltus.bounds import UP, Segment, Step
 from saltus.errors import ParameterError
 from saltus.systems import numbers
 from saltus.taylor import Expr, ordered
 
 if TYPE_CHECKING:
+    from saltus.orbits.orbit import PeriodicOrbit
     from saltus.orbits.proofs.orbit_proof import OrbitProof
+    from saltus.orbits.proofs.special_proof import SpecialProof
 
 FORMAT = "saltus proof 2"
 LEAVES = ("parameter", "coordinate", "velocity")
 REST_ROOTS = ("pull", "held_pull", "held_rate", "speed_after", "restitution", "position", "rate")
 # The time is a matter of the machine, and the others are computed anew or by their own means.
-NOT_COMPARED = ("seconds", "orbit", "radii", "made", "shooting", "zero", "moduli")
+NOT_COMPARED = ("seconds", "orbit", "special", "radii", "made", "shooting", "zero", "moduli")
 ROOM = 1.01  # by which balls of moduli are told wider, so that other machines verify them too
 WIDER = 1.1  # the most that the ball of a modulus may exceed the computed one
 
@@ -41,6 +43,47 @@ def certificate_of(proof: OrbitProof) -> dict[str, Any]:
     ParameterError
         Nothing is proved.
     """
+    made = proof.made
+    rests = zip(() if made is None else made.rests, proof.rests_by, strict=True)
+    return _of_zero(proof, proof.orbit) | {
+        "stable": proof.stable,
+        "moduli": [_hex(modulus) for modulus in proof.moduli],
+        "least_speed": float(proof.least_speed).hex(),
+        "releases": [] if made is None else [int(i) for i in made.releases],
+        "rests": [
+            {
+                "last": rest.last,
+                "release": rest.release,
+                "over": float(over).hex(),
+                "roots": _tape([getattr(rest, name) for name in REST_ROOTS]),
+            }
+            for rest, over in rests
+        ],
+    }
+
+
+def special_certificate_of(proof: SpecialProof) -> dict[str, Any]:
+    """The certificate; `SpecialProof.certificate` says what it is.
+
+    Raises
+    ------
+    ParameterError
+        Nothing is proved.
+    """
+    result = _of_zero(proof, proof.special.orbit)
+    assert proof.shooting is not None
+    return result | {
+        "kind": proof.kind,
+        "path": proof.shooting.path_place,
+        "pins": [
+            {"row": _hex(row), "goal": float(goal).hex()} for row, goal in proof.shooting.pins or []
+        ],
+        "only": {name: float(radius).hex() for name, radius in proof.only_within.items()},
+    }
+
+
+def _of_zero(proof: OrbitProof | SpecialProof, orbit: PeriodicOrbit) -> dict[str, Any]:
+    """The equations of a proof, and the boxes of their zero."""
     shooting = proof.shooting
     zero = proof.zero
     if not proof.proved or shooting is None or zero is None:
@@ -49,7 +92,7 @@ def certificate_of(proof: OrbitProof) -> dict[str, Any]:
         "format": FORMAT,
         "statement": proof.statement,
         "assumptions": list(proof.assumptions),
-        "system": proof.orbit.system.to_json(),
+        "system": orbit.system.to_json(),
         "parameters": {
             "names": [name for name, _ in numbers(shooting.system)],
             "middle": _hex(shooting.parameters.middle),
@@ -63,37 +106,23 @@ def certificate_of(proof: OrbitProof) -> dict[str, Any]:
         "event_size": shooting.event_size,
         "free_time": shooting.free_time,
         "segments": [_segment(segment) for segment in shooting.segments],
-        "steps": [
-            {
-                "segment": step.segment,
-                "begin": step.begin,
-                "from_event": step.from_event,
-                "begin_time": None if step.from_event else float(step.begin_time).hex(),
-                "close": step.close,
-                "to_event": step.to_event,
-                "close_time": None if step.to_event else float(step.close_time).hex(),
-                "wraps": step.wraps,
-            }
-            for step in shooting.steps
-        ],
+        "steps": [_step(step) for step in shooting.steps],
         "middle": _hex(zero.middle),
         "radius": _hex(zero.radius),
         "unique": _hex(zero.unique),
-        "stable": proof.stable,
-        "moduli": [_hex(modulus) for modulus in proof.moduli],
-        "least_speed": float(proof.least_speed).hex(),
-        "releases": [] if proof.made is None else [int(i) for i in proof.made.releases],
-        "rests": [
-            {
-                "last": rest.last,
-                "release": rest.release,
-                "over": float(over).hex(),
-                "roots": _tape([getattr(rest, name) for name in REST_ROOTS]),
-            }
-            for rest, over in zip(
-                () if proof.made is None else proof.made.rests, proof.rests_by, strict=True
-            )
-        ],
+    }
+
+
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "segment": step.segment,
+        "begin": step.begin,
+        "from_event": step.from_event,
+        "begin_time": None if step.from_event else float(step.begin_time).hex(),
+        "close": step.close,
+        "to_event": step.to_event,
+        "close_time": None if step.to_event else float(step.close_time).hex(),
+        "wraps": step.wraps,
     }
 
 
@@ -133,7 +162,7 @@ def _hex(values: np.ndarray) -> list[str]:
     return [float(value).hex() for value in values]
 
 
-def differences(proof: OrbitProof, again: OrbitProof) -> list[str]:
+def differences(proof: OrbitProof | SpecialProof, again: OrbitProof | SpecialProof) -> list[str]:
     """What a proof or its certificate says that does not follow, or not in this form, from the same
     proof computed anew: the names of fields and of entries; empty where all of it does.
     """
@@ -143,14 +172,16 @@ def differences(proof: OrbitProof, again: OrbitProof) -> list[str]:
         if entry.name not in NOT_COMPARED
         and not np.array_equal(getattr(proof, entry.name), getattr(again, entry.name))
     ]
-    if not _follow(proof.moduli, again.moduli):
-        differing.append("moduli")
+    moduli = getattr(proof, "moduli", None)
+    if moduli is not None:
+        if not _follow(moduli, again.moduli):
+            differing.append("moduli")
+        # Words and numbers of moduli are those of the proof, where these follow.
+        again = replace(again, moduli=moduli)
     if differing or not again.proved:
         return differing
-    # Words and numbers of moduli are those of the proof, where these follow.
-    again = replace(again, moduli=proof.moduli)
-    computed = certificate_of(again)
-    for certificate in (proof.certificate, certificate_of(proof)):
+    computed = again.certificate
+    for certificate in (proof.certificate, replace(proof).certificate):
         names = [*computed, *certificate]
         differing += [name for name in names if certificate.get(name) != computed.get(name)]
     return list(dict.fromkeys(differing))

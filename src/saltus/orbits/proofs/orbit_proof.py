@@ -50,6 +50,13 @@ ASSUMPTIONS = (
     "the traced graph is the model, with its literal numbers as doubles",
 )
 MIRROR = "the system has the mirror symmetry that its model states"
+FLINT = "the balls of FLINT contain what they stand for"
+
+
+def assumptions_of(symmetric: bool, zero: ProvedZero | None = None) -> tuple[str, ...]:
+    """What is taken for granted of an orbit, symmetric or not, and of its zero."""
+    precise = zero is not None and zero.precise
+    return (*ASSUMPTIONS, *((MIRROR,) * symmetric), *((FLINT,) * precise))
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,8 @@ class ProofSettings:
     # ... but within these limits; its own equations are solved within the first of them.
     least: float = 1e-11
     most: float = 1e-7
+    # What no orbit in doubles can do without: a few roundings of its equations, times the condition.
+    rounded: float = 1e-15
 
 
 SETTINGS = ProofSettings()
@@ -164,12 +173,8 @@ class OrbitProof(Result):
             *self._rests_in_words(),
             _of_stability(self.stable, self.moduli),
         ]
-        if self.radii:
-            radii = ", ".join(
-                f"{name} within {rounded_down(radius)}" for name, radius in self.radii.items()
-            )
-            told.append(f"This holds for every {radii} of its double.")
-        return " ".join(part for part in told if part)
+        told += of_radii(self.radii)
+        return " ".join(told)
 
     def _rests_in_words(self) -> list[str]:
         """A sentence for each rest."""
@@ -229,7 +234,7 @@ def prove_orbit(
     if isinstance(made, CannotProve):
         return _without_zero(orbit, made.reason, began)
     shooting = shooting_of(orbit, made, radii=radii, settings=steps)
-    zero = prove_zero(shooting)
+    zero = prove_zero(shooting, precise=True)
     if isinstance(zero, NotProved):
         return _without_zero(orbit, zero.reason, began, shooting)
     return theorem_of(orbit, made, shooting, zero, dict(radii or {}), began)
@@ -274,7 +279,7 @@ def theorem_of(
         least_speed=least,
         stable=multipliers.stable,
         moduli=np.array(multipliers.moduli).reshape(-1, 2) * (1.0, ROOM),
-        assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
+        assumptions=assumptions_of(orbit.symmetric, zero),
         steps=len(shooting.steps),
         seconds=time.process_time() - began,
         rests_by=np.array([end for end in rested if end is not None]),
@@ -302,17 +307,18 @@ def _again(proof: OrbitProof) -> OrbitProof | None:
     if isinstance(made, CannotProve):
         return None
     anew = shooting_of(proof.orbit, made, radii=proof.radii, settings=shooting.settings)
-    if not _have_same_nodes(anew, shooting):
+    if not took_nodes(anew, shooting):
         return None
-    anew.steps = shooting.steps
-    verified = verified_zero(anew, zero.middle, zero.radius, zero.unique)
+    verified = verified_zero(anew, zero.middle, zero.radius, zero.unique, zero.precise)
     if isinstance(verified, NotProved):
         return None
     return theorem_of(proof.orbit, made, anew, verified, proof.radii, 0.0)
 
 
-def _have_same_nodes(first: Shooting, second: Shooting) -> bool:
-    """Whether the steps of two equations are the same, but for roundings of the times of nodes."""
+def took_nodes(first: Shooting, second: Shooting) -> bool:
+    """Whether the steps of two equations are the same, but for roundings of the times of nodes; the
+    first then takes those of the second.
+    """
     untimed = [
         [replace(step, begin_time=0.0, close_time=0.0) for step in shooting.steps]
         for shooting in (first, second)
@@ -321,21 +327,26 @@ def _have_same_nodes(first: Shooting, second: Shooting) -> bool:
         np.array([(step.begin_time, step.close_time) for step in shooting.steps])
         for shooting in (first, second)
     )
-    return untimed[0] == untimed[1] and np.allclose(one, other, rtol=1e-9, equal_nan=True)
+    same = untimed[0] == untimed[1] and np.allclose(one, other, rtol=1e-9, equal_nan=True)
+    first.steps = second.steps if same else first.steps
+    return same
 
 
 def shooting_of(
     orbit: PeriodicOrbit,
     made: OrbitSegments,
     *,
+    values: np.ndarray | None = None,
     path: str | None = None,
     radii: dict[str, float] | None = None,
     pins: list[tuple[np.ndarray, float]] | None = None,
     settings: ShootingSettings | None = None,
 ) -> Shooting:
-    """The equations of the segments of an orbit, in balls."""
+    """The equations of the segments of an orbit, in balls, at other `values` of the branch's
+    parameters than its own, if they are given.
+    """
     return Shooting(
-        orbit.equations.system_at(orbit.solution.values),
+        orbit.equations.system_at(orbit.solution.values if values is None else values),
         made.segments,
         made.guess,
         made.event_names,
@@ -357,6 +368,7 @@ def _refutation(
     asked = made.guess.ravel()
     away = np.abs(asked - zero.middle[:count]) - 2.0 * zero.radius[:count]
     limit = np.clip(SETTINGS.solved * zero.condition, SETTINGS.least, SETTINGS.most)
+    limit = max(limit, SETTINGS.rounded * zero.condition)
     far = away / np.maximum(shooting.scales[:count], np.abs(asked))
     farthest = int(far.argmax())
     if far[farthest] > limit:
@@ -404,7 +416,7 @@ def _without_zero(
         least_speed=np.nan,
         stable=None,
         moduli=none,
-        assumptions=ASSUMPTIONS,
+        assumptions=assumptions_of(orbit.symmetric),
         steps=0 if shooting is None else len(shooting.steps),
         seconds=time.process_time() - began,
         rests_by=np.empty(0),
@@ -432,6 +444,12 @@ def _of_stability(stable: bool | None, moduli: np.ndarray) -> str:
         return f"{told}."
     sizes = ", ".join(rounded_ball(*modulus) for modulus in moduli)
     return f"{told}: its multipliers have the moduli {sizes} over the time its equations cover."
+
+
+def of_radii(radii: dict[str, float]) -> list[str]:
+    """For which systems a theorem holds, in words; nothing where it is one."""
+    told = ", ".join(f"{name} within {rounded_down(radius)}" for name, radius in radii.items())
+    return [f"This holds for every {told} of its double."] if radii else []
 
 
 def in_words(value: bool | None) -> str:

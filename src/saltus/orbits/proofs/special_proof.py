@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,16 +20,19 @@ from saltus.bounds import (
     prove_zero,
     rounded_ball,
     varied,
+    verified_zero,
 )
 from saltus.bounds import only_one as only_one_of
 from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.proofs.certificate import differences, special_certificate_of
 from saltus.orbits.proofs.orbit_proof import (
-    ASSUMPTIONS,
-    MIRROR,
+    assumptions_of,
     in_words,
+    of_radii,
     radii_columns,
     shooting_of,
+    took_nodes,
     with_proof,
     within,
 )
@@ -89,6 +93,7 @@ class SpecialProof(Result):
     assumptions: tuple[str, ...]
     seconds: float
     special: SpecialPoint = field(repr=False)
+    radii: dict[str, float] = field(default_factory=dict, repr=False)
     shooting: Shooting | None = field(default=None, repr=False)
     zero: ProvedZero | None = field(default=None, repr=False)
 
@@ -109,13 +114,15 @@ class SpecialProof(Result):
         model = type(self.special.orbit.system.model).__name__
         orbit = self.special.orbit
         alone = self.only_within or self.unique_within
-        whatever = " whatever its kernel vector," if self.only_within else ""
-        return (
+        whatever = ", whatever its kernel vector," if self.only_within else ""
+        told = [
             f"{model} has a periodic orbit of {orbit.period} forcing "
             f"period{'s' * (orbit.period > 1)} with {meaning} ({self.kind}) at {self.path} = "
-            f"{rounded_ball(*self.parameter)}. No other one of this signature,{whatever} lies, at "
-            f"its impacts and at the nodes between them, within {within(alone)} of it."
-        )
+            f"{rounded_ball(*self.parameter)}. No other one of this signature{whatever} lies, at "
+            f"its impacts and at the nodes between them, within {within(alone)} of it.",
+            *of_radii(self.radii),
+        ]
+        return " ".join(told)
 
     def to_xarray(self) -> xarray.Dataset:
         """The orbit's dataset with the enclosure, and with the statement as an attribute."""
@@ -134,6 +141,24 @@ class SpecialProof(Result):
         }
         return with_proof(self.special.orbit.to_xarray(), "special_proof", columns, facts)
 
+    @cached_property
+    def certificate(self) -> dict[str, Any]:
+        """All that a program needs to check the proof again, without saltus; plain JSON.
+
+        Raises
+        ------
+        ParameterError
+            Nothing is proved.
+        """
+        return special_certificate_of(self)
+
+    def check(self) -> bool:
+        """Whether all that the proof and its certificate say holds when it is computed anew. It
+        takes the system of the orbit and the boxes of the certificate, and makes no search.
+        """
+        again = _again(self)
+        return self.proved is True and again is not None and not differences(self, again)
+
 
 def prove_special(
     point: SpecialPoint,
@@ -151,39 +176,92 @@ def prove_special(
         return _unproved(point, path, reason, began)
     if len(paths) != 1:
         return _unproved(point, path, "a point in two parameters is not proved yet", began)
-    grazes = point.kind == SpecialKind.GR
-    made = (
-        _touching(point, path, radii, steps)
-        if grazes
-        else _singular(orbit, 1.0 if point.kind == SpecialKind.LP else -1.0, path, radii, steps)
-    )
+    made = _equations_of(point, path, radii, steps)
     if isinstance(made, CannotProve):
         return _unproved(point, path, made.reason, began)
-    zero = prove_zero(made)
+    zero = prove_zero(made, precise=True)
     if isinstance(zero, NotProved):
         return _unproved(point, path, zero.reason, began)
-    opened = made.is_open(zero.enclosure, zero.box)
+    return _theorem_of(point, path, made, zero, dict(radii or {}), began)
+
+
+def _equations_of(
+    point: SpecialPoint,
+    path: str,
+    radii: dict[str, float] | None,
+    steps: ShootingSettings | None,
+) -> Shooting | CannotProve:
+    """The equations of which a special point is a regular zero."""
+    if point.kind == SpecialKind.GR:
+        return _touching(point, path, radii, steps)
+    theta = 1.0 if point.kind == SpecialKind.LP else -1.0
+    return _singular(point.orbit, theta, path, radii, steps)
+
+
+def _theorem_of(
+    point: SpecialPoint,
+    path: str,
+    shooting: Shooting,
+    zero: ProvedZero,
+    radii: dict[str, float],
+    began: float,
+) -> SpecialProof:
+    """What follows of a special point from the zero of its equations."""
+    opened = shooting.is_open(zero.enclosure, zero.box)
     only: dict[str, float] = {}
-    if opened and not grazes:
-        box = only_one_of(made, zero)
-        radii_by_name = {} if box is None else made.by_name(box)
-        only = {
-            name: radius for name, radius in radii_by_name.items() if not name.startswith(KERNEL)
-        }
+    box = only_one_of(shooting, zero) if opened and point.kind != SpecialKind.GR else None
+    if box is not None:
+        named = shooting.by_name(box).items()
+        only = {name: radius for name, radius in named if not name.startswith(KERNEL)}
     return SpecialProof(
         proved=True if opened else None,
         reason="" if opened else "the contact was not shown to be open between impacts",
         kind=str(point.kind),
         path=path,
         parameter=np.array([zero.middle[-1], zero.radius[-1]]),
-        unique_within=made.by_name(zero.unique),
+        unique_within=shooting.by_name(zero.unique),
         only_within=only,
-        assumptions=(*ASSUMPTIONS, *((MIRROR,) * orbit.symmetric)),
+        assumptions=assumptions_of(point.orbit.symmetric, zero),
         seconds=time.process_time() - began,
         special=point,
-        shooting=made,
+        radii=radii,
+        shooting=shooting,
         zero=zero,
     )
+
+
+def _again(proof: SpecialProof) -> SpecialProof | None:
+    """The proof from the orbit's own system and equations, with the boxes, nodes and pins of a
+    proof; None where they prove nothing.
+    """
+    point = proof.special
+    shooting = proof.shooting
+    zero = proof.zero
+    if shooting is None or zero is None:
+        return None
+    path = point.orbit.equations.paths[0]
+    anew = _equations_of(point, path, proof.radii, shooting.settings)
+    if isinstance(anew, CannotProve) or not took_nodes(anew, shooting):
+        return None
+    if not _took_pin(anew, shooting):
+        return None
+    verified = verified_zero(anew, zero.middle, zero.radius, zero.unique, zero.precise)
+    if isinstance(verified, NotProved):
+        return None
+    return _theorem_of(point, path, anew, verified, proof.radii, 0.0)
+
+
+def _took_pin(first: Shooting, second: Shooting) -> bool:
+    """Whether the pin of the second equations is one of the same unknowns, and no kernel vector of
+    zeros meets it; the first then take it. Its numbers are those of a guess.
+    """
+    assert first.pins
+    assert second.pins
+    (row, goal), (other, other_goal) = first.pins[0], second.pins[0]
+    same = other.shape == row.shape and bool(other.any()) and not other[row == 0.0].any()
+    same = same and bool(other_goal) == bool(goal)
+    first.pins = second.pins if same else first.pins
+    return same
 
 
 def _singular(
@@ -199,6 +277,8 @@ def _singular(
     made = orbit.equations.segments_to_prove(orbit.solution)
     if isinstance(made, CannotProve):
         return made
+    if made.rests:
+        return CannotProve("special points of orbits that rest are not proved yet")
     plain = shooting_of(orbit, made, settings=steps)
     kernel = _kernel(plain, theta)
     events, size = made.guess.shape
@@ -219,6 +299,10 @@ def _singular(
         state_names=(*states[:d], *kernel_states[:d], *states[d:], *kernel_states[d:]),
     )
     probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
+    # A part of the kernel vector has the scale of what it is a variation of, though it may be 0.
+    scales = dict(zip(plain.names, plain.scales, strict=True))
+    own = zip(probe.names, probe.scales, strict=True)
+    probe.scales = np.array([scales.get(name.removeprefix(KERNEL), scale) for name, scale in own])
     row = np.zeros(probe.size)
     goal = 0.0
     for i in range(events):
@@ -272,7 +356,7 @@ def _unproved(point: SpecialPoint, path: str, reason: str, began: float) -> Spec
         parameter=np.array([point.parameter, np.inf]),
         unique_within={},
         only_within={},
-        assumptions=ASSUMPTIONS,
+        assumptions=assumptions_of(point.orbit.symmetric),
         seconds=time.process_time() - began,
         special=point,
     )
