@@ -162,7 +162,7 @@ def _hex(values: np.ndarray) -> list[str]:
     return [float(value).hex() for value in values]
 
 
-def differences(proof: OrbitProof | SpecialProof, again: OrbitProof | SpecialProof) -> list[str]:
+def differences(proof: OrbitProof | SpecialProof, again: Any) -> list[str]:
     """What a proof or its certificate says that does not follow, or not in this form, from the same
     proof computed anew: the names of fields and of entries; empty where all of it does.
     """

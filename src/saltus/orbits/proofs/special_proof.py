@@ -300,9 +300,11 @@ def _singular(
     )
     probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
     # A part of the kernel vector has the scale of what it is a variation of, though it may be 0.
-    scales = dict(zip(plain.names, plain.scales, strict=True))
+    plain_scales = dict(zip(plain.names, plain.scales, strict=True))
     own = zip(probe.names, probe.scales, strict=True)
-    probe.scales = np.array([scales.get(name.removeprefix(KERNEL), scale) for name, scale in own])
+    probe.scales = np.array(
+        [plain_scales.get(name.removeprefix(KERNEL), scale) for name, scale in own]
+    )
     row = np.zeros(probe.size)
     goal = 0.0
     for i in range(events):
