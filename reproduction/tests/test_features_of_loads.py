@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from claim_verdicts import claims_of, verdicts
+from scipy_motion import by_scipy
 from spectrum_cases import branch, diagram, folded, loop
 from test_errata import crossings
 
@@ -21,6 +22,7 @@ from saltus_paper.figures.harmonic_loads import AMPLITUDE, under_both, under_for
 from saltus_paper.figures.knots_and_jumps import birth
 from saltus_paper.figures.load_diagrams import undeformed
 from saltus_paper.measures.response_measures import _anticipated, border_of_rest, coexistence
+from saltus_paper.measures.spectrum_features import amplitudes_at
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,42 @@ def rest_under_both_loads():
         "disturbed": fig13._disturbed(critical),
     }
     return xr.DataTree.from_dict({**groups, "a": xr.Dataset(attrs={"critical": critical})})
+
+
+def test_an_attractor_of_a_short_stable_part_lies_on_the_drawn_line():
+    """Fig. 11b: three periods, stable between a fold and a doubling that are 1.6e-4 apart.
+
+    SciPy's integrator settles there, Newton's method finds the orbit with its multipliers, and the
+    line of the branch, whose steps are longer, passes it as a stable one.
+    """
+    amplitude, periods = 2.420395, 3
+    system = under_force(frequency=1.0, amplitude=amplitude)
+    beta0, vertical, damping = math.radians(80.0), -0.5, 0.1
+
+    def acceleration(t, theta, v, side, middle):
+        angle = beta0 + side * theta
+        push = amplitude * math.sin(t)
+        return math.sin(angle) * push + side * math.cos(angle) * vertical - damping * v - theta
+
+    orbit = saltus.find_orbit(system, theta=-0.5543603, velocity=-2.3527150, period=periods)
+    assert orbit.stable
+    theta, velocity = orbit.section_state
+    end = 2.0 * math.pi * periods * 6
+    x, v, _, impacts = by_scipy(
+        acceleration,
+        lambda x, side: side * x,
+        (theta + 1e-5, velocity),
+        1 if theta > 0.0 else -1,
+        0.0,
+        end,
+    )
+    # the disturbance has become smaller by the multipliers, 0.39 in each of the orbit's periods
+    assert (x, v) == pytest.approx((theta, velocity), abs=1e-6)
+    assert len(impacts) == 6 * orbit.impact_count
+    family = saltus.continue_orbit(orbit, AMPLITUDE, (2.41, 2.6))
+    branch = saltus.continue_orbit(family.orbits[-1], AMPLITUDE, (1.9, 2.8))
+    lines = amplitudes_at(branch.to_xarray(), amplitude, stable=True)
+    assert np.abs(lines - orbit.amplitude).min() < 5e-3
 
 
 def judged(data):

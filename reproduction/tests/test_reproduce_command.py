@@ -77,6 +77,26 @@ def test_a_part_that_fails_is_named_at_the_end_and_the_others_are_made(
     assert 'id="fig08"' in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(
+    ("verdict", "draft", "status"),
+    [("DISAGREES", False, 1), ("DISAGREES", True, 0), ("UNDECIDED", False, 0)],
+)
+def test_a_claim_that_disagrees_is_named_at_the_end_and_has_a_status(
+    saltus, monkeypatch, tmp_path, verdict, draft, status
+):
+    from saltus_paper import ClaimVerdict, reproduce
+
+    monkeypatch.setattr("saltus_paper.report.browser.BROWSERS", ())
+    (made,) = reproduce(["table1"], tmp_path)
+    first, *others = made.claims
+    judged = replace(first, verdict=ClaimVerdict[verdict], evidence="2 instead of 3")
+    results = [replace(made, claims=(judged, *others), draft=draft)]
+    monkeypatch.setattr("saltus_paper.reproduce", lambda *given: results)
+    found = saltus("reproduce", "table1", "-o", tmp_path)
+    assert found.exit_code == status
+    assert (f"saltus: {first.id} disagrees: 2 instead of 3" in found.stderr) == bool(status)
+
+
 def test_an_unknown_part_is_refused(refused, tmp_path):
     said = refused("reproduce", "fig4", "-o", tmp_path)
     assert "did you mean" in said

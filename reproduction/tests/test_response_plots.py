@@ -61,6 +61,24 @@ def test_a_smooth_curve_looks_smooth_between_its_points():
     assert chords > 1.5e-3
 
 
+@pytest.mark.parametrize(
+    ("special", "stable"),
+    [((("LP", 1.0, 0.0),), 0), ((("reach", 1.0, 0.0),), 1)],
+)
+def test_a_line_that_is_cut_at_a_fold_has_the_slope_of_the_curve_there(special, stable):
+    """p = 1 - y^2: at a value of p the line has the y of the curve within a tenth of the step."""
+    y = np.array([-0.65, -0.6, -0.5, -0.3, 0.0, 0.3, 0.5, 0.6, 0.65])
+    flags = np.where(y < 0.0, stable, 1)
+    margins = {"reach": np.where(y <= 0.0, -1.0, 1.0)} if stable else None
+    data = branch(1.0 - y**2, y, flags, special=special, margins=margins)
+    runs = list(smooth_lines(data))
+    assert len(runs) == 2
+    at = np.linspace(0.02, 0.28, 27)
+    for run in runs:
+        p, amplitude = run.places[np.argsort(-run.places[:, 0])].T
+        assert np.abs(np.abs(np.interp(at**2, 1.0 - p, amplitude)) - at).max() < 0.03
+
+
 def test_a_grazing_keeps_its_corner():
     data = branch([0, 1, 2, 2, 1, 0], [0, 1, 2, 2, 3, 4], np.ones(6), crossings=[2, 2, 2, 6, 6, 6])
     one, two = (run.places for run in smooth_lines(data))

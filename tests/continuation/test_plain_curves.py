@@ -87,6 +87,29 @@ def test_two_zeros_between_which_another_function_vanishes_are_both_found(width)
     )
 
 
+@pytest.mark.parametrize("shift", [0.0, 0.0137, 0.0291, 0.0333])
+def test_two_special_points_of_one_step_have_a_point_between_them(shift):
+    """What holds between them, such as a stability, is seen at no other point of the curve."""
+    zeros = 0.4 + shift, 0.41 + shift
+
+    class Both(Events):
+        keeps_special = True
+
+        def tests(self, point):
+            return tuple(
+                Function(str(zero), lambda at, zero=zero: at.parameter - zero) for zero in zeros
+            )
+
+    line = Explicit(lambda z: z[1] - z[0], lambda z: np.array([-1.0, 1.0]))
+    found = both_ways(line.start(0.0, 0.0), Both, {"p": (-1.0, 1.0)})
+    assert [zero.parameter for zero in found.special] == pytest.approx(zeros, abs=1e-12)
+    values = found.parameters
+    assert (np.diff(values) > 0.0).all()
+    inside = values[(values > zeros[0] + 1e-3) & (values < zeros[1] - 1e-3)]
+    assert len(inside) == 1
+    assert largest_residual(found) < 1e-12
+
+
 def test_a_cusp_is_no_fold():
     """p = y^3: p stands still at 0 and goes on."""
     curve = Explicit(lambda z: z[1] - z[0] ** 3, lambda z: np.array([-3.0 * z[0] ** 2, 1.0]))

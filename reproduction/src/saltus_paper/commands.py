@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 RESULTS = Path("results")
-FAILED = 1  # the exit status where a part could not be made
+FAILED = 1  # the exit status where a part could not be made, or a claim disagrees
 
 
 def reproduce(
@@ -44,8 +44,9 @@ def reproduce(
 
     Writes PNG, PDF and netCDF files, and report.html to open (report.pdf too,
     where a browser is found that can print it). What is up to date is skipped.
-    If a part fails, the others and the report are made; the command names it
-    at its end, and ends with status 1.
+    If a part fails, the others and the report are made. The command names at
+    its end what failed, and each claim or own check that disagrees; it then
+    ends with status 1. Claims of a draft do not count.
 
     Example: [cyan]saltus reproduce[/] for everything
 
@@ -83,7 +84,7 @@ def reproduce_paper(
     verdicts on the claims.
     """
     from saltus.cli import progress_bar
-    from saltus_paper import FIGURES, HEADINGS, ledger, tally, with_summaries
+    from saltus_paper import FIGURES, HEADINGS, ClaimVerdict, ledger, tally, with_summaries
     from saltus_paper import reproduce as made
     from saltus_paper.reproduction import FAILURES
 
@@ -109,6 +110,16 @@ def reproduce_paper(
         print(f"saltus: {result.name} failed: {result.error}", file=sys.stderr)
     if failed:
         print(f"saltus: the tracebacks are in {output / FAILURES}", file=sys.stderr, flush=True)
+    disagree = [
+        claim
+        for claim in with_summaries(
+            claim for result in results if not result.draft for claim in result.claims
+        )
+        if claim.verdict is ClaimVerdict.DISAGREES
+    ]
+    for claim in disagree:
+        print(f"saltus: {claim.id} disagrees: {claim.evidence}", file=sys.stderr, flush=True)
+    if failed or disagree:
         raise typer.Exit(FAILED)
 
 

@@ -36,6 +36,7 @@ class MadeFigure:
     files: tuple[Path, ...]
     claims: tuple[Claim, ...]
     error: str = ""  # why the part could not be made, in a sentence; it has no files and no claims
+    draft: bool = False  # made with the effort "quick", from which some claims cannot be judged
 
 
 FAILURES = "failures.txt"  # in the output folder: the tracebacks of the parts that failed
@@ -217,6 +218,7 @@ def _result(figure: PaperFigure, output: Path, made: _Progress) -> MadeFigure:
         files=() if error else tuple(output / name for name in figure.files()),
         claims=() if error else tuple(state.claims(figure, output)),
         error=_sentence(error) if error else "",
+        draft=figure.effort == "quick",
     )
 
 

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation.course import Course, solved_between, turning_point
+from saltus.continuation.course import Course, middle_of, solved_between, turning_point
 from saltus.continuation.curve import Zero
 from saltus.continuation.end import CurveEnd, CurveMissed, End, Missed
 from saltus.continuation.pseudo_arclength import STEPS, StepSettings
 from saltus.continuation.test_functions import Cut, Events, located
+from saltus.continuation.trail import SETTINGS as TRAIL
 from saltus.continuation.trail import Trail, TrailPoint
 from saltus.progress import Progress, silent
 
@@ -174,6 +175,8 @@ class Continuation:
             ahead, end, cut = self.events.closing(self.points[0], ahead), End(CurveEnd.CLOSED), None
         if closed or not born:
             self._locate(self.trail.examined(self.trail.up_to(samples, ahead)))
+            if cut is not None and cut.special is not None:
+                self._show_between(point, ahead)
         else:
             self.trail.begin(ahead)
         self.points += (
@@ -220,11 +223,27 @@ class Continuation:
             self.events.distinct(found),
             key=lambda zero: first.curve.norm(zero.point.place - first.place),
         ):
-            self.special.append(zero)
             if self.events.keeps_special:
+                self._show_between(first, zero.point)
                 self.points.append(zero.point)
+            self.special.append(zero)
             self.end = self.end or self.events.last(zero)
         self.trail.go_on(samples)
+
+    def _show_between(self, first: Any, special: Any) -> None:
+        """Add a point before a special one if the last point is special too and lies in the same
+        step, which begins at `first`.
+
+        At special points a multiplier is 1 in modulus up to rounding, so that a part of the curve
+        between two of them shows its stability only at a point of its own.
+        """
+        last = self.points[-1]
+        if not self.special or last is not self.special[-1].point:
+            return
+        norm = first.curve.norm
+        if norm(special.place - last.place) > TRAIL.narrowest * norm(special.place - first.place):
+            middle = middle_of(last, special)
+            self.points += [] if middle is None else [middle]
 
     def _zeros(self, a: TrailPoint, b: TrailPoint, chosen: np.ndarray | bool = True) -> list[Zero]:
         """The zeros of the test functions, or of those chosen, that change their signs between two

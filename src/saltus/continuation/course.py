@@ -78,6 +78,17 @@ def _near(a: Any, b: Any, guess: np.ndarray, index: int, value: float) -> Any:
     return point if max(a.curve.turn(a, point), a.curve.turn(point, b)) < STEPS.most else None
 
 
+def middle_of(a: Any, b: Any) -> Any:
+    """The point halfway from a to b; None if Newton's method finds none near the cubic through
+    both.
+    """
+    point = _at_share(a, b, 0.5)
+    if point is None:
+        return None
+    off = a.curve.norm(point.place - between(a, b, 0.5))
+    return point if off <= STEPS.beside * a.curve.norm(b.place - a.place) else None
+
+
 def _at_share(a: Any, b: Any, share: float) -> Any:
     """The point at a share of the way."""
     chord = b.place - a.place

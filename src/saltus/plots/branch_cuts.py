@@ -18,6 +18,10 @@ import numpy as np
 STEPS_BETWEEN = 6
 # The kinds of special points at which the stability can change.
 STABILITY_CHANGES = ("LP", "PD", "BPC", "GR", "NS", "SW", "GS", "CS", "SS", "AS")
+# Those of them at which the curve itself has a corner.
+CORNERS = ("GR", "SW", "GS", "CS", "SS", "AS")
+# Places nearer to one another than this share of their line's extent are one place.
+SAME_PLACE = 1e-9
 # the beginning of the names of a branch's variables with the least value of a margin
 MARGIN = "margin_"
 
@@ -136,23 +140,57 @@ def _turns(
 def smooth_lines(branch: Any, quantity: str = "amplitude") -> Iterator[BranchLine]:
     """The lines of `branch_lines`, smoothed: with further places on monotone cubics over the length
     between their points.
+
+    Where two lines meet and the curve has no corner, as at a fold, both take the slope of the
+    smooth curve there, from the places on both sides.
     """
-    for line in branch_lines(branch, quantity):
-        yield line._replace(places=_smoothed(line.places))
+    lines = list(branch_lines(branch, quantity))
+    corners = np.isin(branch["kind"].values, CORNERS)
+    corner_places = np.stack(
+        [branch[f"special_{name}"].values[corners] for name in ("parameter", quantity)], axis=1
+    )
+    counts = branch["impact_count"].values
+    joined = [
+        bool(counts[line.points.start - 1] == counts[line.points.start])
+        and not (corner_places == line.places[0]).all(axis=1).any()
+        for line in lines[1:]
+    ]
+    nothing = np.empty((0, 2))
+    for i, line in enumerate(lines):
+        before = lines[i - 1].places if i and joined[i - 1] else nothing
+        after = lines[i + 1].places if i < len(joined) and joined[i] else nothing
+        yield line._replace(places=_smoothed(line.places, before, after))
 
 
-def _smoothed(line: np.ndarray) -> np.ndarray:
-    """A denser row of points on the monotone cubics through the given ones, (n, 2)."""
+def _smoothed(line: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """A denser row of points on the monotone cubics through the given ones, (n, 2). The row
+    `before` ends, and the row `after` begins, where the line begins and ends: their nearest places
+    count for the slope there.
+    """
     from scipy.interpolate import PchipInterpolator
 
-    size = np.ptp(line, axis=0)
-    steps = np.linalg.norm(np.diff(line, axis=0) / np.where(size > 0, size, 1.0), axis=1)
-    line = line[np.append(True, steps > 1e-9)]
+    extent = np.ptp(line, axis=0)
+    size = np.where(extent > 0, extent, 1.0)
+
+    def steps(rows: np.ndarray) -> np.ndarray:
+        return np.asarray(np.linalg.norm(np.diff(rows, axis=0) / size, axis=1))
+
+    line = line[np.append(True, steps(line) > SAME_PLACE)]
+    own = slice(0, len(line))
+    for rows, end in ((before[::-1], 0), (after, -1)):
+        away = np.linalg.norm((rows - line[end]) / size, axis=1) > SAME_PLACE
+        nearest = rows[away][:1]
+        if end == 0:
+            line = np.concatenate([nearest, line])
+            own = slice(len(nearest), len(line))
+        else:
+            line = np.concatenate([line, nearest])
     if len(line) < 3:
-        return line
-    length = np.append(0.0, np.cumsum(steps[steps > 1e-9]))
+        return line[own]
+    length = np.append(0.0, np.cumsum(steps(line)))
+    within = length[own]
     shares = np.arange(STEPS_BETWEEN) / STEPS_BETWEEN
-    along = np.append((length[:-1, None] + np.diff(length)[:, None] * shares).ravel(), length[-1])
+    along = np.append((within[:-1, None] + np.diff(within)[:, None] * shares).ravel(), within[-1])
     return np.asarray(PchipInterpolator(length, line)(along))
 
 
