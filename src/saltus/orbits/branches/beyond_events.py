@@ -34,7 +34,13 @@ from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import is_image, nearest, parent_of
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.equations.event_sequence import EventSequence, OrbitEvent, section_of
+from saltus.orbits.equations.event_sequence import (
+    TIME_BETWEEN,
+    EventSequence,
+    OrbitEvent,
+    section_of,
+)
+from saltus.orbits.equations.sampled_motion import REACTION
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
 
@@ -98,6 +104,9 @@ class OtherSideSettings:
     slow: float = 1e-2
     # At a change of events something vanishes: it is at most this there, in natural units.
     witness: float = 1e-6
+    # A rest that is shorter than this at a change of events, in natural times, vanishes there: it
+    # is nearly as short as the root of the change's bracket.
+    short_rest: float = 1e-2
     # An orbit that is farther than this from a change of events, and has no orbits with other
     # events beside it, is at no change: the two orbits between which it was solved for lie on two
     # branches.
@@ -155,6 +164,8 @@ def change_at(zero: Zero, reference: OrbitPoint) -> Cut | End:
         return End(CurveEnd.NOT_LOCATED, zero.parameter, SpecialKind.SW)
     if other is None:
         kind: SpecialKind | None = SpecialKind.SW
+    elif _rest_vanishes(events_at(here), events_of(other)):
+        kind = SpecialKind.CH
     elif _is_discontinuous(here, place, other):
         kind = first_change(events_at(here), events_of(other))
     else:
@@ -598,6 +609,19 @@ def kind_between(before: EventSequence, after: EventSequence) -> SpecialKind | N
     if set(more) != {EventCode.IMPACT}:
         return SpecialKind.SW
     return SpecialKind.GR if min(before.distance, after.distance) < SETTINGS.slow else None
+
+
+def _rest_vanishes(here: EventSequence, other: EventSequence) -> bool:
+    """Whether the rest after an accumulation has no duration left in an orbit at a change of
+    events, beyond which impacts of the accumulation count.
+
+    Beyond it the impacts grow again, and may then die away a second time: whether the motion rests
+    there hangs on the last bits, so that the number of rests on the other side decides nothing.
+    """
+    force_or_time = here.witness in (REACTION, TIME_BETWEEN)
+    rest = here.until_next((EventCode.HELD, EventCode.RELEASE))
+    vanishes = force_or_time and rest < SETTINGS.short_rest * here.natural_time
+    return vanishes and other.impact_count > here.impact_count
 
 
 def first_change(before: EventSequence, after: EventSequence) -> SpecialKind:

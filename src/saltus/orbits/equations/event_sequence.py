@@ -44,6 +44,7 @@ class EventSettings:
 
 
 SETTINGS = EventSettings()
+TIME_BETWEEN = "time between events"  # one of the quantities that vanish at a change of events
 
 
 class OrbitEvent(NamedTuple):
@@ -151,7 +152,7 @@ def sequence_of(
     distance, witness = min(
         sampled.nearest_touch(units, smooth),
         (min(speeds, default=math.inf) / units.speed, "speed of an impact"),
-        (float(later) / units.time, "time between events"),
+        (float(later) / units.time, TIME_BETWEEN),
     )
     events, times = _in_order(events, times, ONE_INSTANT * period)
     return EventSequence(

@@ -25,6 +25,8 @@ MOST_ORDER = 24  # the highest order of a step's series
 # Events nearer to each other than this share of the period happen at one instant, and steps between
 # them are left out.
 ONE_INSTANT = 1e-9
+# The name of what a closed contact or a sticking friction lacks to open or to slip.
+REACTION = "reaction or friction force"
 # Slower impacts, in natural units, are not listed: they belong to an accumulation.
 DYING = 1e-5
 
@@ -498,7 +500,7 @@ class SampledMotion:
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
             if steps.size:
                 force = self.only(steps)._dip(steps, [mask[steps] for mask in chosen], forces)
-                least.append((force / largest, "reaction or friction force"))
+                least.append((force / largest, REACTION))
         value, what = min(least)
         return float(value), what
 
