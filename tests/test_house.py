@@ -24,6 +24,7 @@ SHARED = {
     "enumerations",
     "notebook",
     "result",
+    "result_tree",
     "checks",
     "kinds",
     "files",

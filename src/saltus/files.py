@@ -249,6 +249,8 @@ def read_dataset(path: Path | str) -> Any:
     """
     import xarray
 
+    from saltus.result_tree import ResultTree
+
     path = Path(path)
     content = checked_content(path)
     if content[:200].lstrip().lower().startswith((b"<!doctype html", b"<html")):
@@ -273,7 +275,9 @@ def read_dataset(path: Path | str) -> Any:
     for node in tree.subtree:
         # the file is closed, and a handle to it need not be sent to other processes
         node.set_close(None)
-    return tree if tree.children else tree.to_dataset()
+    return (
+        ResultTree.from_dict(tree.to_dict(), name=tree.name) if tree.children else tree.to_dataset()
+    )
 
 
 @contextlib.contextmanager

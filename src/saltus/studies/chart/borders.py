@@ -263,6 +263,8 @@ class Borders:
         """
         import xarray as xr
 
+        from saltus.result_tree import ResultTree
+
         changes = changes_of(chart)
         found = self.of(chart, changes)
         rows = places(changes, self.of(chart, changes))
@@ -290,7 +292,7 @@ class Borders:
             np.array(keys_of(chart, changes), dtype=int).reshape(-1, len(KEY)),
         )
         groups = {f"curve_{i:02d}": curve for i, curve in enumerate(self.curves)}
-        return xr.DataTree.from_dict({"ends": xr.Dataset(data), **groups})
+        return ResultTree.from_dict({"ends": xr.Dataset(data), **groups})
 
 
 @answered

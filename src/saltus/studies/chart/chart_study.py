@@ -469,7 +469,7 @@ def bordered_chart(
     >>> sorted(made.children)
     ['borders', 'chart', 'disagreements', 'static']
     """
-    import xarray as xr
+    from saltus.result_tree import ResultTree
 
     chart = stability_chart(
         system,
@@ -505,4 +505,4 @@ def bordered_chart(
     static = quasi_static_border(system, tuple(chart.attrs["path"]), float(chart["vertical"].min()))
     if static is not None:
         groups["static"] = static.to_xarray()
-    return xr.DataTree.from_dict(groups).assign({"borders": borders.to_xarray(read_chart(chart))})
+    return ResultTree.from_dict(groups).assign({"borders": borders.to_xarray(read_chart(chart))})

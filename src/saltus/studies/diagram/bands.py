@@ -136,13 +136,15 @@ class Bands(Result):
         """The tree of `to_datasets`, with the parameter's `path` and the range."""
         import xarray
 
+        from saltus.result_tree import ResultTree
+
         low = float(self.tried.values.min())
         high = float(self.tried.values.max())
         about = {"title": "bands of chaos computed by saltus", "kind": "chaotic_bands"}
         name = self.system.model.coordinates[0]
         where: dict[str, Any] = {"path": self.path, "bounds": [low, high], "coordinate": name}
         root = xarray.Dataset(attrs=about | provenance(self.system, **where))
-        return xarray.DataTree.from_dict({"/": root, **self.to_datasets()})
+        return ResultTree.from_dict({"/": root, **self.to_datasets()})
 
     def to_datasets(self) -> dict[str, xarray.Dataset]:
         """`bands`, `exponents` (by value) and `stroboscopic` (a dot for each state of the motions,

@@ -47,6 +47,8 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     """The DataTree that `bifurcation_diagram` returns; `facts` are further attributes."""
     import xarray
 
+    from saltus.result_tree import ResultTree
+
     system = search.system
     path = search.path
     bounds = search.bounds
@@ -85,7 +87,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         else explained(system, chaos, branches).to_datasets()
     )
     found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
-    return xarray.DataTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
+    return ResultTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
 
 
 def _effort(search: DiagramSearch) -> dict[str, Any]:
