@@ -376,8 +376,9 @@ class AttractorsFound:
 
 
 def as_chart_motions(motions: SimulatedMotions, middle: float, time: float) -> np.ndarray:
-    """The motions as records of a chart, all in cell 0, with extrema from the `middle` on and
-    speeds times a unit of time, so that they are compared by the same functions.
+    """The motions as records of a chart, all in cell 0, so that the same functions compare them.
+
+    Extrema are measured from the `middle`, and speeds are multiplied by a unit of time.
     """
     table = np.zeros(len(motions), motion_type(motions.last.shape[1]))
     for name in ("period", "impact_count"):
