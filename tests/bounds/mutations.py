@@ -55,7 +55,9 @@ class _Turned(ast.NodeTransformer):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         self.inside.append(node.name)
         if ".".join(self.inside) in self.functions:
-            unrounded = self._is_wanted("no rounding", node.args)
+            names = [part.id for part in ast.walk(node) if isinstance(part, ast.Name)]
+            rounds = any(name in ROUNDING for name in names)
+            unrounded = rounds and self._is_wanted("no rounding", node.args)
             self.generic_visit(node)
             if unrounded:
                 node = _Unrounded().visit(node)

@@ -14,7 +14,19 @@ from mutations import mutated, mutations_of
 
 from saltus.bounds import Ball, arcs, krawczyk
 
-OPERATOR = ("contraction", "_of_two", "_by_discs", "_isolated")
+OPERATOR = (
+    "contraction",
+    "Centre.step",
+    "Centre.weights",
+    "Centre.image",
+    "Centre.zero",
+    "centre_at",
+    "verified_zero",
+    "return_map",
+    "_of_two",
+    "_by_discs",
+    "_isolated",
+)
 CURVE = ("Tube.hull", "Tube.at", "Tube.holds", "_Image.__init__", "drift_of", "turn_of")
 TINY = Fraction(1e-14)  # what roundings of doubles may add
 WIDER = 1.3  # the most that a bound may exceed the least one
@@ -39,10 +51,8 @@ EQUIVALENT = {
     "_by_discs: sign turned: 1.0 + EPS": MARGIN,
     "_isolated: no rounding: centre: np.ndarray, discs: np.ndarray, index: int": MARGIN,
     "_isolated: sign turned: 1.0 - 4.0 * EPS": MARGIN,
-    "Tube.at: no rounding: self, s: float": "it has no bound of rounding",
     "Tube.holds: no rounding: self, zero: Ball": "`inside` rounds upward by more",
     "_Image.__init__: no rounding: self, centre: Centre, tube: Tube": COVERED,
-    "drift_of: no rounding: inverse: np.ndarray, jacobian: Ball, tangent: np.ndarray": COVERED,
     "turn_of: no rounding: defect: np.ndarray, drift: np.ndarray, tangent: np.ndarray, scales: np.ndarray": (
         COVERED
     ),
@@ -166,7 +176,101 @@ def diagonals_hold(module: SimpleNamespace) -> bool:
 
 
 def operator_holds(module: SimpleNamespace) -> bool:
-    return contraction_holds(module) and multipliers_hold(module)
+    return (
+        contraction_holds(module)
+        and zeros_hold(module)
+        and return_maps_hold(module)
+        and multipliers_hold(module)
+    )
+
+
+class Roots:
+    """The equations x^2 = 2, y = x in balls, as shooting equations are asked."""
+
+    size = 2
+    scales = np.array([1.0, 4.0])
+    row_scales = np.array([2.0, 0.5])
+
+    def __init__(self, largest: float = 10.0) -> None:
+        self.largest = largest
+
+    def enclose(self, box: Ball) -> SimpleNamespace:
+        return SimpleNamespace(proved=bool(box.magnitude.max() < self.largest), box=box)
+
+    def system_rows(self, enclosure: SimpleNamespace, box: Ball) -> tuple[Ball, Ball]:
+        x, y = box[0], box[1]
+        first, second = x * x - 2.0, y - x
+        slope = x * 2.0
+        residual = Ball([first.middle, second.middle], [first.radius, second.radius])
+        matrix = Ball(
+            [[slope.middle, 0.0], [-1.0, 1.0]],
+            [[slope.radius, 0.0], [0.0, 0.0]],
+        )
+        return residual, matrix
+
+    def nearly_inverse(self, matrix: np.ndarray) -> np.ndarray:
+        return np.linalg.inv(matrix)
+
+
+def zeros_hold(module: SimpleNamespace) -> bool:
+    """The root of 2 is verified in boxes that contain it alone, and in no others; the operator's image
+    of a box of radius r about it has the radius r^2 / sqrt(2), as the slope changes by so much.
+    """
+    root = np.full(2, np.sqrt(2.0))
+    narrow = np.full(2, 1e-9)
+    for middle, radius, unique, largest, true in (
+        (root, narrow, np.full(2, 0.3), 10.0, True),
+        (root, narrow, np.full(2, 1.2), 10.0, True),
+        (root, narrow, np.full(2, 1.5), 10.0, False),  # beyond 0 the slope vanishes
+        (root, narrow, narrow / 2, 10.0, False),
+        (root + 1e-6, narrow, np.full(2, 0.3), 10.0, False),
+        (root - 1e-6, narrow, np.full(2, 0.3), 10.0, False),
+        (root, narrow, np.full(2, 0.3), 1.6, False),  # a step has no enclosure over the wide box
+        (root, narrow[:1], np.full(2, 0.3), 10.0, False),
+    ):
+        zero = module.verified_zero(Roots(largest), middle, radius, unique)
+        if isinstance(zero, module.NotProved) is true:
+            return False
+        if true and not (zero.radius is radius and zero.unique is unique):
+            return False
+    centre = module.centre_at(Roots(), root)
+    reach = centre.image(np.full(2, 0.3))[0][0]
+    least = 0.09 / np.sqrt(2.0)
+    step = module.centre_at(Roots(), root + 1e-3).step[0]
+    slope = 1.0 / (2.0 * np.sqrt(2.0))  # of the inverse
+    weights = [2.0 * slope, (2.0 * slope + 0.5) / 4.0]
+    condition = module.verified_zero(Roots(), root, narrow, narrow).condition
+    return bool(
+        least <= reach <= WIDER * least
+        and 1e-3 - 1e-6 <= step <= WIDER * 1e-3
+        and np.allclose(centre.weights, weights)
+        and np.isclose(condition, max(weights))
+    )
+
+
+def return_maps_hold(module: SimpleNamespace) -> bool:
+    """-(L^-1 B) for all L and B of their balls, first rows, in units of powers of two."""
+    rng = np.random.default_rng(14)
+    scales = np.array([2.0, 0.5, 8.0])
+    rows = np.array([4.0, 1.0, 0.25])
+    for radius in (1e-12, 1e-3):
+        left = Ball(rng.normal(size=(3, 3)) + 3.0 * np.eye(3), radius * np.ones((3, 3)))
+        right = Ball(rng.normal(size=(3, 2)), radius * np.ones((3, 2)))
+        equations = SimpleNamespace(scales=scales, row_scales=rows, event_size=2)
+        enclosure = SimpleNamespace(
+            open_jacobian=SimpleNamespace(middle=left.middle, ball=left),
+            start_jacobian=SimpleNamespace(ball=right),
+        )
+        found = module.return_map(equations, enclosure)
+        if not found.radius.max() < 60.0 * (radius + 1e-14):
+            return False
+        for sign in (-1.0, 0.0, 1.0):
+            matrix = left.middle + sign * left.radius
+            exact_map = -np.linalg.solve(matrix, right.middle - sign * right.radius)[:2]
+            exact_map = exact_map * scales[:2] / scales[:2, None]
+            if not (np.abs(found.middle - exact_map) <= found.radius + 1e-13).all():
+                return False
+    return True
 
 
 def curve_holds(module: SimpleNamespace) -> bool:
