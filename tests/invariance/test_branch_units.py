@@ -190,12 +190,22 @@ def test_branches_and_verdicts_are_the_same_in_all_units(kind: str, seed: int) -
     check(random_case(kind, seed), verdict=True)
 
 
-@pytest.mark.thorough
-def test_a_branch_ends_at_one_place_where_grazings_accumulate() -> None:
-    """Begun beyond the grazings and among them, and over two ranges."""
+@pytest.mark.parametrize(
+    "begun_and_asked",
+    [
+        pytest.param(((None, (1.0, 1.04)), (1.038, (1.0, 1.04))), id="one range"),
+        pytest.param(
+            ((None, (0.9, 1.2)), (None, (1.0, 1.04)), (1.038, (0.9, 1.2))),
+            id="two ranges",
+            marks=pytest.mark.thorough,
+        ),
+    ],
+)
+def test_a_branch_ends_at_one_place_where_grazings_accumulate(begun_and_asked: Any) -> None:
+    """Begun beyond the grazings and among them."""
     case = random_case("absorber", 9)
     found = []
-    for frequency, bounds in ((None, (0.9, 1.2)), (None, (1.0, 1.04)), (1.038, (0.9, 1.2))):
+    for frequency, bounds in begun_and_asked:
         numbers = list(case.numbers)
         numbers[3] = frequency or 1.039
         begun = replace(case, numbers=tuple(numbers))

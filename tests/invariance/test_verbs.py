@@ -26,7 +26,7 @@ NO_DEFAULT_WINDOW = ("origin", "inert")
 
 
 def in_other_words(recipe: Recipe, rng: np.random.Generator) -> Iterator[Recipe]:
-    """The same in other words, units first."""
+    """The same in other words."""
     yield recipe.in_units(*10.0 ** rng.uniform(*UNITS))
     yield recipe.mirrored()
     yield recipe.rounded(rng)
@@ -45,11 +45,11 @@ def is_asked(verb: str, recipe: Recipe) -> bool:
     return "attractors" not in verb or not any(word in recipe.name for word in OTHERWISE_SPREAD)
 
 
-def differences(verb: str, kind: str, seed: int, count: int | None = None) -> list[str]:
+def differences(verb: str, kind: str, seed: int) -> list[str]:
     """How the answers of a verb to a random recipe in other words differ, in words."""
     rng = np.random.default_rng([seed, *kind.encode(), 5])
     recipe = steady(random_recipe(kind, rng))
-    others = list(in_other_words(recipe, rng))[:count]
+    others = list(in_other_words(recipe, rng))
     if recipe.frequency is None or not is_asked(verb, recipe):
         return []
     one = says(verb, recipe)
@@ -70,8 +70,8 @@ def differences(verb: str, kind: str, seed: int, count: int | None = None) -> li
 
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize("kind", ["wall", "stops"])
-def test_a_verb_answers_the_same_in_other_units_and_mirrored(verb: str, kind: str) -> None:
-    assert not differences(verb, kind, 0, 2)
+def test_a_verb_answers_a_first_model_the_same_in_other_words(verb: str, kind: str) -> None:
+    assert not differences(verb, kind, 0)
 
 
 @pytest.mark.thorough
