@@ -64,10 +64,15 @@ def test_all_places_say_the_same_version():
 
 def test_what_saltus_imports_it_also_requires():
     """A package that another one brings along may be gone with that one's next release."""
-    names = {"tomli-w": "tomli_w", "lazy-loader": "lazy_loader", "cuda-bindings": "cuda"}
+    names = {
+        "tomli-w": "tomli_w",
+        "lazy-loader": "lazy_loader",
+        "cuda-bindings": "cuda",
+        "python-flint": "flint",
+    }
     extras = PROJECT["optional-dependencies"]
     texts = [*PROJECT["dependencies"], *extras["cluster"], *extras["explore"], *extras["sympy"]]
-    texts += [*extras["jax"], *extras["torch"], *extras["cuda"]]
+    texts += [*extras["jax"], *extras["torch"], *extras["cuda"], *extras["prove"]]
     required = {re.match(r"[\w-]+", text)[0] for text in texts}
     allowed = {names.get(name, name) for name in required} | {"saltus", *sys.stdlib_module_names}
     statement = re.compile(r"^\s*(?:from|import) ([A-Za-z_]\w*)", re.M)
