@@ -68,7 +68,7 @@ MISTAKES = {
     ),
     "the time": (
         lambda: saltus.System(model=pushed(lambda t, x, v: -np.sin(t))),
-        "the time may only be handed to a load channel",
+        "the time may only be passed to a load channel",
     ),
     "drag": (
         lambda: saltus.System(model=pushed(lambda t, x, v: -v * abs(v))),

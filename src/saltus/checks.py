@@ -343,7 +343,7 @@ def check_size(values: Any, name: str | None = None) -> None:
     )
     if isinstance(size, int) and size > LIMITS.count:
         raise ParameterError(
-            f"{name or 'a list'} has {size} values, and {LIMITS.count} are the most", name
+            f"{name or 'a list'} has {size} values; at most {LIMITS.count} are allowed", name
         )
 
 
@@ -510,13 +510,12 @@ def check_environment() -> None:
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if disabled not in ("", "0"):
         raise SaltusError(
-            "the environment has NUMBA_DISABLE_JIT set, but saltus is nothing without its compiler;"
-            " unset it"
+            "the environment has NUMBA_DISABLE_JIT set, but saltus needs its compiler; unset it"
         )
     if not (threads.isdecimal() and int(threads) > 0):
         raise SaltusError(
-            f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is no number of"
-            " threads; unset it"
+            f"the environment has NUMBA_NUM_THREADS={threads[:20]!r}, which is not a number of "
+            f"threads; unset it"
         )
 
 

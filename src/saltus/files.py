@@ -271,7 +271,7 @@ def read_dataset(path: Path | str) -> Any:
         with _without_unraisable():
             traceback.clear_frames(error.__traceback__)
         said = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise ParameterError(f"{path} is no netCDF file that can be read ({said:.80})") from error
+        raise ParameterError(f"{path} is not a readable netCDF file ({said:.80})") from error
     for node in tree.subtree:
         # the file is closed, and a handle to it need not be sent to other processes
         node.set_close(None)
@@ -303,7 +303,7 @@ def checked_content(path: Path) -> bytes:
     """
     try:
         if path.exists() and not path.is_file():  # reading a device or a pipe may never end
-            raise ParameterError(f"{path} is no file that can be read")
+            raise ParameterError(f"{path} is not a readable file")
         # a sparse file may have any size
         check_memory(str(path), COPIES * path.stat().st_size, "its bytes")
         content = path.read_bytes()

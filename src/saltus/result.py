@@ -273,7 +273,8 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
         return made
     if not (hasattr(result, "data_vars") and hasattr(result, "attrs")):
         raise ParameterError(
-            f"result must be a Dataset, a DataTree or what has to_pandas, got {shown(result)}",
+            f"result must be a Dataset, a DataTree or an object with to_pandas, got "
+            f"{shown(result)}",
             "result",
         )
     return table_of(result, table)
@@ -398,7 +399,7 @@ def check_provenance(
     """
     differ = "; ".join(_differences(attributes, system))
     if differ:
-        raise ParameterError(f"{what} is not of what is computed now: {differ}; {remedy}")
+        raise ParameterError(f"{what} is not from the same computation: {differ}; {remedy}")
 
 
 def _differences(attributes: Mapping[str, Any], system: System) -> Iterator[str]:

@@ -71,8 +71,8 @@ def test_what_is_no_result_is_told(refused, tmp_path):
     (tmp_path / "cut.nc").write_bytes((tmp_path / "foreign.nc").read_bytes()[:700])
     for name, problem in (
         ("nothing.nc", "there is no file or folder"),
-        ("text.nc", "is no netCDF file that can be read"),
-        ("empty.nc", "is no netCDF file that can be read"),
+        ("text.nc", "is not a readable netCDF file"),
+        ("empty.nc", "is not a readable netCDF file"),
         ("cut.nc", "is damaged: it has 700 bytes, and its data end at"),
         ("folder", "is not a store: it has no zarr.json"),
         ("foreign.nc", "it does not say of what kind it is; it draws attractors, "),
@@ -117,7 +117,7 @@ def test_a_file_that_opens_only_half_is_told_without_a_traceback(refused, tmp_pa
     monkeypatch.setattr(sys, "unraisablehook", hook)
     monkeypatch.setattr(xarray, "open_datatree", open_half)
     (tmp_path / "damaged.nc").write_bytes(b"damaged")
-    assert "is no netCDF file that can be read" in refused("plot", tmp_path / "damaged.nc")
+    assert "is not a readable netCDF file" in refused("plot", tmp_path / "damaged.nc")
     assert not failed
     assert sys.unraisablehook is hook
 
@@ -174,6 +174,6 @@ def test_sweeps_that_have_no_picture_are_told(refused, tmp_path):
         "plot", tmp_path / "half.zarr"
     )
     run(plan("basin_cells"), tmp_path / "basins.zarr")
-    assert "read basins.nc beside it" in refused("plot", tmp_path / "basins.zarr")
+    assert "read basins.nc in the same folder" in refused("plot", tmp_path / "basins.zarr")
     run(plan("squares"), tmp_path / "mine.zarr")
     assert "its kind is 'squares'" in refused("plot", tmp_path / "mine.zarr")

@@ -84,7 +84,7 @@ def test_fresh_removes_nothing_but_stores(saltus, refused, tmp_path):
     mine = tmp_path / "out" / "stability_chart.zarr"
     mine.mkdir(parents=True)
     (mine / "letter").write_text("mine")
-    assert "is no store, so it is not removed" in refused(
+    assert "is not a store, so it is not removed" in refused(
         "run", tmp_path / "study.toml", "-o", tmp_path / "out", "--fresh"
     )
     assert (mine / "letter").read_text() == "mine"

@@ -450,7 +450,7 @@ class Rubbed(saltus.ContactModel):
         ((saltus.Friction(name="a", coordinate="y", kinetic=0.1),), "none of x"),
         (
             tuple(saltus.Friction(name=n, coordinate="x", kinetic=0.1) for n in "ab"),
-            "take two coordinates",
+            "a coordinate can have one",
         ),
         (
             tuple(saltus.Friction(name="a", coordinate="x", kinetic=0.1) for _ in range(2)),

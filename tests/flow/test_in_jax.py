@@ -164,7 +164,8 @@ def test_what_has_no_meaning_in_jax_is_said_in_a_sentence(jax):
         jax.block_until_ready(end({"impact.e": 1.5}, START))
     jax.config.update("jax_enable_x64", False)
     with pytest.raises(
-        ParameterError, match=r'32 bits here; first say jax.config.update\("jax_enable_x64", True\)'
+        ParameterError,
+        match=r'32 bits here; first call jax.config.update\("jax_enable_x64", True\)',
     ):
         end(VALUES, START)
 

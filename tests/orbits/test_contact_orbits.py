@@ -396,7 +396,7 @@ def test_curves_of_changes_of_events_of_whole_motions_are_refused_by_name():
     )
     orbit = saltus.find_orbit(system, x=0.2, velocity=0.1)
     branch = saltus.continue_orbit(orbit, "load.force.amplitude", (0.2, 0.35))
-    with pytest.raises(ParameterError, match="curves are followed of LP, PD"):
+    with pytest.raises(ParameterError, match="curves are followed from LP, PD"):
         saltus.continue_special(branch.special[0], "load.frequency", (0.9, 1.5))
 
 

@@ -124,7 +124,7 @@ def test_a_motion_that_loses_energy_in_its_impacts_has_lost_the_difference():
 
 def test_what_has_no_mean_is_refused():
     motion = saltus.simulate(linear(), x=0.1, periods=2)
-    with pytest.raises(ParameterError, match="kept densely for so many forcing periods"):
+    with pytest.raises(ParameterError, match="dense output over so many forcing periods"):
         mean_dissipated_power(motion, periods=3)
     with pytest.raises(ParameterError, match="no channel 'horizontal'"):
         transmissibility(motion, "horizontal")

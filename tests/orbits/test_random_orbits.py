@@ -133,7 +133,7 @@ def test_chaos_is_refused_with_what_to_try():
 
 def test_rest_is_refused_with_what_to_try():
     with pytest.raises(
-        MotionError, match=r"the undeformed state, which is no orbit to follow.*start farther"
+        MotionError, match=r"the undeformed state, which is not an orbit.*start farther"
     ):
         find_orbit(forced(H=0.03), theta=0.05, parameters=(FREQUENCY,))
 

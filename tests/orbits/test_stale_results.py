@@ -91,7 +91,8 @@ def test_numbers_that_are_no_orbit_are_refused(branch):
     damaged = branch.copy(deep=True)
     damaged["unknowns"][2, 0] += 1e-6
     with pytest.raises(
-        ParameterError, match=r"what is kept at load.frequency = .* is no orbit \(its residual is"
+        ParameterError,
+        match=r"what is kept at load.frequency = .* is not an orbit \(its residual is",
     ):
         orbits_of(damaged)
 

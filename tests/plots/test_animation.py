@@ -64,7 +64,7 @@ def test_what_is_no_film_is_refused(motion, tmp_path, monkeypatch):
         saltus.animate(motion, tmp_path / "film.mp4")
     with pytest.raises(ParameterError, match=r"a film is a .gif, .html or .mp4, got 'film.avi'"):
         saltus.animate(motion, tmp_path / "film.avi")
-    with pytest.raises(ParameterError, match="result must be a motion that was kept densely"):
+    with pytest.raises(ParameterError, match="result must be a motion with dense output"):
         saltus.animate(saltus.simulate(SYSTEM, theta=0.3, periods=1, dense=False))
 
 

@@ -45,7 +45,7 @@ GOOD = {"path": FREQUENCY, "bounds": (0.5, 1.5)}
         ({"starts": 0}, "starts must lie in"),
         ({"starts": "many"}, "starts must be a whole number"),
         ({"effort": "standart"}, "did you mean 'standard'"),
-        ({"effort": 3}, "effort knows no"),
+        ({"effort": 3}, "there is no effort"),
         ({"seed": -1}, "seed must lie in"),
         ({"repelling": -1}, "repelling must lie in"),
         ({"step": 0.0}, "step must lie in"),

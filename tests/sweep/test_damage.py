@@ -97,7 +97,7 @@ def test_the_store_of_another_plan_is_not_mended(waves_plan, store, tree):
     (store / files.CHECKSUMS).unlink()
     before = tree(store)
     with pytest.raises(
-        ParameterError, match=r"is damaged, so the store cannot be gone on with; name another store"
+        ParameterError, match=r"is damaged, so the store cannot be continued; name another store"
     ):
         run(waves_plan(arguments={"hole": 0.2}), store)
     assert tree(store) == before
@@ -108,7 +108,7 @@ def test_a_store_is_removed_and_nothing_else_is(waves_plan, store, tmp_path):
     assert not store.exists()
     remove_store(store)
     (tmp_path / "mine").mkdir()
-    with pytest.raises(ParameterError, match="is no store, so it is not removed"):
+    with pytest.raises(ParameterError, match="is not a store, so it is not removed"):
         remove_store(tmp_path / "mine")
 
 
@@ -164,7 +164,7 @@ def test_words_of_a_store_are_no_markup(tmp_path, capsys):
 
 def test_a_grid_of_too_many_chunks_is_refused(waves_plan):
     with pytest.raises(
-        ParameterError, match="cuts the grid into 2000000 chunks, and 1000000 are the most"
+        ParameterError, match="cuts the grid into 2000000 chunks; at most 1000000 are allowed"
     ):
         waves_plan(axes={"x": np.arange(2e6), "y": np.arange(1.0)}, chunk={"x": 1})
 
@@ -202,7 +202,7 @@ def test_arrays_whose_codecs_could_run_code_are_refused_before_zarr_reads_them(
         lambda path: open_store(path, partial=True),
     ):
         with pytest.raises(
-            ParameterError, match="no store that saltus has made: it has codecs of other programs"
+            ParameterError, match="is not a store of saltus: it has codecs of other programs"
         ):
             question(store)
 

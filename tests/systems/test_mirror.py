@@ -218,7 +218,7 @@ def test_a_mirror_that_is_found_is_the_one_that_is_declared() -> None:
 
 
 def test_a_declared_mirror_that_is_none_is_refused_and_one_that_is_not_given_is_kept() -> None:
-    with pytest.raises(saltus.errors.ParameterError, match="no symmetry of its equations"):
+    with pytest.raises(saltus.errors.ParameterError, match="not a symmetry of its equations"):
         mirror_of(under(Declared(even=0.3)))
 
     @dataclass(frozen=True, kw_only=True)

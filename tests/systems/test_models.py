@@ -59,7 +59,7 @@ FLOOR = (Contact(name="floor", coordinate="x"),)
         ),
         (
             made(OneContactModel, acceleration=fall, sides=(1, -1), coordinates=("x", "y")),
-            "coordinates x, y, which must be one",
+            "coordinates x, y, but it must have one",
         ),
         (made(OneContactModel, acceleration=fall, sides=(1,)), "define reset"),
         (made(OneContactModel, acceleration=fall, sides=(-1,)), r"sides must be \(1, -1\)"),
@@ -158,7 +158,7 @@ UNIT = [[1.0, 0.0], [0.0, 1.0]]
         (
             NoDataclass(),
             (
-                r"NoDataclass is no dataclass, so stiffness would be no parameter: write "
+                r"NoDataclass is not a dataclass, so stiffness would not be a parameter: write "
                 r"@dataclass\(frozen"
             ),
         ),
@@ -209,7 +209,8 @@ def test_a_misspelt_channel_is_refused_when_a_system_is_made():
         Model, channels=("force",), acceleration=lambda self, t, x, v, side, load: load.forse(t) - x
     )
     with pytest.raises(
-        saltus.TraceError, match=r"reads load\.forse, not one of its channels; did you mean 'force'"
+        saltus.TraceError,
+        match=r"reads load\.forse, which is not one of its channels; did you mean 'force'",
     ):
         System(model=model)
 

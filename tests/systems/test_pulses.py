@@ -145,7 +145,7 @@ quantity = "velocity"
     with pytest.raises(
         ParameterError,
         match=(
-            r"study.toml: load.ground_horizontal.type .HalfSin. is no pulse; did you mean"
+            r"study.toml: load.ground_horizontal.type .HalfSin. is not a pulse; did you mean"
             r" 'HalfSine'"
         ),
     ):
@@ -183,8 +183,8 @@ def sweep():
         (lambda: MavroeidisPapageorgiou(amplitude=1.0, frequency=1.0, gamma=1.0), "gamma must lie in .1, inf."),
         (lambda: Load(force=HalfSine(amplitude=1.0, frequency=1.0, quantity="acceleration")), "takes a HalfSine of force"),
         (lambda: Load(ground_vertical=Ricker(amplitude=1.0, frequency=1.0)), "takes a Ricker of displacement, velocity or acc"),
-        (lambda: Load(ground_vertical=sweep()).ground_vertical.velocity(0.5), "no elementary function"),
-        (lambda: System.from_dict({"model": {"type": "TwoStops"}, "load": {"force": {"type": 3}}}), "is no pulse"),
+        (lambda: Load(ground_vertical=sweep()).ground_vertical.velocity(0.5), "not an elementary function"),
+        (lambda: System.from_dict({"model": {"type": "TwoStops"}, "load": {"force": {"type": 3}}}), "is not a pulse"),
     ],
 )  # fmt: skip
 def test_a_pulse_without_meaning_is_refused(make, sentence):

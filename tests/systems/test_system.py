@@ -181,7 +181,7 @@ def test_an_impact_law_without_impacts_is_refused():
         System(model=Metainterface(beta0=1.4, smoothing=50.0), impact=VelocityReduction(0.5))
     with pytest.raises(
         ParameterError,
-        match="EnergyRestitution is no law for the contacts of a TwoLayer; give NewtonImpact",
+        match="EnergyRestitution does not apply to the contacts of a TwoLayer; give NewtonImpact",
     ):
         System(model=TwoLayer(beta0=1.4), impact=EnergyRestitution(0.5))
 
@@ -406,7 +406,7 @@ class Lopsided(Metainterface):
 def test_a_mirror_that_is_no_symmetry_is_refused(numbers):
     load = Load(frequency=1.0, horizontal=Harmonic(0.3), vertical=-0.5)
     assert System(model=Lopsided(beta0=1.4), load=load).mirrored() is not None
-    with pytest.raises(ParameterError, match="mirror is no symmetry"):
+    with pytest.raises(ParameterError, match="mirror is not a symmetry"):
         System(model=Lopsided(beta0=1.4, **numbers), load=load).mirrored()
 
 

@@ -68,7 +68,7 @@ class Smooth(saltus.Model):
 
 @pytest.mark.parametrize("kind", [ByKind, ByState, ByMass, ByPosition, Smooth])
 def test_a_branch_on_a_type_is_refused(kind: Any) -> None:
-    with pytest.raises(saltus.SaltusError, match=r"another model for symbols than for numbers"):
+    with pytest.raises(saltus.SaltusError, match=r"other equations for symbols than for numbers"):
         saltus.System(model=kind(), load=HARMONIC)
 
 

@@ -310,7 +310,7 @@ def test_surfaces_which_a_page_does_not_follow_are_refused_by_both_doors(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(
-        saltus.ParameterError, match="a page follows no surfaces so far, and Backlash has some"
+        saltus.ParameterError, match="a page cannot show surfaces yet, and Backlash has some"
     ):
         show(saltus.System(model=Backlash()), x=0.0)
     assert list(tmp_path.iterdir()) == []

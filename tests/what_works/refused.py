@@ -4,9 +4,9 @@ A cell that is not here works. `REASONS` are the sentences that the documentatio
 """
 
 SUMS = "give it system.in_gap_coordinates"
-SURFACES = "a page follows no surfaces so far"
-RUBBING = "a page follows no frictions in contacts so far"
-FIRST_ORDER = "a page follows no coordinates of first order so far"
+SURFACES = "a page cannot show surfaces yet"
+RUBBING = "a page cannot show frictions in contacts yet"
+FIRST_ORDER = "a page cannot show coordinates of first order yet"
 
 EXTREMA = "give system.in_gap_coordinates"
 MANY = "lyapunov_many works on models with one coordinate"
@@ -37,15 +37,14 @@ REFUSED = {
 }
 REASONS = {
     SUMS: (
-        "A page works in coordinates that contacts hold one by one: "
-        "`saltus.page(system.in_gap_coordinates)` makes one."
+        "A page needs a coordinate for each gap: `saltus.page(system.in_gap_coordinates)` makes"
+        " one."
     ),
-    SURFACES: "A page follows no surfaces so far.",
-    RUBBING: "A page follows no frictions in contacts so far.",
+    SURFACES: "A page cannot show surfaces yet.",
+    RUBBING: "A page cannot show frictions in contacts yet.",
     EXTREMA: (
-        "Extrema of ensembles are those of coordinates that contacts hold one by one: give"
-        " `system.in_gap_coordinates`."
+        "Extrema of ensembles need a coordinate for each gap: give `system.in_gap_coordinates`."
     ),
     MANY: "`lyapunov_many` is for models with one coordinate; `lyapunov_spectrum` takes any.",
-    FIRST_ORDER: "A page follows no coordinates of first order so far.",
+    FIRST_ORDER: "A page cannot show coordinates of first order yet.",
 }

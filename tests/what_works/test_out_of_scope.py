@@ -93,7 +93,7 @@ PUSHED = Load(push=1.0)
     [
         (lambda: System(model=Dragged(), load=PUSHED), "sign of a velocity"),
         (lambda: System(model=Timed(), load=PUSHED), "time"),
-        (lambda: System(model=TwiceRubbing(), impact=NewtonImpact(0.3)), "another one is"),
+        (lambda: System(model=TwiceRubbing(), impact=NewtonImpact(0.3)), "a contact can have one"),
         (lambda: System(model=FastSide()), "x_velocity"),
         (lambda: System(model=HertzianStop()), "at the surface 'sphere'"),
         (lambda: System(model=RootedStop()), "has no Taylor series"),
@@ -122,7 +122,7 @@ def test_hertz_s_law_is_taken_where_it_is_rounded_off():
 def test_cycles_without_a_period_are_no_orbits_and_undecided():
     belt = saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.2)
     free = System(model=belt)
-    with pytest.raises(saltus.ParameterError, match="no forcing period, so no periodic orbits"):
+    with pytest.raises(saltus.ParameterError, match="no forcing period, and so no periodic orbits"):
         saltus.find_orbit(free, x=0.5)
     assert str(saltus.classify(free, x=0.5, periods=100).kind) == "undecided"
 

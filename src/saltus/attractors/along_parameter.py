@@ -246,10 +246,7 @@ def _values(system: System, path: str, values: Any) -> np.ndarray:
         or not ((steps > 0).all() or (steps < 0).all())
     ):
         raise ParameterError(
-            (
-                f"values must be numbers of {path} that increase, or that decrease, got "
-                f"{shown(values)}"
-            ),
+            (f"values must be numbers of {path} that increase or decrease, got {shown(values)}"),
             "values",
         )
     check_along(system, path, grid, "values")

@@ -56,7 +56,7 @@ class Tape:
         place = {id(node): i for i, node in enumerate(nodes)}
         unknown = sorted({node.op for node in nodes} - {op.name.lower() for op in Op})
         if unknown:
-            raise TraceError(f"there is no ball arithmetic of {', '.join(unknown)}")
+            raise TraceError(f"there is no ball arithmetic for {', '.join(unknown)}")
         rows = [_row(node, place) for node in nodes]
         self.nodes = np.array(rows, dtype=np.int64).reshape(-1, 4)
         self.numbers = np.array(

@@ -330,7 +330,7 @@ def draw_file(path: Path, stem: Path, data: Any) -> list[Path]:
     if kind not in DRAWINGS:
         what = f"its kind is {kind!r}" if kind else "it does not say of what kind it is"
         raise ParameterError(
-            f"{path} is no result that `saltus plot` draws: {what:.60}; it draws "
+            f"{path} is not a result that `saltus plot` draws: {what:.60}; it draws "
             f"{', '.join(DRAWINGS)}"
         )
     try:

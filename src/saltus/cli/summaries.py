@@ -263,9 +263,7 @@ def print_status(path: Path, verify: bool = False) -> None:
         table.add_row(head, Text(printable(text)))
     console.print(table)
     if found.damaged:
-        raise ParameterError(
-            f"{damage(found)}; start the sweep again, and what they held is computed anew"
-        )
+        raise ParameterError(f"{damage(found)}; start the sweep again to compute their chunks anew")
     console.print(ending(found), markup=False, soft_wrap=True)
     if verify:
         console.print("Every file is what was written.", markup=False)

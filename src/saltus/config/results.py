@@ -112,8 +112,8 @@ def _open_store(path: Path) -> Any:
     check_memory(str(path), float(data.nbytes), "its arrays")
     if kind_of(data) in PARTIAL:
         raise ParameterError(
-            f"{path} keeps {PARTIAL[kind_of(data)]} alone; read {path.with_suffix('.nc').name} "
-            "beside it"
+            f"{path} keeps {PARTIAL[kind_of(data)]} alone; read {path.with_suffix('.nc').name} in "
+            f"the same folder"
         )
     return data
 
@@ -182,8 +182,8 @@ def save(
         if figure is None:
             raise ParameterError(
                 (
-                    "result must be a Dataset, a DataTree, a figure, a text or what has to_xarray, "
-                    f"got {shown(result)}"
+                    "result must be a Dataset, a DataTree, a figure, a text or an object with "
+                    f"to_xarray, got {shown(result)}"
                 ),
                 "result",
             )
@@ -252,7 +252,8 @@ def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) 
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not (hasattr(data, "data_vars") and hasattr(data, "attrs")):
         raise ParameterError(
-            f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}",
+            f"result must be a Dataset, a DataTree or an object with to_xarray, got "
+            f"{shown(result)}",
             "result",
         )
     path = Path(path)

@@ -85,7 +85,7 @@ def _readers(model: Model, margins: tuple[str, ...]) -> dict[str, Reader]:
         for name in names:
             if name not in margins:
                 raise ValueError(
-                    f"names no margin of this model with {show(name)}; {near(name, margins)}"
+                    f"must name margins of this model, got {show(name)}; {near(name, margins)}"
                 )
         return names
 

@@ -184,8 +184,8 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
         or not end > begin
     ):
         raise ParameterError(
-            "the motion must have been kept densely for so many forcing periods; simulate it for"
-            " longer",
+            "the motion must have dense output over so many forcing periods; simulate it for "
+            "longer",
             "periods",
         )
     dense = motion.dense
@@ -301,7 +301,7 @@ def _refuse_moving_walls(system: System) -> None:
     inner: Any = system.in_gap_coordinates
     if inner is not system and any(inner.model.gap_sums()[1]):
         raise ParameterError(
-            "walls that move do work at contacts, which is not told apart: give a motion of"
+            "moving walls do work at contacts, which cannot be separated: give a motion of"
             " system.in_gap_coordinates, whose energies are relative to the ground",
             "of",
         )

@@ -96,7 +96,7 @@ def animate(
     names = dir(motion)
     if "system" not in names or "dense" not in names or motion.dense is None:
         raise ParameterError(
-            f"result must be a motion that was kept densely, or an orbit, got {shown(result)}",
+            f"result must be a motion with dense output, or an orbit, got {shown(result)}",
             "result",
         )
     count = max(2, round(seconds * fps))

@@ -395,7 +395,7 @@ def _check_size(size: Any, dpi: Any, into_given: bool, has_width: bool) -> None:
     for name, value in (("size", size), ("dpi", dpi)):
         if value is not None and into_given:
             raise ParameterError(
-                f"{name} is that of a new figure; set it on the figure of the given axes", name
+                f"{name} applies to a new figure; set it on the figure of your axes", name
             )
     if size is not None and has_width:
         raise ParameterError("size and width exclude each other; give one of them", "size")
@@ -439,7 +439,8 @@ def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
         raise ParameterError(
-            f"result must be a Dataset, a DataTree or what has to_xarray, got {shown(result)}",
+            f"result must be a Dataset, a DataTree or an object with to_xarray, got "
+            f"{shown(result)}",
             "result",
         )
     draw = DRAWINGS.get(str(data.attrs.get("kind", ""))) or _by_content(data)

@@ -69,10 +69,10 @@ class Measurement:
             empty = isinstance(given, (list, tuple, np.ndarray)) and not np.size(given)
             times = np.empty(0) if empty else np.ravel(as_numbers(given, name))
             if not empty and not times.size:
-                raise ParameterError(f"{name} must be numbers that rise, got {shown(given)}", name)
+                raise ParameterError(f"{name} must be increasing numbers, got {shown(given)}", name)
             if not np.isfinite(times).all() or not (np.diff(times) > 0).all():
                 raise ParameterError(
-                    f"{name} must be numbers that rise, got {shown(getattr(self, name))}", name
+                    f"{name} must be increasing numbers, got {shown(getattr(self, name))}", name
                 )
             object.__setattr__(self, name, times)
         for name in ("start", "values", "changes"):
@@ -364,7 +364,8 @@ def check_measurements(
                 raise ParameterError(f"start has {name!r}; {near(name, (*names, 'time'))}", "data")
         if both := set(record.changes) & set(unknowns):
             raise ParameterError(
-                f"{min(both)} is to be found, and a measurement gives it in changes", "parameters"
+                f"{min(both)} is an unknown of the fit, and a measurement sets it in its changes",
+                "parameters",
             )
         system.with_(dict(record.changes))
     given = [
@@ -373,6 +374,4 @@ def check_measurements(
         for sigma in map(record.sigma_of, record.quantities)
     ]
     if any(given) and not all(given):
-        raise ParameterError(
-            "sigma must be given of all quantities that were measured, or of none", "data"
-        )
+        raise ParameterError("sigma must be given for all measured quantities, or for none", "data")

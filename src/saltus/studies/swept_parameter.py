@@ -92,7 +92,8 @@ class SweepRequest:
         grid = given[::-1] if falling else given
         if grid.size < 2:
             raise ParameterError(
-                f"values must be two or more that increase or that fall, got {shown(self.values)}",
+                f"values must be two or more increasing or decreasing numbers, got "
+                f"{shown(self.values)}",
                 "values",
             )
         for name, function in (self.functions or {}).items():

@@ -188,7 +188,7 @@ def checked(plan: Plan, index: Index, result: Any) -> Arrays:
     for name in result:
         if name not in plan.variables:
             raise ParameterError(
-                f"{where} {name!r}, which is no variable of the plan; "
+                f"{where} {name!r}, which is not a variable of the plan; "
                 f"{near(str(name), plan.variables)}"
             )
     return {name: _array(plan, index, name, result[name], where) for name in plan.variables}
@@ -200,7 +200,7 @@ def _array(plan: Plan, index: Index, name: str, values: Any, where: str) -> np.n
     if array.shape != expected:
         axes = ", ".join(plan.dimensions(name))
         raise ParameterError(
-            f"{where} {name!r} of shape {array.shape}; expected is {expected}, along {axes}"
+            f"{where} {name!r} of shape {array.shape}; {expected} is expected, along {axes}"
         )
     dtype = np.dtype(plan.variables[name].dtype)
     if not np.can_cast(array.dtype, dtype, "same_kind"):

@@ -306,7 +306,7 @@ def _ask_again(plan: FunctionPlan, path: Path, name: str) -> None:
                     raise ParameterError(
                         f"the function {name} gives {variable} = {shown(now[variable].ravel()[0])} "
                         f"at {where}, and {path} keeps {shown(before.ravel()[0])}: something that "
-                        f"it reads has changed; {ANEW}",
+                        f"the function reads has changed; {ANEW}",
                         "store",
                     )
 
@@ -338,8 +338,9 @@ def _sent(function: Callable[..., Any], far: bool) -> Any:
         from cloudpickle import dumps
     except ImportError:
         raise ParameterError(
-            "the function stands in a notebook or inside of another one, where other processes"
-            " cannot find it: install cloudpickle, put the function into a file and import it, or"
+            "the function is defined in a notebook or inside another function, where other "
+            "processes cannot find it: install cloudpickle, put the function into a file and "
+            "import it, or"
             " leave workers out",
             "function",
         ) from None

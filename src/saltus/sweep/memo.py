@@ -180,8 +180,7 @@ class Memo:
             except OSError as error:
                 raise SweepError(
                     f"{file} cannot be written ({(error.strerror or str(error)).lower()}); what was"
-                    " computed before is kept: when that is put right, run the same again and it"
-                    " goes on from there"
+                    " computed before is kept: correct this, and the same call continues from there"
                 ) from error
         self._keep(name, inputs, columns)
 

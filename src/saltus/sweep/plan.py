@@ -171,8 +171,8 @@ class Plan:
             object.__setattr__(self, name, value)
         if self.chunks.total > MOST_CHUNKS:
             raise ParameterError(
-                f"chunk cuts the grid into {self.chunks.total} chunks, and {MOST_CHUNKS} are the "
-                "most",
+                f"chunk cuts the grid into {self.chunks.total} chunks; at most {MOST_CHUNKS} are "
+                f"allowed",
                 "chunk",
             )
 
@@ -382,8 +382,8 @@ def as_json(value: Any, place: str) -> Any:
     if not isinstance(value, Mapping):
         kind = type(value).__name__
         raise ParameterError(
-            f"{place} is of type {kind}, which JSON does not have; numbers, strings, lists and "
-            "dicts can be"
+            f"{place} is of type {kind}, which JSON does not have; use numbers, strings, lists "
+            f"and dicts"
         )
     for key in value:
         if not isinstance(key, str):

@@ -95,8 +95,8 @@ class Store:
         except OSError as error:
             raise SweepError(
                 f"chunk {'/'.join(map(str, index))} cannot be written to {self.path}"
-                f" ({reason(error)}); the chunks before it are kept: when that is put right, run"
-                " the same again and it goes on from there"
+                f" ({reason(error)}); the chunks before it are kept: correct this, and the same "
+                f"call continues from there"
             ) from error
 
     def drop(self, index: Index) -> None:
@@ -211,7 +211,7 @@ def remove_store(path: Path | str) -> None:
         return
     if not ((path / files.METADATA).is_file() or (path / files.CHECKSUMS).is_file()):
         raise ParameterError(
-            f"{path} is no store, so it is not removed; name another place", "path"
+            f"{path} is not a store, so it is not removed; name another place", "path"
         )
     if files.in_use(path):
         raise SweepError(f"a run is writing to {path}; wait for it, or stop it, and run again")
@@ -253,7 +253,7 @@ def _restorable(plan: Plan, path: Path) -> dict[str, bytes]:
     ):
         return {name: content[name] for name in damaged}
     raise ParameterError(
-        f"{path / damaged[0]} is damaged, so the store cannot be gone on with; {BEGIN_ANEW}",
+        f"{path / damaged[0]} is damaged, so the store cannot be continued; {BEGIN_ANEW}",
         "store",
     )
 

@@ -350,7 +350,7 @@ def unpacked(content: bytes) -> Any:
     try:
         return full(json.loads(line))
     except (AttributeError, KeyError, OverflowError, RecursionError, TypeError) as error:
-        raise ValueError(f"this is no file of results ({type(error).__name__})") from error
+        raise ValueError(f"this is not a file of results ({type(error).__name__})") from error
 
 
 def _fields(descr: Any) -> Any:

@@ -240,7 +240,7 @@ def _check_codecs(path: Path, group: dict[str, Any]) -> None:
     )
     if group.get("zarr_format") != 3 or not known:
         raise ParameterError(
-            f"{path} is no store that saltus has made: it has codecs of other programs", "path"
+            f"{path} is not a store of saltus: it has codecs of other programs", "path"
         )
 
 

@@ -532,8 +532,8 @@ def in_gap_coordinates(model: Any) -> Any:
         name for name in (*vars(InGapCoordinates), "own_class") if name not in dir(ContactModel)
     } & {*dir(kind)}:
         raise ParameterError(
-            f"{kind.__name__} has a part named {min(taken)}, as its coordinates of gaps do: "
-            "rename it",
+            f"{kind.__name__} has a part named {min(taken)}, which is also the name of a gap's "
+            f"coordinate: rename it",
             "model",
         )
     made = object.__new__(_class_in(kind, places))  # its numbers have been checked

@@ -80,7 +80,8 @@ class ImpactLaw:
             A law that has no meaning for several contacts.
         """
         raise ParameterError(
-            f"{type(self).__name__} is no law for the contacts of a {type(model).__name__}; give"
+            f"{type(self).__name__} does not apply to the contacts of a {type(model).__name__}; "
+            f"give"
             " NewtonImpact(e=...)",
             "impact",
         )

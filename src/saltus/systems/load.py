@@ -172,7 +172,8 @@ class DeclaredLoad:
         channels = self._model.channels
         if name not in (*channels, "frequency", "period"):
             raise TraceError(
-                f"{type(self._model).__name__} reads load.{name}, not one of its channels; "
+                f"{type(self._model).__name__} reads load.{name}, which is not one of its "
+                f"channels; "
                 f"{near(name, channels)}"
             )
         return getattr(self._load, name)

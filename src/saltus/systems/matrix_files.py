@@ -87,8 +87,8 @@ def _check_shape(shape: Sequence[int]) -> None:
     """Refuse an array that is no matrix of a size that a structure may have."""
     if len(shape) != 2 or min(shape) < 0 or math.prod(shape) > MOST_NUMBERS:
         raise ValueError(
-            f"an array of {' x '.join(map(str, shape))} numbers is in it, and a structure has "
-            f"matrices with at most {LIMITS.coordinates} rows"
+            f"an array of {' x '.join(map(str, shape))} numbers is in it; matrices of a structure "
+            f"have at most {LIMITS.coordinates} rows"
         )
 
 
@@ -121,7 +121,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
         size = math.prod(shape) * kind.itemsize
         content = file.read(size + 1)  # one more, by which the end of the member is checked
     if len(content) != size:
-        raise ValueError(f"{info.filename} has not the {size} bytes that its heading promises")
+        raise ValueError(f"{info.filename} has not the {size} bytes that its header declares")
     return np.frombuffer(content, kind).reshape(shape, order="F" if by_columns else "C")
 
 
@@ -187,7 +187,7 @@ def _arrays(content: bytes) -> dict[str, Callable[[], np.ndarray]]:
         raise ValueError("it is an HDF5 file; save it with -v7 in MATLAB")
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if order is None or len(content) < HEADER:
-        raise ValueError("it is no file of MATLAB's version 5 to 7; save it with -v7")
+        raise ValueError("it is not a file of MATLAB's version 5 to 7; save it with -v7")
     file = Bytes(content, order)
     found: dict[str, Callable[[], np.ndarray]] = {}
     at = HEADER
@@ -226,7 +226,7 @@ def _heading(array: Bytes) -> ArrayHeading:
     shape, at = array.numbers(at, 32)
     name, at = array.numbers(at, NAME_BYTES)
     if flags.size != 2 or shape.size < 2 or name.dtype.itemsize != 1:
-        raise ValueError("the heading of an array is damaged")
+        raise ValueError("the header of an array is damaged")
     sizes = [int(size) for size in shape]
     return ArrayHeading(int(flags[0]), sizes, name.tobytes().decode("ascii"), at)
 
@@ -240,12 +240,12 @@ def _array(heading: ArrayHeading, element: Element, order: str) -> np.ndarray:
         unpack = zlib.decompressobj()
         content = unpack.decompress(content, MOST_NUMBERS * 2 * ENTRY_BYTES + NAME_BYTES)
         if not unpack.eof:  # which compares the checksum
-            raise ValueError(f"{name} is cut short, or has more numbers than its size promises")
+            raise ValueError(f"{name} is cut short, or has more numbers than its header declares")
         content = Bytes(content, order).element(0).content
     array = Bytes(content, order)
     kind = heading.flags & 0xFF
     if kind != SPARSE and kind not in NUMERIC:
-        raise ValueError(f"{name} is no array of numbers")
+        raise ValueError(f"{name} is not an array of numbers")
     entries = math.prod(shape)
     rows = columns = np.zeros(0, dtype=int)
     if kind == SPARSE:
@@ -257,7 +257,7 @@ def _array(heading: ArrayHeading, element: Element, order: str) -> np.ndarray:
         numbers, at = array.numbers(at, MOST_NUMBERS)
         parts.append(numbers)
     if any(part.size < entries or (kind != SPARSE and part.size > entries) for part in parts):
-        raise ValueError(f"{name} has another number of entries than its size promises")
+        raise ValueError(f"{name} has another number of entries than its header declares")
     values = parts[0].astype(float)
     if len(parts) > 1:
         values = values + 1j * parts[1].astype(float)
@@ -293,5 +293,5 @@ def unpacked_numbers(text: bytes, shape: Sequence[int]) -> np.ndarray:
     unpack = zlib.decompressobj()
     content = unpack.decompress(text, size + 1)
     if len(content) != size or not unpack.eof or unpack.unused_data:
-        raise ValueError("it has another size than it promises")
+        raise ValueError("it has another size than its header declares")
     return np.frombuffer(content, dtype="<f8").reshape(shape)

@@ -733,7 +733,7 @@ def _check_declared(system: System, mirrored: System, side: int) -> None:
         pairs += zip(one, model.reset(t, -inward, -side, mirrored.load, system.impact), strict=True)
     if any(abs(float(a) + float(b)) > DECLARED_ROUNDING * (1.0 + abs(float(a))) for a, b in pairs):
         raise ParameterError(
-            f"{type(model).__name__}.mirror is no symmetry of its equations: with the signs of"
+            f"{type(model).__name__}.mirror is not a symmetry of its equations: with the signs of"
             " coordinate, velocity and side turned, the load that it returns does not turn the"
             " sign of the acceleration; return None where there is none"
         )

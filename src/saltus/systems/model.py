@@ -480,8 +480,9 @@ def check_one_contact(model: OneContactModel | type[OneContactModel]) -> None:
         )
     if sides and len(model.coordinates) != 1:
         raise ParameterError(
-            f"{name} has one contact and the coordinates {', '.join(model.coordinates)}, which must"
-            " be one; a model of several coordinates is a saltus.Model if it has no contact, or a"
+            f"{name} has one contact and the coordinates {', '.join(model.coordinates)}, but it "
+            f"must have one coordinate; a model of several coordinates is a saltus.Model if it "
+            f"has no contact, or a"
             " saltus.ContactModel",
             "model",
         )
@@ -541,7 +542,7 @@ class Jet(np.lib.mixins.NDArrayOperatorsMixin):
         slopes = SLOPES.get(ufunc.__name__)
         if method != "__call__" or kwargs or slopes is None:
             raise TraceError(
-                f"np.{ufunc.__name__} of coordinates has no derivative here; known are"
+                f"np.{ufunc.__name__} of coordinates has no derivative here; allowed are"
                 f" {', '.join(SLOPES)}"
             )
         jets = [x if isinstance(x, Jet) else Jet(x, 0.0, 0.0) for x in inputs]

@@ -166,7 +166,8 @@ def _check_fields(kind: type[Model]) -> None:
     }
     if lost := sorted(given - fields.keys()):
         raise ParameterError(
-            f"{kind.__name__} is no dataclass, so {', '.join(lost)} would be no parameter: write"
+            f"{kind.__name__} is not a dataclass, so {', '.join(lost)} would not be a parameter: "
+            f"write"
             f" @dataclass(frozen=True, kw_only=True) above class {kind.__name__}",
             "model",
         )
@@ -418,14 +419,17 @@ def _check_frictions(model: ContactModel) -> None:
         where = f"the friction {friction.name!r} of {kind}"
         if isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
             raise ParameterError(
-                f"{where} holds {friction.coordinate!r}, none of {', '.join(model.coordinates)}",
+                f"{where} acts along {friction.coordinate!r}, which is none of "
+                f"{', '.join(model.coordinates)}",
                 "model",
             )
         if not isinstance(friction.coordinate, str):
             _check_sum(model, friction)
         if friction.coordinate in taken:
             raise ParameterError(
-                f"{where} and another one hold {friction.coordinate}: take two coordinates", "model"
+                f"{where} and another one act along {friction.coordinate}: a coordinate can have "
+                f"one",
+                "model",
             )
         if friction.contact is not None and friction.contact not in [
             contact.name for contact in model.contacts
@@ -436,8 +440,8 @@ def _check_frictions(model: ContactModel) -> None:
             )
         if friction.contact is not None and pressed.count(friction.contact) > 1:
             raise ParameterError(
-                f"{where} is in the contact {friction.contact!r}, as another one is: one is"
-                " followed",
+                f"{where} is in the contact {friction.contact!r}, which has a friction already: a "
+                f"contact can have one",
                 "model",
             )
         for other in (c for c in model.contacts if c.name == friction.contact):

@@ -95,7 +95,7 @@ def finite_array(name: str, given: Any) -> Any:
 
     if (size := getattr(given, "size", 0)) > LIMITS.count:
         raise ParameterError(
-            f"{name} holds {size:.3g} numbers, and {LIMITS.count} are the most", name
+            f"{name} holds {size:.3g} numbers; at most {LIMITS.count} are allowed", name
         )
     try:
         if (

@@ -344,7 +344,7 @@ class Chirp(Pulse):
         rate = self.frequency + growth * since
         if n < 0:
             raise ParameterError(
-                "the velocity of a ground with the acceleration of a Chirp is no elementary "
+                "the velocity of a ground with the acceleration of a Chirp is not an elementary "
                 "function; use a Record"
             )
         if n == 2:

@@ -351,7 +351,7 @@ def signal_class(data: Mapping[str, Any], where: str) -> type[Signal]:
     name = data["type"]
     if not isinstance(name, str) or name not in PULSES:
         hint = f"{near(str(name), PULSES)} (a harmonic and a record have no type)"
-        raise ParameterError(f"{where}.type {shown(name)} is no pulse; {hint}", f"{where}.type")
+        raise ParameterError(f"{where}.type {shown(name)} is not a pulse; {hint}", f"{where}.type")
     found: type[Signal] = PULSES[name]
     return found
 

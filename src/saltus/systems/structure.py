@@ -578,8 +578,7 @@ def _matrix(given: Any, name: str) -> Any:
     """A matrix that was given, or None for a damping that was not."""
     if given is None and name != "damping":
         raise ParameterError(
-            f"{name} is missing: a structure is given by its mass and its stiffness, or by a "
-            "file of them",
+            f"{name} is missing: a structure needs its mass and its stiffness, or a file with both",
             name,
         )
     return (
@@ -614,7 +613,8 @@ def _check_name(name: Any, where: str) -> None:
         and not name.startswith(MODE)
     ):
         raise ParameterError(
-            f"{where}: {shown(name)} is no name for a coordinate, which is as x1 or tip is, not "
+            f"{where}: {shown(name)} is not a name for a coordinate: use names such as x1 or tip, "
+            f"not "
             f"{MODE}1",
             where,
         )

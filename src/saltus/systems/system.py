@@ -265,7 +265,7 @@ class System:
             The model is of another class.
         """
         if not isinstance(self.model, OneContactModel):
-            raise ParameterError(f"{type(self.model).__name__} is no OneContactModel", "system")
+            raise ParameterError(f"{type(self.model).__name__} is not a OneContactModel", "system")
         return self.model
 
     @property
@@ -278,7 +278,7 @@ class System:
             The model is of another class.
         """
         if not isinstance(self.model, ContactModel):
-            raise ParameterError(f"{type(self.model).__name__} is no ContactModel", "system")
+            raise ParameterError(f"{type(self.model).__name__} is not a ContactModel", "system")
         return self.model
 
     def to_dict(self) -> dict[str, Any]:
@@ -470,7 +470,7 @@ def check_system(
     names = system.model.coordinates
     if inner is not system and not sums:
         raise ParameterError(
-            f"{asking} works in coordinates that contacts hold one by one: give it"
+            f"{asking} needs a coordinate for each gap: give it"
             f" system.in_gap_coordinates, which has {', '.join(inner.model.coordinates)}",
             "system",
         )

@@ -88,7 +88,7 @@ def _compare(
         if np.abs(values - own).max(initial=0.0) > ROUNDING * size:
             i = int(np.abs(values - own).argmax())
             raise TraceError(
-                f"{traced.model} is another model for symbols than for numbers: {WORDS[part]}"
+                f"{traced.model} gives other equations for symbols than for numbers: {WORDS[part]}"
                 f" {own[i]:.6g} for numbers and {values[i]:.6g} as traced; what chooses between"
                 " equations, as isinstance or type do, is a ClassVar, or two classes of model"
             )

@@ -263,8 +263,8 @@ def _key(node: Any) -> Any:
         return node.shape, node.dtype.str, node.tobytes()
     if type(node).__hash__ is None:
         raise ParameterError(
-            f"a model cannot keep a {type(node).__name__}, got {node!r}; give it numbers, an "
-            "array or a tuple"
+            f"a field of a model must be a number, an array or a tuple, got a "
+            f"{type(node).__name__}, {node!r}"
         )
     return node
 

@@ -520,5 +520,5 @@ def check_size(traced: Any, lanes: bool = False) -> None:
         raise TraceError(
             f"the equations of {what} have {nodes} operations, {loops} of them functions, products"
             f" and quotients, which would take about {minutes:.2g} minutes to"
-            f" compile{' for an ensemble' * lanes}; what takes more than {most:g} is refused"
+            f" compile{' for an ensemble' * lanes}; more than {most:g} minutes are refused"
         )

@@ -165,7 +165,7 @@ class LoadTime:
     def refuse(self, *_: Any) -> Any:
         """Raise an error for every other use."""
         raise TraceError(
-            "the time may only be handed to a load channel, such as load.horizontal(t); give the "
+            "the time may only be passed to a load channel, such as load.horizontal(t); give the "
             "model a channel for it"
         )
 

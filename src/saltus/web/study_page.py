@@ -284,7 +284,7 @@ def _check(system: System, function: str) -> None:
         if given
     ):
         raise ParameterError(
-            f"a page follows no {what} so far, and {type(model).__name__} has some", "system"
+            f"a page cannot show {what} yet, and {type(model).__name__} has some", "system"
         )
 
 

@@ -147,8 +147,8 @@ def simulate_many(
     inner = system.in_gap_coordinates
     if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
         raise ParameterError(
-            "extrema of many motions, and their derivatives to parameters, are those of"
-            " coordinates that contacts hold one by one: give system.in_gap_coordinates, which has"
+            "extrema of many motions, and their derivatives to parameters, need a coordinate for "
+            "each gap: give system.in_gap_coordinates, which has"
             f" {', '.join(inner.model.coordinates)}",
             "sample",
         )

@@ -148,8 +148,9 @@ def _check_names(
             what = "dimension" if name in dims else "coordinate"
             free = name.removeprefix("start_")
             raise ParameterError(
-                f"a {what} cannot be called {name!r}, as a result is; call it initial_{free}, or "
-                "as you like" + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
+                f"a {what} cannot be called {name!r}, which is the name of a result; call it "
+                f"initial_{free}, for instance"
+                + ("" if name in dims else f", or leave it out: .drop_vars({name!r})")
             )
     own = dict(numbers(system))
     for path in (path for path in own if path in coords):

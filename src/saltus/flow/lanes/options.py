@@ -75,7 +75,7 @@ def read_names(argument: str, given: Any, known: Iterable[str] | None = None) ->
             raise ParameterError(f"{argument} must be names, got {shown(given)}", argument)
         if known is not None and name not in known:
             raise ParameterError(
-                f"{argument} knows no {shown(name)}; {near(str(name), known)}", argument
+                f"{argument} cannot be {shown(name)}; {near(str(name), known)}", argument
             )
     return names
 

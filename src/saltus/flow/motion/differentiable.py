@@ -165,7 +165,7 @@ class _StatesFunction:
         if times is not None:
             if request["periods"] is not None or request["duration"] is not None:
                 raise ParameterError(
-                    "times say how long the motion is; give no periods or duration beside them",
+                    "times give the length of the motion; leave out periods and duration",
                     "times",
                 )
             asked = instants(times)
@@ -215,7 +215,7 @@ class _StatesFunction:
         jnp = _jax().numpy
         if jnp.result_type(float) != np.float64:
             raise ParameterError(
-                'JAX computes with 32 bits here; first say jax.config.update("jax_enable_x64", '
+                'JAX computes with 32 bits here; first call jax.config.update("jax_enable_x64", '
                 "True)"
             )
         paths = self._paths(values)

@@ -247,8 +247,8 @@ class Motion(Result):
         if self.dense is None and self.time > self.start:
             raise ParameterError(
                 (
-                    "this motion was not kept densely: only its end, its events and what it `kept` "
-                    "are known"
+                    "this motion has no dense output: it stores its end, its events and the "
+                    "states in `kept` alone"
                 ),
                 "times",
             )

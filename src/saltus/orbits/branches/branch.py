@@ -419,7 +419,7 @@ def _orbit(equations: OrbitEquations, row: np.ndarray, value: np.ndarray) -> Per
             else f"its residual is {orbit.residual:.1e}"
         )
         raise ParameterError(
-            f"what is kept at {equations.paths[0]} = {values[0]:g} is no orbit ({error}): the "
-            "data are damaged"
+            f"what is kept at {equations.paths[0]} = {values[0]:g} is not an orbit ({error}): the "
+            f"data are damaged"
         )
     return orbit

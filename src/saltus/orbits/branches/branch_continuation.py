@@ -202,8 +202,7 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = PeriodicOrbit.near(equations, orbit.solution.unknowns, equations.values)
     if found is None:
         raise ParameterError(
-            f"the orbit does not solve its own equations to be continued along {path}; find it"
-            " again",
+            f"the orbit does not satisfy its equations along {path}; find it again",
             "orbit",
         )
     if found.symmetric and not symmetric:
@@ -216,8 +215,9 @@ def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:
         found = (half(found) if symmetric else None) or found
     if not found.isolated:
         raise ParameterError(
-            "the orbit has others beside it at the same parameters, as that of a mass which nothing"
-            " holds: these are no branch; begin with an orbit at which it is held or hit",
+            "the orbit is not isolated, as a free mass has others beside it at the same "
+            "parameters: these form no branch; begin with an orbit on which the mass is in "
+            "contact or is hit",
             "orbit",
         )
     return found, symmetric

@@ -169,7 +169,7 @@ def continue_special(
     check_count("most_points", most_points, 1)
     if special.kind not in FOLLOWED:
         raise ParameterError(
-            f"curves are followed of {', '.join(FOLLOWED)}, not of {special.kind}", "special"
+            f"curves are followed from {', '.join(FOLLOWED)}, not from {special.kind}", "special"
         )
     changes = special.kind in (SpecialKind.GR, SpecialKind.SW)
     if changes and special.orbit.equations.touched(special) is None:
@@ -181,9 +181,8 @@ def continue_special(
         )
     if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
         raise ParameterError(
-            "this GR is no singularity, as neither the velocity nor the acceleration changes at the"
-            " contact: nothing begins or ends there, and no curve of such points is followed;"
-            " choose an LP, PD or BPC",
+            "this GR is not a singularity, as neither the velocity nor the acceleration changes "
+            "at the contact; choose an LP, PD or BPC",
             "special",
         )
     first_path = special.orbit.equations.paths[0]
@@ -313,7 +312,8 @@ def _changing(
         if number is not None and abs(known[number].value) < VANISHES:
             return orbit, witness_vanishes(orbit, scales, number)
     raise ParameterError(
-        f"at this {special.kind} two events come together, of which no curves are followed so far;"
+        f"at this {special.kind} two events coincide, and curves of such points are not followed "
+        f"yet;"
         " continue an orbit at several values of the second parameter instead",
         "special",
     )
@@ -361,8 +361,8 @@ def _defined(
         halved = half(orbit) if symmetric else None
         if halved is None:
             raise ParameterError(
-                "this BPC is a crossing of branches that no symmetry keeps: it does not persist"
-                " along a curve"
+                "this BPC is a crossing of branches without a symmetry, which does not persist "
+                "along a curve"
             )
         orbit = halved
     if kind == SpecialKind.NS:

@@ -252,8 +252,8 @@ class OrbitEquations(ABC):
     ) -> None:
         if system.load.frequency is None:
             raise ParameterError(
-                "a load without a frequency has no forcing period, so no periodic orbits to "
-                "find; give one",
+                "a load without a frequency has no forcing period, and so no periodic orbits; "
+                "give it a frequency",
                 "load.frequency",
             )
         self.given = system

@@ -405,8 +405,8 @@ def _instants(
             if beside or (contact in acting and is_impact):
                 both = " and ".join(repr(names[i]) for i in sorted({contact, *beside}))
                 raise MotionError(
-                    f"two events at {both} at one instant, {time:.6g}: the order of events that "
-                    "act on one another matters, so that an orbit has no equations for that"
+                    f"two events at {both} at one instant, {time:.6g}: their order matters, so "
+                    f"that an orbit has no equations there"
                 )
             acting.setdefault(contact, is_impact)
     return instants

@@ -112,7 +112,8 @@ class WholeMotionEquations(OrbitEquations):
         within = (twice.start < twice.events.times) & (twice.events.times < end)
         if not within.any() and 0 in twice.sliding.values():
             raise MotionError(
-                "the motion sticks for good, as it may anywhere near, which is no orbit to follow"
+                "the motion sticks for good, as it could at any state nearby: this is not an "
+                "isolated orbit"
             )
         if twice.stop is Stop.REST and not (
             len(twice.events) and twice.events[-1].time > 0.5 * (twice.start + twice.time)

@@ -144,7 +144,8 @@ def find_orbit(
             return _polish(base, state, q, passed, progress)
     raise MotionError(
         f"the motion has not settled on a periodic orbit of up to {period or max_period} forcing"
-        f" periods after {passed}: it is chaotic, slow to settle or longer; try another start,"
+        f" periods after {passed}: it is chaotic, settles slowly or has a longer period; try "
+        f"another start,"
         " max_period=..., or settle=0 with period=... for an unstable orbit near the start"
     )
 
@@ -185,8 +186,8 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
     """
     if motion.limit is not None:
         raise MotionError(
-            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches 0:"
-            " no orbit there"
+            f"the motion ends at time {motion.time:.6g}, where its margin {motion.limit} reaches "
+            f"0: there is no orbit"
         )
     if motion.side != 0 and motion.phase_known:
         return
@@ -197,20 +198,20 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
     released = bool(load_releases(system))
     if not motion.phase_known and not released:
         raise MotionError(
-            f"the motion from {start} settles on the undeformed state, which is no orbit to follow:"
-            f" its impacts lose nothing and get ever smaller without end; {farther}"
+            f"the motion from {start} settles on the undeformed state, which is not an orbit: its "
+            f"impacts lose no energy and become ever smaller; {farther}"
         )
     if not motion.phase_known:
         raise MotionError(
-            f"the impacts of the motion from {start} lose nothing and become too small to be"
-            " followed before the load pulls again, so its phase is lost and no orbit can be read"
-            " from it; give the impacts a loss (an e below 1), so that it rests until the load"
+            f"the impacts of the motion from {start} lose no energy and become too small to be "
+            f"followed before the load pulls again, so that its phase is lost; give the impacts a "
+            f"loss (an e below 1), so that it rests until the load"
             " pulls, which is an orbit, or take a higher frequency"
         )
     if not released:
         raise MotionError(
             f"the motion from {start} comes to rest at contact for good, as the load never pulls it"
-            f" off: it settles on the undeformed state, which is no orbit to follow; {farther}"
+            f" off: it settles on the undeformed state, which is not an orbit; {farther}"
         )
 
 
@@ -262,8 +263,8 @@ def _polish(
     lost = sensitivities(base.given, **state, periods=periods, dense=False).undefined
     if lost is not None:
         raise MotionError(
-            f"the motion {when} repeats itself after {periods} forcing periods at best where it has"
-            f" no derivative, and so no multipliers: {lost}"
+            f"the motion {when} would repeat itself after {periods} forcing periods where it has "
+            f"no derivative, and so no multipliers: {lost}"
         )
     raise MotionError(
         f"Newton's method finds no orbit of period {periods} near the motion {when}; "

@@ -180,7 +180,7 @@ def check_proof(
     for name, radius in (radii or {}).items():
         if name not in names:
             raise ParameterError(
-                f"radii names {name!r}, which is no number of the system; {near(name, names)}",
+                f"radii names {name!r}, which is not a number of the system; {near(name, names)}",
                 f"radii.{name}",
             )
         check_number(f"radii.{name}", radius, at_least=0.0)
@@ -209,14 +209,14 @@ def _check_mirror(
     for name in names:
         if not _is_symmetric_without(system, [name]):
             raise ParameterError(
-                f"the orbit is symmetric, and with another {name} the system was not shown to have"
-                f" its mirror symmetry; leave {name} out of radii",
+                f"the orbit is symmetric, and with another {name} its mirror symmetry was not "
+                f"shown; leave {name} out of radii",
                 f"radii.{name}",
             )
     if not _is_symmetric_without(system, names):
         raise ParameterError(
-            "the orbit is symmetric, and with other values of all numbers of radii together the"
-            " system was not shown to have its mirror symmetry; leave some of them out",
+            "the orbit is symmetric, and its mirror symmetry was not shown for other values "
+            "of all numbers in radii together; leave some of them out",
             "radii",
         )
 

@@ -206,5 +206,5 @@ def read_effort(effort: Any) -> Effort:
         return Effort(effort)
     except ValueError:
         raise ParameterError(
-            f"effort knows no {effort!r}; {near(str(effort), list(Effort))}", "effort"
+            f"there is no effort {effort!r}; {near(str(effort), list(Effort))}", "effort"
         ) from None
