@@ -34,7 +34,7 @@ FUNCTIONS = (
     "Shooting._begins",
     "Shooting._end_times",
     "Shooting._taken",
-    "Shooting._close_node",
+    "Shooting._close_nodes",
     "Shooting._close_events",
     "Shooting._add_begin",
     "Shooting._values",

@@ -24,7 +24,7 @@ from saltus.bounds.shooting import Enclosure, Shooting
 class ArcSettings:
     """How a box along a curve is looked for."""
 
-    newton: int = 2
+    newton: int = 1  # steps: the prediction is off by the square of the length
     tries: int = 3  # radii, each from the last result
     wide: float = 0.3  # the first radius, as a share of the way along the curve
     least_weight: float = 1e-2  # of a component's radius

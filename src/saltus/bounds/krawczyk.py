@@ -201,10 +201,12 @@ def prove_zero(
 ) -> ProvedZero | NotProved:
     """The tightest box around the zero near `shooting.x0` in which Krawczyk's operator proves it.
 
-    Unless `unique`, no wider box is looked for in which it is alone. With `precise`, the residual
+    Unless `unique`, the first box is enough, after one step of Newton's method: no tighter one is
+    looked for, and no wider one in which it is alone. With `precise`, the residual
     is computed with more digits where doubles are not enough, if FLINT is there.
     """
-    centre = newton(shooting, shooting.x0, settings.newton)
+    steps = settings.newton if unique else 1
+    centre = newton(shooting, shooting.x0, steps)
     if isinstance(centre, NotProved):
         return centre
     zero = _proved_around(centre, settings, unique)
@@ -239,9 +241,10 @@ def _proved_around(
             return NotProved("a Taylor step over the box of the unknowns has no enclosure")
         reach, enclosure = image
         if (reach < settings.sure * radius).all():
+            if not unique:
+                return centre.zero(radius, enclosure, radius)
             tight, inner = _tightened(centre, (radius, enclosure), reach)
-            alone = _widest(centre, radius, settings) if unique else radius
-            return centre.zero(tight, inner, alone)
+            return centre.zero(tight, inner, _widest(centre, radius, settings))
         share = float((reach / radius).max())
         reason = (
             f"Krawczyk's operator does not contract: its image is {share:.3g} times as wide as the "

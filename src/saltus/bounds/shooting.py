@@ -505,9 +505,9 @@ class Shooting:
             back.radius[:, :, 0] = first_column.radius
         back = product(flow.derivative, back)
         along = product(flow.derivative, begin.along.column)[:, :, 0] + flow.along
-        for i, k in enumerate(places):
-            if not steps[i].to_event:
-                self._close_node(k, i, x, flow, back, along, result)
+        at_nodes = [i for i, step in enumerate(steps) if not step.to_event]
+        if at_nodes:
+            self._close_nodes(places, at_nodes, x, flow, back, along, result)
         at_events = [i for i, step in enumerate(steps) if step.to_event]
         if at_events:
             self._close_events(group, places, at_events, end, x, known, flow, back, along, result)
@@ -572,18 +572,34 @@ class Shooting:
         state = Ball(middle, radius)
         return Steps(group.flow, self.settings.order, parameters, begin.time, length, state)
 
-    def _close_node(
-        self, k: int, i: int, x: Ball, flow: _Flow, back: Ball, along: Ball, result: Enclosure
+    def _close_nodes(
+        self,
+        places: list[int],
+        at_nodes: list[int],
+        x: Ball,
+        flow: _Flow,
+        back: Ball,
+        along: Ball,
+        result: Enclosure,
     ) -> None:
-        """The rows of a step to a node: its end is the node's state."""
-        step = self.steps[k]
+        """The rows of steps to nodes: their ends are the nodes' states."""
         width = 2 * self.dof
-        rows = width * k + np.arange(width)
-        places = step.close + np.arange(width)
-        result.residual.add(rows, flow.end[i] - x[places])
-        self._add_begin(step, rows, back[i], result)
-        result.open_jacobian.add((rows[:, None], places), Ball(-np.eye(width)))
-        result.path_jacobian.add(rows, along[i])
+        steps = [self.steps[places[i]] for i in at_nodes]
+        rows = width * np.array(places)[at_nodes][:, None] + np.arange(width)
+        nodes = np.array([step.close for step in steps])[:, None] + np.arange(width)
+        result.residual.add(rows, flow.end[at_nodes] - x[nodes])
+        result.path_jacobian.add(rows, along[at_nodes])
+        blocks = np.tile(-np.eye(width), (len(steps), 1, 1))
+        result.open_jacobian.add((rows[:, :, None], nodes[:, None, :]), Ball(blocks))
+        inner = [j for j, step in enumerate(steps) if not step.from_event]
+        begins = np.array([steps[j].begin for j in inner], dtype=int)[:, None] + np.arange(width)
+        result.open_jacobian.add(
+            (rows[inner][:, :, None], begins[:, None, :]),
+            back[np.array(at_nodes)[inner]][:, :, :width],
+        )
+        for j, step in enumerate(steps):
+            if step.from_event:
+                self._add_begin(step, rows[j], back[at_nodes[j]], result)
 
     def _close_events(
         self,

@@ -331,6 +331,7 @@ class _Walk:
         self.steps = steps
         self.boxes: list[ProvedBox] = []
         self.guesses: list[tuple[np.ndarray, float]] = []
+        self.places: dict[int, np.ndarray | None] = {}
 
     def walk(self, most_boxes: int) -> ProvedPiece | str:
         """The piece, or why there is none."""
@@ -480,11 +481,9 @@ class _Walk:
         count = shooting.event_unknowns
         columns = [*range(count), -1]
         while reached < self.last:
-            point = self.points[reached + 1]
-            made = point.orbit.equations.segments_to_prove(point.solution)
-            if isinstance(made, CannotProve):
+            place = self._place_of(reached + 1)
+            if place is None:
                 return reached
-            place = np.append(made.guess.ravel(), point.solution.values[0])
             distance = place - tube.middle[columns]
             s = float(tube.row[columns] @ distance)
             if s > tube.half:
@@ -494,6 +493,18 @@ class _Walk:
                 return reached
             reached += 1
         return reached
+
+    def _place_of(self, number: int) -> np.ndarray | None:
+        """The unknowns of the events of a point of the branch, then its parameter."""
+        if number not in self.places:
+            point = self.points[number]
+            made = point.orbit.equations.segments_to_prove(point.solution)
+            self.places[number] = (
+                None
+                if isinstance(made, CannotProve)
+                else np.append(made.guess.ravel(), point.solution.values[0])
+            )
+        return self.places[number]
 
     def _uneven(self, arc: ProvedArc) -> bool:
         """Whether nodes no longer fit."""
