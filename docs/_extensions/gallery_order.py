@@ -15,7 +15,7 @@ GROUPS = {  # by subject, as the first paragraph of the gallery lists them
     "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop",
     "Harvesters and coordinates of first order": "harvester piezo_harvester",
     "Orbits, branches, spectra": (
-        "orbits period_doubling resting_orbit proved_fold response_spectrum duffing smoothing"
+        "orbits period_doubling resting_orbit proved_orbit proved_fold response_spectrum duffing smoothing"
     ),
     "Attractors and chaos": (
         "basins erosion capture chaos coming_to_rest potential_wells ensemble stability_chart"
