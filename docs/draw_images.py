@@ -44,16 +44,21 @@ def readme():
     saltus.animate(orbit, IMAGES / "impact_oscillator.gif", seconds=2.6, fps=20)
 
 
+def shown(page):
+    """The names of the images that a page shows."""
+    return re.findall(r"\(\.\./images/([\w.]+)\)", page.read_text(encoding="utf-8"))
+
+
 def tutorial(page):
     """The images that a page shows, saved by its own code."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         run(page)
-        for name in re.findall(r"\(\.\./images/([\w.]+)\)", page.read_text(encoding="utf-8")):
+        for name in shown(page):
             if os.path.exists(name):
                 shutil.copy(name, IMAGES / name)
 
 
 if __name__ == "__main__":
-    pages = {page.stem: page for page in sorted((DOCS / "tutorials").glob("*.md"))}
+    pages = {page.stem: page for page in sorted((DOCS / "tutorials").glob("*.md")) if shown(page)}
     for asked in sys.argv[1:] or ["readme", *pages]:
         readme() if asked == "readme" else tutorial(pages[asked])

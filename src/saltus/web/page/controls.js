@@ -212,6 +212,11 @@ export class NumberField {
   }
 }
 
+// A group with more numbers than these folds all but its first and its last ones.
+const MOST_IN_SIGHT = 10;
+const FIRST_IN_SIGHT = 4;
+const LAST_IN_SIGHT = 2;
+
 /** A titled group of numbers. @param {HTMLElement} parent @param {string} title @param {NumberEntry[]} entries @param {FieldHost} host */
 export function numberGroup(parent, title, entries, host) {
   if (!entries.length) return [];
@@ -220,5 +225,16 @@ export function numberGroup(parent, title, entries, host) {
   legend.textContent = title;
   group.append(legend);
   parent.append(group);
-  return entries.map((entry) => new NumberField(group, entry, host));
+  if (entries.length <= MOST_IN_SIGHT) return entries.map((entry) => new NumberField(group, entry, host));
+  // of a structure's states only the first ones; the time at the start and the duration come last
+  const folded = document.createElement("details");
+  folded.className = "folded";
+  const summary = document.createElement("summary");
+  const hidden = entries.slice(FIRST_IN_SIGHT, -LAST_IN_SIGHT);
+  summary.textContent = `${hidden.length} more`;
+  folded.append(summary);
+  const before = entries.slice(0, FIRST_IN_SIGHT).map((entry) => new NumberField(group, entry, host));
+  group.append(folded);
+  const within = hidden.map((entry) => new NumberField(folded, entry, host));
+  return [...before, ...within, ...entries.slice(-LAST_IN_SIGHT).map((entry) => new NumberField(group, entry, host))];
 }
