@@ -432,4 +432,5 @@ def test_one_path_may_stand_alone_and_none_is_the_state_alone():
     none = saltus.sensitivities(forced(H=0.5), theta=0.3, duration=1.0)
     assert none.parameters.shape == (2, 0)
     assert none.state.shape == (2, 2)
-    np.testing.assert_array_equal(none.state, one.state)
+    # columns of parameters lengthen no step, but their loops may round sums in another order
+    np.testing.assert_allclose(none.state, one.state, rtol=1e-13)

@@ -28,6 +28,7 @@ HALVES = {
     "rocking block",
     "smoothed",
     "a user's model",  # symmetric about its edge
+    "a user's smooth model",
 }
 
 

@@ -286,3 +286,9 @@ def test_what_has_no_meaning_is_refused(function, grid, sentence):
 def test_shapes_that_differ_are_refused():
     with pytest.raises(ParameterError, match="shape"):
         saltus.map_over(lambda x: np.ones(int(x)), {"x": [1.0, 2.0]}, retries=0)
+
+
+@pytest.mark.parametrize("store", ["x" * 300, "/" + "y" * 300])
+def test_a_store_with_too_long_a_name_is_one_sentence(store):
+    with pytest.raises(ParameterError, match="store must be the path of a folder"):
+        saltus.map_over(total, GRID, store=store)

@@ -123,10 +123,13 @@ class Fit(Result):
         values
             The numbers by their paths, or a list of them in the order of `fit.values`.
         """
-        x = np.array(
-            [values[name] for name in self.values] if isinstance(values, Mapping) else values,
-            dtype=float,
-        )
+        try:
+            x = np.array(
+                [values[name] for name in self.values] if isinstance(values, Mapping) else values,
+                dtype=float,
+            )
+        except (LookupError, TypeError, ValueError):
+            x = np.zeros(0)  # which is refused
         if x.shape != (len(self.values),):
             raise ParameterError(
                 f"values must be {len(self.values)} numbers, for {', '.join(self.values)}", "values"

@@ -2,6 +2,7 @@ from .chunks import Failure as Failure
 from .execution import SweepInterrupted as SweepInterrupted
 from .execution import check_run as check_run
 from .execution import run as run
+from .execution import store_path as store_path
 from .memo import Memo as Memo
 from .memo import MemoKind as MemoKind
 from .plan import Plan as Plan

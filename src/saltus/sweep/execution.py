@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.checks import answered, check_count
-from saltus.errors import ParameterError, SweepError
+from saltus.errors import ParameterError, SweepError, shown
 from saltus.progress import Progress, silent
 from saltus.sweep.chunks import Arrays, Computation, Failure, Index, Raised, attempt, checked
 from saltus.sweep.plan import Plan
@@ -301,6 +301,17 @@ def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path |
             f"{progress!r}",
             "progress",
         )
+    return store_path(store)
+
+
+def store_path(store: Any) -> Path | None:
+    """The path of a store, or None.
+
+    Raises
+    ------
+    ParameterError
+        It is no path of a folder on this machine.
+    """
     if store is not None and not isinstance(store, str | Path):
         raise ParameterError(
             f"store must be the path of a folder, or None, got {store!r:.80}", "store"
@@ -311,4 +322,13 @@ def check_run(store: Any, workers: Any, scheduler: Any, progress: Any) -> Path |
         raise ParameterError(
             f"store must be a folder on this machine, got the address {store!r}", "store"
         )
-    return None if store is None else Path(store)
+    if store is None:
+        return None
+    try:
+        Path(store).exists()
+    except OSError as error:
+        raise ParameterError(
+            f"store must be the path of a folder: {error.strerror}, got {shown(str(store))}",
+            "store",
+        ) from None
+    return Path(store)

@@ -243,7 +243,7 @@ class UnitCell:
         theta
             The difference angle, rad; any shape.
         """
-        return np.sign(theta) * (math.cos(self.beta0) - np.cos(self.beta(theta)))
+        return np.sign(np.multiply(1.0, theta)) * (math.cos(self.beta0) - np.cos(self.beta(theta)))
 
     def eta(self, theta: Numbers) -> Any:
         """Height of the layer, sin(beta_j) (`configdbeta`).

@@ -270,8 +270,11 @@ def _check(
     check_work("periods", height * width, periods)
     at_once = width * (height if store is None else min(rows, height))
     check_memory(grid.plane[1], float(at_once) * LIMITS.motion, f"{at_once} cells at once")
-    if store is not None and Path(store).exists():
-        check_basin_store(Path(store), system)
+    from saltus.sweep import store_path
+
+    path = store_path(store)
+    if path is not None and path.exists():
+        check_basin_store(path, system)
 
 
 @checked_by(_check)
