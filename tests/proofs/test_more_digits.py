@@ -132,3 +132,20 @@ def test_series_of_functions_are_those_of_mpmath(name: str) -> None:
         found = precise.FUNCTIONS[name](flint.arb_series([flint.arb(0.7), 1], prec=9)).coeffs()
         for coefficient, exact in zip(found, expected, strict=True):
             assert abs(mp.mpf(coefficient.mid().str(40, radius=False)) - exact) < 1e-13
+
+
+def test_beside_a_fold_a_proof_of_another_stability_is_not_given() -> None:
+    """Two orbits lie 4e-8 on both sides of the phase pi. One that is asked for between them solves its
+    equations in doubles, is not stable, and Newton's method leads from it to the stable one.
+    """
+    pytest.importorskip("flint")
+    near, phase = beside_the_fold(6e-16)
+    between = np.array([np.pi + 0.002 * (float(phase) - np.pi), 4.0 * np.pi / 3.0])
+    orbit = PeriodicOrbit.known(near.equations, between, near.solution.values)
+    assert orbit is not None
+    assert not orbit.stable
+    assert saltus.prove(near, step=1.0, order=24).stable
+    proof = saltus.prove(orbit, step=1.0, order=24)
+    assert proof.proved is None
+    assert proof.stable is None
+    assert "which of two orbits was meant is not decided" in proof.reason

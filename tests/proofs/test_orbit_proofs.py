@@ -299,7 +299,7 @@ def test_what_cannot_be_proved_says_why() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"radii": {"model.dampin": 1e-3}}, "no number of the system"),
+        ({"radii": {"model.dampin": 1e-3}}, "is not a number of the system"),
         ({"radii": {"model.damping": -1.0}}, "must lie in"),
         ({"radii": {"load.horizontal.mean": 1e-9}}, "orbit is symmetric, and with another load"),
         ({"radii": {"load.horizontal.order": 1e-9}}, "is a whole number"),

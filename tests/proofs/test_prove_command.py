@@ -83,7 +83,7 @@ def test_a_branch_is_written_with_columns_and_read_back(run, tmp_path: Path) -> 
     [
         ('path = "load.ground.amplitude"', "path and bounds belong together"),
         ("most_boxes = -1", "most_boxes"),
-        ('radii = { "model.wal" = 1e-6 }', "no number of the system"),
+        ('radii = { "model.wal" = 1e-6 }', "is not a number of the system"),
         ("radii = 1e-6", "table of numbers"),
         ('radii = { "model.wall" = "wide" }', "model.wall"),
         ("thet = 0.3", "unknown key prove.thet"),

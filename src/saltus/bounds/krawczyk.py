@@ -33,7 +33,7 @@ class KrawczykSettings:
     # More digits are tried where Newton's step, in natural scales, is longer than a few roundings, and
     # the condition less than what makes the Jacobian in doubles useless.
     rounded: float = 1e-14
-    singular: float = 1e13
+    singular: float = 1e11
     halvings: int = 10  # of the box of a singular orbit, see `only_one`
     # A box is told wider than the operator's image of it by this, and its image is narrower than it
     # by `sure`: machines that round in another way verify it too.

@@ -13,9 +13,9 @@ If rows `pins` c . x = d are appended, the parameter at `path` is unknown as wel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -169,11 +169,14 @@ class Adder:
         self.middle = np.zeros(shape)
         self.radius = np.zeros(shape)
 
+    def put(self, places: Any, value: Ball) -> None:
+        """Set balls."""
+        self.middle[places] = value.middle
+        self.radius[places] = value.radius
+
     def add(self, places: Any, value: Ball) -> None:
         """Add balls at distinct places."""
-        total = Ball(self.middle[places], self.radius[places]) + value
-        self.middle[places] = total.middle
-        self.radius[places] = total.radius
+        self.put(places, Ball(self.middle[places], self.radius[places]) + value)
 
     @property
     def ball(self) -> Ball:
@@ -516,30 +519,30 @@ class Shooting:
         """The states with which steps begin, with their derivatives."""
         count = len(steps)
         width = 2 * self.dof
-        most = max(width, self.event_size)
-        result = _Begins(count, width, most)
-        for i, step in enumerate(steps):
-            if step.from_event:
-                continue
-            result.put_time(i, Ball(step.begin_time))
-            result.put_state(i, x[step.begin : step.begin + width])
-            result.slopes.middle[i, range(width), range(width)] = 1.0
+        times = Adder(count)
+        states = Adder(count, width)
+        slopes = Adder(count, width, max(width, self.event_size))
+        along = Adder(count, width)
         events = [i for i, step in enumerate(steps) if step.from_event]
+        nodes = [i for i, step in enumerate(steps) if not step.from_event]
+        if nodes:
+            at = np.array([steps[i].begin for i in nodes])[:, None] + np.arange(width)
+            times.put(nodes, Ball([steps[i].begin_time for i in nodes]))
+            states.put(nodes, x[at])
+            slopes.middle[nodes, :, :width] = np.eye(width)
         if events:
             at = np.array([steps[i].begin for i in events])[:, None] + np.arange(self.event_size)
             unknowns = x[at]
             time = unknowns[:, 0] if self.free_time else Ball(np.zeros(len(events)))
             values = self._values(group.start, known, unknowns, time, None)
-            for j, i in enumerate(events):
-                result.put_time(i, time[j])
-                result.put_state(i, values[j, :width])
-                slopes = values[j, width : width * (1 + self.event_size)]
-                slopes = slopes.reshape(self.event_size, width).transposed
-                result.slopes.middle[i, :, : self.event_size] = slopes.middle
-                result.slopes.radius[i, :, : self.event_size] = slopes.radius
-                result.along.middle[i] = values.middle[j, -width:]
-                result.along.radius[i] = values.radius[j, -width:]
-        return result
+            times.put(events, time)
+            states.put(events, values[:, :width])
+            inner = values[:, width : width * (1 + self.event_size)]
+            inner = inner.reshape(len(events), self.event_size, width).transposed
+            columns = np.arange(self.event_size)
+            slopes.put(np.ix_(np.array(events), np.arange(width), columns), inner)
+            along.put(events, values[:, -width:])
+        return _Begins(times.ball, states.ball, slopes.ball, along.ball)
 
     def _end_times(self, steps: list[Step], x: Ball, known: Ball) -> Ball:
         """When steps end."""
@@ -688,52 +691,47 @@ class Shooting:
 
     def pierced(self, enclosure: Enclosure, x: Ball) -> float | None:
         """A time at which a gap is certainly negative, for all motions of a box; else None."""
+        for step, gap, coefficients, position, length in self._gaps(enclosure, x):
+            begin = x[step.begin] if step.from_event else Ball(step.begin_time)
+            for share in SHARES:
+                moment = length * share
+                value = Ball(0.0)
+                for order in reversed(range(len(coefficients.middle))):
+                    value = value * moment + coefficients[order]
+                if ((value - position) * gap.sign).high < 0.0:
+                    return float(begin.middle + moment.middle)
+        return None
+
+    def is_open(self, enclosure: Enclosure, x: Ball) -> bool:
+        """Whether every gap is open inside every step, for all motions of a box."""
+        return all(
+            load_balls().is_open(
+                np.ascontiguousarray(coefficients.middle),
+                np.ascontiguousarray(coefficients.radius),
+                gap.sign,
+                float(position.middle),
+                float(position.radius),
+                float(length.middle),
+                float(length.radius),
+                gap.start if step.from_event else 0,
+                gap.stop if step.to_event else 0,
+            )
+            for step, gap, coefficients, position, length in self._gaps(enclosure, x)
+        )
+
+    def _gaps(self, enclosure: Enclosure, x: Ball) -> Iterator[tuple[Step, Gap, Ball, Ball, Ball]]:
+        """Each gap of each step, with the coefficients of its coordinate, its position, and the
+        step's length.
+        """
         known = self.parameters_at(x[-1] if self.pins is not None else None)[None]
         time = Ball(np.zeros(1))
         nothing = Ball(np.zeros((1, self.dof)))
         for k, step in enumerate(self.steps):
             tape = self.groups[step.segment].positions
             positions = tape.values(known, time, nothing, nothing)[0]
-            length = enclosure.lengths[k]
-            begin = x[step.begin] if step.from_event else Ball(step.begin_time)
             for at, gap in enumerate(self.segments[step.segment].gaps):
                 coefficients = enclosure.coefficients[k][gap.coordinate]
-                for share in SHARES:
-                    moment = length * share
-                    value = Ball(0.0)
-                    for order in range(len(coefficients.middle) - 1, -1, -1):
-                        value = value * moment + coefficients[order]
-                    if ((value - positions[at]) * gap.sign).high < 0.0:
-                        return float(begin.middle + moment.middle)
-        return None
-
-    def is_open(self, enclosure: Enclosure, x: Ball, parameter: Ball | None = None) -> bool:
-        """Whether every gap is open inside every step, for all motions of a box."""
-        if self.pins is not None:
-            parameter = x[-1]
-        known = self.parameters_at(parameter)[None]
-        time = Ball(np.zeros(1))
-        nothing = Ball(np.zeros((1, self.dof)))
-        for k, step in enumerate(self.steps):
-            segment = self.segments[step.segment]
-            tape = self.groups[step.segment].positions
-            positions = tape.values(known, time, nothing, nothing)[0]
-            for at, gap in enumerate(segment.gaps):
-                coefficients = enclosure.coefficients[k][gap.coordinate]
-                length = enclosure.lengths[k]
-                if not load_balls().is_open(
-                    np.ascontiguousarray(coefficients.middle),
-                    np.ascontiguousarray(coefficients.radius),
-                    gap.sign,
-                    float(positions.middle[at]),
-                    float(positions.radius[at]),
-                    float(length.middle),
-                    float(length.radius),
-                    gap.start if step.from_event else 0,
-                    gap.stop if step.to_event else 0,
-                ):
-                    return False
-        return True
+                yield step, gap, coefficients, positions[at], enclosure.lengths[k]
 
 
 def _largest_states(enclosure: Enclosure, dof: int) -> np.ndarray:
@@ -749,26 +747,15 @@ def _largest_states(enclosure: Enclosure, dof: int) -> np.ndarray:
     return np.where((result > 0.0) & np.isfinite(result), result, 1.0)
 
 
-class _Begins:
+class _Begins(NamedTuple):
     """Where steps begin: times, states, their derivatives to the unknowns there and to the
     parameter.
     """
 
-    def __init__(self, count: int, width: int, most: int) -> None:
-        self.time = Ball(np.zeros(count), np.zeros(count))
-        self.state = Ball(np.zeros((count, width)), np.zeros((count, width)))
-        self.slopes = Ball(np.zeros((count, width, most)), np.zeros((count, width, most)))
-        self.along = Ball(np.zeros((count, width)), np.zeros((count, width)))
-
-    def put_time(self, i: int, time: Ball) -> None:
-        """Set the time of a begin."""
-        self.time.middle[i] = time.middle
-        self.time.radius[i] = time.radius
-
-    def put_state(self, i: int, state: Ball) -> None:
-        """Set the state of a begin, positions before velocities."""
-        self.state.middle[i] = state.middle
-        self.state.radius[i] = state.radius
+    time: Ball
+    state: Ball
+    slopes: Ball
+    along: Ball
 
 
 class _Flow:

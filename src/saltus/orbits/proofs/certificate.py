@@ -11,7 +11,7 @@ ball arithmetic of FLINT.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -114,15 +114,9 @@ def _of_zero(proof: OrbitProof | SpecialProof, orbit: PeriodicOrbit) -> dict[str
 
 
 def _step(step: Step) -> dict[str, Any]:
-    return {
-        "segment": step.segment,
-        "begin": step.begin,
-        "from_event": step.from_event,
+    return asdict(step) | {
         "begin_time": None if step.from_event else float(step.begin_time).hex(),
-        "close": step.close,
-        "to_event": step.to_event,
         "close_time": None if step.to_event else float(step.close_time).hex(),
-        "wraps": step.wraps,
     }
 
 

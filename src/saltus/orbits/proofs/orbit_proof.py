@@ -264,10 +264,13 @@ def theorem_of(
     if not reason and not least > 0.0:
         opened = False
         reason = "an impact was not shown to have a speed"
+    if not reason and zero.precise and multipliers.stable not in (None, orbit.stable):
+        opened = False
+        reason = "it lies so near a fold that which of two orbits was meant is not decided"
     if not reason and None in rested:
         opened = False
         reason = "an accumulation of impacts, or the rest after it, has no bound"
-    if not opened and made.rests:
+    if not opened and (made.rests or zero.precise):
         multipliers = Multipliers(None, ())
     impacts = events_of(shooting, zero.box, made)
     return OrbitProof(
