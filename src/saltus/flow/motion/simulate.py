@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping
 from copy import copy
 from operator import is_
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
@@ -274,6 +274,44 @@ def _sample_times(given: Any, start: float) -> np.ndarray:
 
 WHAT = "following the motion"  # for the progress
 GOES_ON = (Status.FULL, Status.PAUSED)  # the motion, with another call of the kernel
+
+
+@overload
+def simulate(
+    system: System,
+    *,
+    periods: float,
+    duration: None = ...,
+    velocity: Numbers = ...,
+    tol: float = ...,
+    time: float = ...,
+    side: int | None = ...,
+    stop_at: Iterable[str] = ...,
+    dense: bool = ...,
+    times: Numbers | None = ...,
+    progress: Progress = ...,
+    **coordinates: float,
+) -> Motion:
+    """The motion over so many forcing periods."""
+
+
+@overload
+def simulate(
+    system: System,
+    *,
+    duration: float,
+    periods: None = ...,
+    velocity: Numbers = ...,
+    tol: float = ...,
+    time: float = ...,
+    side: int | None = ...,
+    stop_at: Iterable[str] = ...,
+    dense: bool = ...,
+    times: Numbers | None = ...,
+    progress: Progress = ...,
+    **coordinates: float,
+) -> Motion:
+    """The motion over so much dimensionless time."""
 
 
 def simulate(
