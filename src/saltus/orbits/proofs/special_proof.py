@@ -299,12 +299,10 @@ def _singular(
         state_names=(*states[:d], *kernel_states[:d], *states[d:], *kernel_states[d:]),
     )
     probe = shooting_of(orbit, larger, path=path, radii=radii, pins=[], settings=steps)
-    # A part of the kernel vector has the scale of what it is a variation of, though it may be 0.
+    # A part of the kernel vector may be 0; its scale is then that of what it is a variation of.
     plain_scales = dict(zip(plain.names, plain.scales, strict=True))
-    own = zip(probe.names, probe.scales, strict=True)
-    probe.scales = np.array(
-        [plain_scales.get(name.removeprefix(KERNEL), scale) for name, scale in own]
-    )
+    least = [plain_scales.get(name.removeprefix(KERNEL), 0.0) for name in probe.names]
+    probe.scales = np.maximum(probe.scales, least)
     row = np.zeros(probe.size)
     goal = 0.0
     for i in range(events):
