@@ -1,6 +1,6 @@
 """
-A design grid, stopped and gone on with
-=======================================
+A design grid, stopped and continued
+====================================
 
 Which dashpot and which stops harvest most: a quantity of one's own over three parameters. The run
 is stopped half way, as a key or a power cut would do it, and the same call goes on. With the widest
