@@ -18,7 +18,7 @@ from saltus.taylor import inline_jit, jit, lean_jit
 @jit
 def functions_of(lane):
     """The functions of the structure that the scalar kernel calls."""
-    _, functions = lane.kernel
+    (functions,) = lane.kernel
     return functions
 
 

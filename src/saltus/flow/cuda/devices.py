@@ -31,7 +31,7 @@ FEWEST = 65
 # waits for a card, whose code may have to be made first.
 LEAST_WORK = 1e6
 SLOW = 32  # single numbers that a card computes in the time of a double one
-SEVERAL = "models with several contacts or with friction are not followed"
+RUBBING = "models with friction or with surfaces are not followed"
 
 
 @dataclass
@@ -77,8 +77,8 @@ def check_device(
             "device",
         )
     if device == "cuda":
-        if trace(system.in_gap_coordinates).several:
-            raise ParameterError(f"{SEVERAL} on a card: leave device out", "device")
+        if trace(system.in_gap_coordinates).friction_coordinates:
+            raise ParameterError(f"{RUBBING} on a card: leave device out", "device")
         card()
     return str(device)
 
@@ -144,8 +144,10 @@ def target_of(device: str, run: Program, motions: int, periods: float, cores: in
 
 def _refused(run: Program) -> str:
     """Why the motions of a program are not followed on a card, or nothing."""
-    if run.trace.several:
-        return SEVERAL
+    if run.trace.friction_coordinates:
+        return RUBBING
+    if run.structure.several and run.model.eigenmodes.size:
+        return "stiff structures, which move in eigenmodes, are not followed"
     if run.structure.sizes.columns:
         return "derivatives are not computed"
     return ""

@@ -8,10 +8,11 @@ from pathlib import Path
 from llvmlite import binding
 
 from saltus.flow.cuda import thread
+from saltus.flow.cuda.thread_memory import NONE, ONE_CONTACT, SEVERAL
 from saltus.flow.kernel.compiled import contacts_text, one_contact_text
-from saltus.flow.kernel.memory import OneContactFunctions
+from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
 from saltus.flow.lanes.compiled_lanes import driver_text, helpers_text
-from saltus.flow.lanes.memory import Helpers
+from saltus.flow.lanes.memory import Code, Helpers
 from saltus.taylor import (
     compiled_part,
     digest,
@@ -29,17 +30,26 @@ from saltus.taylor import (
 from saltus.taylor.private_numba import by_value
 
 ONE_LANE = {"SALTUS_LANES": "1"}
-# functions that are called by their names in the text, by the fields of named tuples that hold them
-HELPERS = ("first_root_of", "turning_range", "scalar_motion", "contacts_impact")
-STRUCTURE = ("series", "contact_series", "reset", "contact_damping", "tangent")
-LINKED = {
-    **{
-        (Helpers.__name__, field): name
-        for field, name in zip(Helpers._fields, HELPERS, strict=True)
-    },
-    **{(OneContactFunctions.__name__, name): name for name in STRUCTURE},
-}
 SEPARATOR = "\n; --- next text ---\n"
+
+
+def linked_functions(several: bool) -> dict[tuple[str, str], str]:
+    """The functions that are called by their names in the text, by the named tuples that hold them
+    and their fields.
+    """
+    names = SEVERAL if several else ONE_CONTACT
+    kinds = {
+        Code: names["code"],
+        Helpers: names["helpers"],
+        OneContactFunctions: (*ONE_CONTACT["kernel"][:-1], NONE, ONE_CONTACT["kernel"][-1]),
+        ContactsFunctions: SEVERAL["kernel"],
+    }
+    return {
+        (kind.__name__, field): name
+        for kind, functions in kinds.items()
+        for field, name in zip(kind._fields, functions, strict=False)
+        if name != NONE
+    }
 
 
 def kernel_texts(several: bool) -> list[str]:
@@ -68,7 +78,7 @@ def _sources(several: bool) -> dict[str, str]:
 
 def write(several: bool, path: str) -> None:
     """Write the texts to a file; called in a process of its own."""
-    numba_types.LINKED |= LINKED
+    numba_types.LINKED |= linked_functions(several)
     texts = list[str]()
     for source in _sources(several).values():
         for function, signature in functions_of(source):

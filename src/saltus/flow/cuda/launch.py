@@ -111,7 +111,11 @@ def _chunks(
         work.jobs,
     )
     tables = sum(table.nbytes for table in work.tables if len(table) > 1)
-    each = sum(array[0].nbytes for array in arrays) + WORD * (code.kept + FLAG_WORDS + 2) + tables
+    each = (
+        sum(array[0].nbytes for array in arrays)
+        + WORD * (code.first_row.size + FLAG_WORDS + 2)
+        + tables
+    )
     size = max(1, min(settings.most_motions, int(target.memory / each)))
     for first in range(0, n, size):
         yield slice(first, min(first + size, n))
@@ -130,7 +134,7 @@ def _launches(
     """
     n = len(work.states)
     flags = np.zeros((n, FLAG_WORDS + 1), dtype=np.int64)
-    kept = np.zeros((n, code.kept), dtype=np.int64)
+    kept = np.tile(code.first_row, (n, 1))
     made = (work.last, work.ends, work.rates, work.samples)
     arrays = (flags, kept, work.states, work.jobs, work.parameters, *work.tables, *made)
     places = [target.put(array) for array in arrays]

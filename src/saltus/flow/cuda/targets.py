@@ -14,11 +14,9 @@ import numpy as np
 from llvmlite import binding
 
 from saltus.errors import SaltusError
-from saltus.flow.cuda.thread_code import machine
+from saltus.flow.cuda.thread_code import BLOCK, BLOCKS, machine
 
 ARENA = 1 << 17  # bytes of a thread, for the arrays of the scalar kernel
-BLOCK = 128  # threads that start together
-RESIDENT = 384  # threads of a processor that fit into its registers, at 168 each
 SHARE = 0.25  # of the card's free memory that one launch takes
 
 
@@ -114,7 +112,7 @@ class Card:
         self._context = self._ask("the card is busy", driver.cuDevicePrimaryCtxRetain, self._device)
         self._ask("the card is busy", driver.cuCtxSetCurrent, self._context)
         processors = self._attribute(attribute.CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT)
-        self._threads = processors * RESIDENT
+        self._threads = processors * BLOCKS * BLOCK
         self.free_memory, _ = self._ask("the card is busy", driver.cuMemGetInfo)
         self.memory = SHARE * self.free_memory
         self._threads = min(self._threads, int(self.memory) // ARENA // BLOCK * BLOCK)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from llvmlite import binding
 
 from saltus.flow.cuda.kernel_text import kernel_texts
@@ -21,6 +22,10 @@ from saltus.taylor.vectors import Arithmetic
 CARD = "nvptx64-nvidia-cuda"
 OLDEST = "sm_80"
 VERSION = "+ptx75"
+BLOCK = 128  # threads that start together
+# Blocks of them that one processor of the card holds at once: the driver then gives a thread at most
+# 168 registers. With more it would hold fewer blocks than a launch starts.
+BLOCKS = 3
 # Functions that become part of the loop over steps, in which LLVM then knows the numbers of the
 # group: those whose names say that they take lanes, and the structure's own for lanes. The scalar
 # kernel, for rare events, is left as it is.
@@ -125,6 +130,11 @@ body:
 end:
   ret void
 }
+declare double @llvm.ceil.f64(double)
+define double @ceil(double %x) alwaysinline {
+  %whole = call double @llvm.ceil.f64(double %x)
+  ret double %whole
+}
 declare double @llvm.sqrt.f64(double)
 define double @sqrt(double %x) alwaysinline {
   %root = call double @llvm.sqrt.f64(double %x)
@@ -143,6 +153,10 @@ define ptr @arena() alwaysinline {{
   %arena = inttoptr i64 %place to ptr
   ret ptr %arena
 }}
+"""
+RESIDENT = f"""
+!nvvm.annotations = !{{!0}}
+!0 = !{{ptr @follow_all, !"maxntidx", i32 {BLOCK}, !"minctasm", i32 {BLOCKS}}}
 """
 ENTRIES = {
     "host": ARENA.format(thread="%thread = add i64 0, 0"),
@@ -171,7 +185,8 @@ define ptx_kernel void @follow_all(ptr %request) {
   call void @follow(ptr %request, i64 %first, i64 %step)
   ret void
 }
-""",
+"""
+    + RESIDENT,
 }
 
 
@@ -201,7 +216,7 @@ class ThreadCode:
     """The code of a thread for a target, an object file or PTX, and what it keeps of a motion."""
 
     code: bytes
-    kept: int  # words
+    first_row: np.ndarray  # words of a motion before its first launch
 
 
 def thread_code(lanes: Lanes, group: LaneGroup, card: bool) -> ThreadCode:
@@ -211,7 +226,7 @@ def thread_code(lanes: Lanes, group: LaneGroup, card: bool) -> ThreadCode:
     texts += [structure_text(lanes.program.trace), *kernel_texts(lanes.several)]
     made_by = source_of(sys.modules[__name__]), repr(binding.llvm_version_info), made_for()
     name = f"thread_{digest(*texts, *made_by)}.{'ptx' if card else 'o'}"
-    return ThreadCode(kept_bytes(name, lambda: _compiled(texts, card)), entry.kept)
+    return ThreadCode(kept_bytes(name, lambda: _compiled(texts, card)), entry.first_row)
 
 
 def _compiled(texts: Sequence[str], card: bool) -> bytes:

@@ -9,7 +9,7 @@ that a `Request` names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -23,13 +23,21 @@ from saltus.taylor.private_numba import value_type
 from saltus.taylor.vectors import DOUBLE, INDEX, LONG
 
 WORD = 8  # bytes
-NAMES = {  # of the functions in the text, by their places in the group
-    "code": ("lane_series", "lane_impact", "lane_field", "constants", "geometry"),
-    "helpers": ("first_root_of", "turning_range", "scalar_motion"),
-    "kernel": ("advance", "series", "contact_series", "reset", "contact_damping", "tangent"),
+CODE = ("lane_series", "lane_impact", "lane_field", "constants")
+HELPERS = ("first_root_of", "turning_range", "scalar_motion")
+NONE = ""  # no function
+ONE_CONTACT = {  # the functions in the text by their places in the group
+    "code": (*CODE, "geometry", NONE),
+    "helpers": (*HELPERS, NONE, "advance"),
+    "kernel": ("series", "contact_series", "reset", "contact_damping", "tangent"),
 }
-ROOM = ("polynomial", "gap")  # of which a motion keeps nothing
-FUNCTIONS = [name for names in NAMES.values() for name in names]
+SEVERAL = {
+    "code": (*CODE, "matrices", "lane_one_free"),
+    "helpers": (*HELPERS, "contacts_impact", "advance"),
+    "kernel": ("series", "matrices", "matrix_slopes", "tangent", "load_series"),
+}
+# A motion keeps nothing of these from one launch to the next.
+ROOM = ("polynomial", "gap", "impact_space")
 
 
 class Request(NamedTuple):
@@ -57,15 +65,42 @@ class Request(NamedTuple):
 
 
 FLAG_WORDS = FLAGS.itemsize // WORD
+KEPT = ("constants_of", "geometry", "contact_rows")
 
 
 def kept_fields(group: LaneGroup, series_at: int) -> dict[str, int]:
     """The arrays of a group that a motion keeps from one launch to the next besides its flags, and
     their words; of the memory, its slots before the series.
     """
-    names = ["constants_of", "geometry"] + ["stroboscopic", "agreements"] * group.sizes.settle
+    names = [*KEPT, *["stroboscopic", "agreements"] * group.sizes.settle]
     sizes = {name: getattr(group, name)[0].size for name in names}
     return {"memory": series_at, "rows": ROW.itemsize // WORD} | sizes
+
+
+def first_row(group: LaneGroup, fields: dict[str, int]) -> np.ndarray:
+    """What a motion keeps (`kept_fields`) before its first launch."""
+    row = np.zeros(sum(fields.values()), dtype=np.int64)
+    at = 0
+    for name, size in fields.items():
+        if name in KEPT:
+            row[at : at + size] = _words_of(getattr(group, name)[0])
+        at += size
+    return row
+
+
+def _words_of(array: np.ndarray) -> np.ndarray:
+    """The numbers of an array as words."""
+    return np.ascontiguousarray(array).ravel().view(np.int64)
+
+
+def _arrays(value: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """The arrays in a field of a group, by their names."""
+    if isinstance(value, np.ndarray):
+        yield name, value
+    elif isinstance(value, tuple):
+        names = getattr(value, "_fields", None) or map(str, range(len(value)))
+        for inner, part in zip(names, value, strict=True):
+            yield from _arrays(part, f"{name}.{inner}")
 
 
 def _word(builder: Any, place: Any, number: int) -> Any:
@@ -83,7 +118,7 @@ class ThreadText:
         """`places` are the parts of the memory for one lane, and `end` its slots."""
         self.group = group
         self.fields = kept_fields(group, places.positions)
-        self.kept = sum(self.fields.values())
+        self.first_row = first_row(group, self.fields)
         self._end = end
         self._module = ir.Module("thread")
         self._builder: Any = None
@@ -91,11 +126,21 @@ class ThreadText:
         self._words: dict[str, Any] = {}
         self._arrays: dict[str, tuple[Any, tuple[Any, ...]]] = {}
         self._setting = count()
+        several = group.impact_space is not None
+        self._spaces = {
+            name: array for field in ROOM for name, array in _arrays(getattr(group, field), field)
+        }
+        self._names = SEVERAL if several else ONE_CONTACT
+        names = dict.fromkeys(
+            name for part in self._names.values() for name in part if name != NONE
+        )
         self._functions = {
             name: ir.Function(self._module, ir.FunctionType(ir.VoidType(), []), name)
-            for name in FUNCTIONS
+            for name in names
         }
-        self._kind = LanesType.tuples["lanes of one contact"]
+        self._kind = LanesType.tuples[
+            f"lanes of {'several contacts' if several else 'one contact'}"
+        ]
         run = ir.FunctionType(value_type(types.none), [value_type(self._kind)])
         self._run = ir.Function(self._module, run, "run_thread")
         self._write()
@@ -118,9 +163,14 @@ class ThreadText:
         }
         # in the thread's own memory, so that LLVM may keep it in registers
         own = b.alloca(ir.ArrayType(LONG, self._end)), b.alloca(ir.ArrayType(LONG, FLAG_WORDS))
-        room = {name: b.alloca(ir.ArrayType(LONG, getattr(self.group, name).size)) for name in ROOM}
+        room = {
+            name: b.alloca(ir.ArrayType(LONG, max(1, array.nbytes // WORD)))
+            for name, array in self._spaces.items()
+        }
         control = b.alloca(ir.ArrayType(LONG, len(Control)))
         b.call(ir.Function(self._module, ir.FunctionType(ir.VoidType(), []), "begin_arena"), [])
+        for name, place in room.items():
+            self._clear(place, self._spaces[name].nbytes)
         b.branch(head)
         b.position_at_end(head)
         turn = b.phi(LONG)
@@ -129,7 +179,9 @@ class ThreadText:
         b.position_at_end(body)
         going = b.inttoptr(self._words["going"], words)
         motion = b.load(b.gep(going, [turn]))
-        kept = b.gep(b.inttoptr(self._words["kept"], words), [b.mul(motion, LONG(self.kept))])
+        kept = b.gep(
+            b.inttoptr(self._words["kept"], words), [b.mul(motion, LONG(self.first_row.size))]
+        )
         flags = b.gep(
             b.inttoptr(self._words["flags"], words), [b.mul(motion, LONG(FLAG_WORDS + 1))]
         )
@@ -149,6 +201,16 @@ class ThreadText:
         b.branch(head)
         b.position_at_end(end)
         b.ret_void()
+
+    def _clear(self, place: Any, size: int) -> None:
+        """Fill so many bytes with zeros."""
+        b = self._builder
+        kinds = [LONG.as_pointer(), ir.IntType(8), LONG, ir.IntType(1)]
+        clear = self._module.globals.get("zero_words") or ir.Function(
+            self._module, ir.FunctionType(ir.VoidType(), kinds), "zero_words"
+        )
+        first = b.gep(place, [INDEX(0), INDEX(0)])
+        b.call(clear, [first, kinds[1](0), LONG(size), kinds[3](0)])
 
     def _copy(self, rows: Iterable[tuple[Any, Any, int]]) -> None:
         """Copy from one place to another, word by word: a loop would become a call that copies
@@ -171,8 +233,10 @@ class ThreadText:
         places |= own
         lengths = {"memory": (self._end,), "work.control": (len(Control),)}
         for name, place in places.items():
-            shape = lengths.get(name) or (1, *getattr(group, name).shape[1:])
-            shape = getattr(group, name).shape if name in ROOM else shape
+            if name in self._spaces:
+                shape = self._spaces[name].shape
+            else:
+                shape = lengths.get(name) or (1, *getattr(group, name).shape[1:])
             self._arrays[name] = place, tuple(map(LONG, shape))
         if not group.sizes.settle:
             self._arrays["stroboscopic"] = kept, (LONG(1), LONG(0), LONG(0))
@@ -251,8 +315,8 @@ class ThreadText:
         return made
 
     def _constants(self, given: np.ndarray, name: str) -> tuple[Any, tuple[Any, ...]]:
-        """An array of whole numbers that a structure fixes, as a constant of the text."""
-        numbers = np.ascontiguousarray(given, dtype=np.int64).ravel().tolist() or [0]
+        """An array of numbers that a structure fixes, as a constant of the text."""
+        numbers = _words_of(given).tolist() or [0]
         kind = ir.ArrayType(LONG, len(numbers))
         table = ir.GlobalVariable(self._module, kind, f"numbers.{name}")
         table.linkage = "internal"
@@ -263,8 +327,9 @@ class ThreadText:
     def _function(self, path: tuple[str, ...]) -> str:
         """The name of the function at a place in the group."""
         part, *inner = path
-        names = NAMES[part]
-        if part == "kernel":
-            return names[0] if inner == ["0"] else names[1 + int(inner[1])]
-        fields = (Code if part == "code" else Helpers)._fields
-        return names[fields.index(inner[0])]
+        names = self._names[part]
+        if part == "code":
+            return names[Code._fields.index(inner[0])]
+        if part == "helpers":
+            return names[Helpers._fields.index(inner[0])]
+        return inner[1] if inner[1] in names else names[int(inner[1])]

@@ -73,7 +73,7 @@ class LaneTypes(NamedTuple):
     CONTACTS_IMPACT: Any
 
 
-def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
+def _lane_types(name: str, code: Any, advance: Any, functions: Any, several: bool) -> LaneTypes:
     """The types for models with one contact or none, or with several.
 
     A lane is an argument of functions to which its group has pointers, so the type of the group's
@@ -89,7 +89,7 @@ def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
         function_type(signature)
         for signature in (root, TURNING_RANGE, motion, impact)[: 4 if several else 3]
     ]
-    helpers += [] if several else [types.none]
+    helpers += [function_type(advance)] if several else [types.none, function_type(advance)]
     group = named_tuple(
         LaneGroup,
         *(
@@ -99,7 +99,7 @@ def _lane_types(name: str, code: Any, kernel: Any, several: bool) -> LaneTypes:
             _SETTINGS,
             named_tuple(Code, *code),
             named_tuple(Helpers, *helpers),
-            kernel,
+            types.Tuple((functions,)),
         ),
         *(_records(FLAGS), _records(ROW), _f2, _f2, _f3, _i2, _i3, _f1, _f1, space, _WORK),
     )
@@ -112,12 +112,14 @@ _geometry, _matrices, _one_free = (
     written_type(signature) for signature in (GEOMETRY, MATRICES, LANE_ONE_FREE)
 )
 _functions = types.Tuple(tuple(MODEL.types[i] for i in (0, 1, 2, 3, 5)))
-_kernel = types.Tuple((function_type(ADVANCE), _functions))
 ONE_CONTACT = _lane_types(
-    "lanes of one contact", (*_code, _geometry, types.none), _kernel, several=False
+    "lanes of one contact", (*_code, _geometry, types.none), ADVANCE, _functions, several=False
 )
-_contacts_kernel = types.Tuple((function_type(ADVANCE_CONTACTS), CONTACT_MODEL))
 CONTACTS = _lane_types(
-    "lanes of several contacts", (*_code, _matrices, _one_free), _contacts_kernel, several=True
+    "lanes of several contacts",
+    (*_code, _matrices, _one_free),
+    ADVANCE_CONTACTS,
+    CONTACT_MODEL,
+    several=True,
 )
 shared, RUN_LANES, LANE_ROOT, SCALAR_MOTION, CONTACTS_IMPACT = ONE_CONTACT

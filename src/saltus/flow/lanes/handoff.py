@@ -229,7 +229,7 @@ def scalar_motion(lane):
 
     Returns (PAUSED, 0), or why the motion ends and which margin reached zero.
     """
-    advance, _ = lane.kernel
+    advance = lane.helpers.advance
     numbers, state = scalar_state(lane)
     motion = numbers[0]
     rows = lane.contact_rows[lane.index]

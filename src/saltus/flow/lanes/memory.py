@@ -272,12 +272,13 @@ class Code(NamedTuple):
 
 
 class Helpers(NamedTuple):
-    """The functions that work on one lane at a time, by their addresses."""
+    """The functions that work on one lane at a time, or on its motion, by their addresses."""
 
     first_root: Any
     turning_range: Any
     scalar_motion: Any
     impact: Any  # of a model with several contacts; else None
+    advance: Any  # the scalar kernel
 
 
 class Work(NamedTuple):
@@ -319,7 +320,7 @@ class LaneGroup(NamedTuple):
     settings: LaneSettings
     code: Code
     helpers: Helpers
-    kernel: tuple[Any, ...]  # the scalar kernel, and the functions of the structure that it calls
+    kernel: tuple[Any]  # the functions of the structure that the scalar kernel calls
     flags: np.ndarray
     rows: np.ndarray
     constants_of: np.ndarray  # a row for each lane, as in the following

@@ -16,7 +16,7 @@ from saltus.taylor import inline_jit, jit, lean_jit
 @jit
 def functions_of(lane):
     """The functions of the structure that the scalar kernel calls."""
-    _, (series, contact_series, reset, contact_damping, tangent) = lane.kernel
+    ((series, contact_series, reset, contact_damping, tangent),) = lane.kernel
     return OneContactFunctions(
         series, contact_series, reset, contact_damping, lane.geometry[lane.index], tangent
     )
