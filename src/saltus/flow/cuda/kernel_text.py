@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 from llvmlite import binding
 
@@ -38,7 +39,7 @@ def linked_functions(several: bool) -> dict[tuple[str, str], str]:
     and their fields.
     """
     names = SEVERAL if several else ONE_CONTACT
-    kinds = {
+    kinds: dict[Any, tuple[str, ...]] = {
         Code: names["code"],
         Helpers: names["helpers"],
         OneContactFunctions: (*ONE_CONTACT["kernel"][:-1], NONE, ONE_CONTACT["kernel"][-1]),
