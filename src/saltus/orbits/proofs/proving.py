@@ -91,7 +91,7 @@ def prove(
         By its path, how far a number of the system may lie from its double: the theorem holds for
         all of these values.
     step
-        The longest Taylor step, also times the forcing frequency; 0.45 by default.
+        The longest Taylor step, in the time in which the system moves by itself; 0.35 by default.
     order
         The order of the Taylor steps; 36 by default.
     most_boxes
