@@ -52,7 +52,7 @@ def from_none_to_one_impact():
 def test_a_tree_comes_back_from_netcdf_as_it_was(spectrum, tmp_path):
     path = write_dataset(tmp_path / "spectrum.nc", spectrum)
     with xr.open_datatree(path, engine="h5netcdf") as file:
-        xr.testing.assert_identical(file.load(), spectrum)
+        assert file.load().identical(spectrum)
 
 
 @pytest.mark.parametrize("make", [through_a_grazing, from_none_to_one_impact])
