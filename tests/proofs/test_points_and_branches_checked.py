@@ -213,3 +213,11 @@ def test_other_words_about_a_branch_are_noticed(branch_proof: BranchProof) -> No
     special[at] = replace(special[at], evidence=replace(special[at].evidence, proof=false))
     branch = replace(branch_proof.branch, special=tuple(special))
     assert not replace(branch_proof, branch=branch).check()
+
+
+def test_a_proof_of_another_special_point_is_noticed(branch_proof: BranchProof) -> None:
+    special = list(branch_proof.branch.special)
+    at = next(i for i, point in enumerate(special) if point.kind == "LP")
+    special[at] = replace(special[at], point=branch_proof.branch.points[0])
+    branch = replace(branch_proof.branch, special=tuple(special))
+    assert not replace(branch_proof, branch=branch).check()

@@ -216,12 +216,19 @@ class BranchProof(Result):
         lies = np.zeros(len(points), dtype=bool)
         for piece in self.pieces:
             lies[piece.ends[0] : piece.ends[1] + 1] = True
-        proofs = [point.evidence.proof for point in self.branch.special]
+        proofs = [(point, point.evidence.proof) for point in self.branch.special]
+        own = [
+            proof.kind == point.kind
+            and proof.special.parameter == point.parameter
+            and proof.check()
+            for point, proof in proofs
+            if proof is not None and proof.proved
+        ]
         return bool(
             self.path == orbit.equations.paths[0]
             and self.assumptions == assumptions_of(any(p.orbit.symmetric for p in points))
             and np.array_equal(self.proved, lies)
-            and all(proof.check() for proof in proofs if proof is not None and proof.proved)
+            and all(own)
             and all(
                 _Walk(self.branch, *piece.ends, self.path, self.radii, self.steps).confirms(piece)
                 for piece in self.pieces
