@@ -59,6 +59,10 @@ def assumptions_of(symmetric: bool, zero: ProvedZero | None = None) -> tuple[str
     return (*ASSUMPTIONS, *((MIRROR,) * symmetric), *((FLINT,) * precise))
 
 
+# In natural scales: an orbit that lies farther from the enclosed one, beside a fold, may be another.
+NEARBY = 1e-5
+
+
 @dataclass(frozen=True)
 class ProofSettings:
     """When a proof refutes the orbit it was asked for."""
@@ -68,8 +72,6 @@ class ProofSettings:
     # ... but within these limits; its own equations are solved within the first of them.
     least: float = 1e-11
     most: float = 1e-7
-    # What no orbit in doubles can do without: a few roundings of its equations, times the condition.
-    rounded: float = 1e-15
 
 
 SETTINGS = ProofSettings()
@@ -264,7 +266,9 @@ def theorem_of(
     if not reason and not least > 0.0:
         opened = False
         reason = "an impact was not shown to have a speed"
-    if not reason and zero.precise and multipliers.stable not in (None, orbit.stable):
+    asked = np.abs(made.guess.ravel() - zero.middle[: made.guess.size])
+    moved = bool((asked > NEARBY * shooting.scales[: made.guess.size]).any())
+    if not reason and zero.precise and (moved or multipliers.stable not in (None, orbit.stable)):
         opened = False
         reason = "it lies so near a fold that which of two orbits was meant is not decided"
     if not reason and None in rested:
@@ -371,10 +375,10 @@ def _refutation(
     asked = made.guess.ravel()
     away = np.abs(asked - zero.middle[:count]) - 2.0 * zero.radius[:count]
     limit = np.clip(SETTINGS.solved * zero.condition, SETTINGS.least, SETTINGS.most)
-    limit = max(limit, SETTINGS.rounded * zero.condition)
     far = away / np.maximum(shooting.scales[:count], np.abs(asked))
     farthest = int(far.argmax())
-    if far[farthest] > limit:
+    # Where the equations are nearly singular, an orbit solves them in doubles that far away too.
+    if far[farthest] > limit and not zero.precise:
         return (
             f"the orbit as given does not solve the equations: the {shooting.names[farthest]} of"
             f" the one that does lies more than {rounded_down(float(away[farthest]), 2)} away"
