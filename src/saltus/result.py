@@ -307,6 +307,10 @@ def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
         raise ParameterError(
             f"the path comes first, to_csv(path, result); got {shown(path)}", "path"
         )
+    if not Path(path).name:
+        raise ParameterError(
+            f"path must name a file, such as branch.csv, got {shown(path)}", "path"
+        )
     return write_text(path, to_pandas(result, table).to_csv(lineterminator="\n"))
 
 

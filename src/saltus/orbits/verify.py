@@ -69,6 +69,7 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
     True
     """
     check_count("rounds", rounds, 1)
+    orbits = list(orbits)
     if len(orbits) == 0:
         return np.zeros(0)
     equations = orbits[0].equations

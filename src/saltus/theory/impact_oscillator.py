@@ -372,7 +372,8 @@ def wall_orbits(system: System, period: int = 1) -> WallOrbits:
             ),
             "model.damping",
         )
-    if isinstance(period, bool) or period != int(period) or period < 1:
+    whole = not isinstance(period, bool) and period >= 1 and math.isfinite(period)
+    if not whole or period != int(period):
         raise ParameterError(
             f"period must be a whole number of forcing periods, at least 1, got {period!r}",
             "period",

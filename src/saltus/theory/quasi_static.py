@@ -58,13 +58,14 @@ def critical_horizontal(beta0: float, vertical: Numbers, swing: float = 0.0) -> 
             f"{vertical!r}",
             "vertical",
         )
-    least = vertical**2 - swing**2
-    if np.any(least < 0):
+    check_number("swing", swing)
+    if np.any(np.abs(vertical) < abs(swing)):
         raise ParameterError(
             "swing must be at most abs(V), or theta = 0 is lost without a horizontal load; got "
             f"{swing!r}",
             "swing",
         )
+    least = vertical**2 - swing**2
     return np.abs(np.sqrt(least) / math.tan(beta0))[()]
 
 

@@ -288,7 +288,8 @@ def decayed_period(cycle: Numbers, *, period: float, e: float) -> Any:
     2.25
     """
     check_number("period", period, above=0.0)
-    return (1 + e) ** 2 / 4 * period * _factor(cycle, e) ** 2
+    factor = _factor(cycle, e)
+    return (1 + e) ** 2 / 4 * period * factor**2
 
 
 def final_time(*, period: float, e: float) -> float:

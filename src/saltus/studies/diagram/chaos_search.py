@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.attractors import EarlierJudgement
 from saltus.checks import check_count, checked_by
+from saltus.errors import ParameterError, shown
 from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.diagram.bands import BandOrigin, Bands
@@ -46,6 +47,17 @@ def _check(
     read_effort(effort)
     check_count("count", count, 2)
     check_window(window, system)
+    if not isinstance(special, Iterable) or isinstance(special, (str, bytes, Mapping)):
+        raise ParameterError(
+            f"special must be BandOrigins, as band_origins gives them, got {shown(special)}",
+            "special",
+        )
+    for origin in special if isinstance(special, (list, tuple)) else ():
+        if not isinstance(origin, BandOrigin):
+            raise ParameterError(
+                f"special must be BandOrigins, as band_origins gives them, got {shown(origin)}",
+                "special",
+            )
 
 
 @checked_by(_check)
