@@ -53,6 +53,7 @@ ONE_INSTANT = 1e-11  # events of frictions nearer than this are at one instant, 
 MOVED = 4096.0  # units in the last place by which events are moved: more than rounding moves them
 # Derivatives in two orders are the same if their columns differ by no more than this share.
 SAME_ORDER = 1e-6
+VANISHED = 1e-6  # a column of a state, in natural units: times SAME_ORDER it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,6 +318,8 @@ def in_any_order(
     given = np.append(units, np.ones(found.parameters.shape[1]))
     scaled = columns * given / units[:, None]
     size = np.abs(scaled).max(axis=0)
+    # A state's column begins with 1: what sticking leaves of one that vanishes is rounding.
+    size[: len(units)] = np.maximum(size[: len(units)], VANISHED)
     differs = np.zeros(columns.shape[1], dtype=bool)
     first: tuple[float, str] | None = None
     count = len(system.contact_model.contacts)
