@@ -298,10 +298,12 @@ class Lanes:
             sizes=self._sizes(),
             settings=self._settings(),
             code=self._code(),
-            helpers=Helpers(
-                *load_helpers(self.several),
-                *([] if self.several else [None]),
-                load_advance(self.several),
+            helpers=Helpers._make(
+                (
+                    *load_helpers(self.several),
+                    *([] if self.several else [None]),
+                    load_advance(self.several),
+                )
             ),
             kernel=(self.program.model if self.several else self.program.structure.functions,),
             flags=np.zeros(1, dtype=FLAGS),
