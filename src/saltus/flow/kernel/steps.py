@@ -23,7 +23,6 @@ from saltus.flow.kernel.layout import (
     SHORTEST,
     SLOW,
     SMALLEST,
-    STANDS,
     EventCode,
 )
 from saltus.flow.kernel.memory import ModeArrays, StateArrays, StepArrays
@@ -108,8 +107,8 @@ def state_size(motion, first, last):
     relative: a speed, so that it depends on units of length and time as a speed does.
 
     It is the largest of the velocities and of sqrt(abs(q a)), which is the amplitude of the
-    velocity of an oscillation about 0, at its ends too. Where all of these are 0, or far below the
-    rounding of what one step gives, it is that (`given_speed`).
+    velocity of an oscillation about 0, at its ends too. Where all of these are 0 it is the largest
+    acceleration, and SMALLEST if that is 0, too.
     """
     q = motion.coordinate_series
     v = motion.velocity_series
@@ -119,52 +118,10 @@ def state_size(motion, first, last):
     for i in range(first, last):
         pull = abs(a[i, 0])
         size = max(size, abs(v[i, 0]), math.sqrt(abs(q[i, 0])) * math.sqrt(pull))
-        largest = max(largest, pull, abs(v[i, 2]), abs(v[i, 3]))
-    if size > STANDS * largest:
+        largest = max(largest, pull)
+    if size > 0.0:
         return size
-    return max(size, given_speed(v[first:last], motion.order, motion.tolerance))
-
-
-@lean_jit
-def given_speed(series, order, tol):
-    """The speed that one step gives to a motion from rest, from the series (n, order + 1) of its
-    velocities; SMALLEST for one that stays at rest.
-
-    It is the largest of the terms c_k h^k at the end of the step, where the last two are the share
-    tol of it. A small first term, as of a load that is 0 but for rounding, is no part of it.
-    """
-    last = 0
-    for k in range(order, 0, -1):
-        for i in range(series.shape[0]):
-            if series[i, k] != 0.0 and last == 0:
-                last = k
-    if last == 0:
-        return SMALLEST
-    logarithm = math.log(tol)
-    end = log_term(series, last)
-    before = log_term(series, last - 1)
-    step = -np.inf
-    for k in range(1, last):
-        wanted = logarithm + log_term(series, k)
-        allowed = (wanted - end) / (last - k)
-        if k < last - 1 and before > -np.inf:
-            allowed = min(allowed, (wanted - before) / (last - 1 - k))
-        step = max(step, allowed)
-    if step == -np.inf:
-        return math.exp(end)
-    speed = -np.inf
-    for k in range(1, last + 1):
-        speed = max(speed, log_term(series, k) + k * step)
-    return math.exp(speed)
-
-
-@lean_jit
-def log_term(series, k):
-    """The logarithm of the largest coefficient of a power; -inf if all are 0."""
-    term = 0.0
-    for i in range(series.shape[0]):
-        term = max(term, abs(series[i, k]))
-    return math.log(term) if term > 0.0 else -np.inf
+    return largest if largest > 0.0 else SMALLEST
 
 
 @lean_jit
