@@ -173,7 +173,7 @@ def test_what_has_no_meaning_in_jax_is_said_in_a_sentence(jax):
 def test_a_length_is_asked_for_once():
     with pytest.raises(ParameterError, match="say how long"):
         saltus.to_jax(SYSTEM)
-    with pytest.raises(ParameterError, match="no periods or duration beside them"):
+    with pytest.raises(ParameterError, match="leave out periods and duration"):
         saltus.to_jax(SYSTEM, times=[1.0], periods=2)
     with pytest.raises(ParameterError, match="not before the start, 2"):
         saltus.to_jax(SYSTEM, times=[1.0, 3.0], time=2.0)

@@ -123,7 +123,7 @@ def test_what_no_picture_has_is_refused_in_one_sentence(branch, options, words):
 def test_size_and_dots_are_refused_for_given_axes(branch):
     figure, ax = plt.subplots()
     for name, value in (("size", "column"), ("dpi", 200)):
-        with pytest.raises(ParameterError, match=f"{name} is that of a new figure"):
+        with pytest.raises(ParameterError, match=f"{name} applies to a new figure"):
             saltus.plot(branch, ax=ax, **{name: value})
     plt.close(figure)
 

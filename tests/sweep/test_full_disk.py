@@ -28,7 +28,7 @@ def test_a_disk_that_is_full_is_told_and_the_store_goes_on_once_there_is_room(sc
     assert process.returncode == 0, err
     sentence, counts, parts, same = out.splitlines()
     assert "(no space left on device); the chunks before it are kept" in sentence
-    assert "run the same again" in sentence
+    assert "the same call continues from there" in sentence
     done, total = map(int, counts.split())
     assert 0 < done < total == 120
     assert parts == "0"

@@ -211,9 +211,7 @@ def test_a_file_that_has_changed_is_noticed_where_a_store_is_gone_on_with(tmp_pa
         saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr", retries=0)
     broken.unlink()
     file.write_text("2.5")
-    with pytest.raises(
-        ParameterError, match=r"keeps .*something that the function reads has changed"
-    ):
+    with pytest.raises(ParameterError, match=r"keeps .*something .*function reads has changed"):
         saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr")
     file.write_text("2.0")
     data = saltus.map_over(asked, {"x": [1.0, 2.0, 3.0]}, store=tmp_path / "k.zarr")

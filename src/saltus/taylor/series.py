@@ -57,6 +57,9 @@ class Rows:
     first_order: Sequence[int] = ()  # the positions of first order
     coordinates: Sequence[int] | None = None  # those whose positions these are, if they are not all
     loops: LoopRows | None = None  # the others, whose equations read the last of the roots
+    orders: int = (
+        0  # with as many, none is left to a loop: all coefficients are values of their own
+    )
 
 
 class Series:
@@ -103,7 +106,9 @@ class Series:
         kept = [row for i, row in self.velocities.items() if i not in layout.first_order]
         self._integrated = [*self.positions.values(), *kept]
         highest = max((row.degree for row in self.rows if row.degree is not None), default=0)
-        self.written_out = 2 * (highest // 2 + 1)  # the number of orders whose code is written out
+        self.written_out = 2 * (highest // 2 + 1)
+        # the number of orders whose code is written out
+        self.written_out = max(self.written_out, layout.orders)
         self._tables = inverses(self.builder, layout.capacity + 2)
 
     def _row(self, node: Node) -> Row:
@@ -180,6 +185,10 @@ class Series:
             if any_order and k:
                 self._go_on_if(b.icmp_signed("<", LONG(k), order), end)
             yield
+        if self.layout.orders:
+            b.branch(end)
+            b.position_at_end(end)
+            return
         first, self._head, newest = (
             b.block,
             *(b.append_basic_block(name) for name in ("pair", "newest")),

@@ -134,10 +134,14 @@ def _launches(
     """
     n = len(work.states)
     flags = np.zeros((n, FLAG_WORDS + 1), dtype=np.int64)
-    kept = np.tile(code.first_row, (n, 1))
     made = (work.last, work.ends, work.rates, work.samples)
-    arrays = (flags, kept, work.states, work.jobs, work.parameters, *work.tables, *made)
-    places = [target.put(array) for array in arrays]
+    given = (work.states, work.jobs, work.parameters, *work.tables)
+    places = [
+        target.put(flags),
+        target.room(n * code.first_row.nbytes),  # the threads fill it
+        target.put(code.first_row),
+        *(target.put(array) for array in (*given, *made)),
+    ]
     sizes = len(work.tables[0]), work.tables[0].shape[1], work.samples.shape[1]
     going = np.arange(n)
     while going.size:

@@ -33,6 +33,9 @@ class Target(Protocol):
     def put(self, array: np.ndarray) -> int:
         """Copy an array there; returns its address."""
 
+    def room(self, size: int) -> int:
+        """Room for so many bytes there; returns its address."""
+
     def get(self, address: int, array: np.ndarray) -> None:
         """Copy an array back."""
 
@@ -72,6 +75,9 @@ class Host:
     def put(self, array: np.ndarray) -> int:
         self._arrays.append(array)
         return int(array.ctypes.data)
+
+    def room(self, size: int) -> int:
+        return self.put(np.empty(-(-size // 8), dtype=np.int64))
 
     def get(self, address: int, array: np.ndarray) -> None:
         pass  # it is there
@@ -163,11 +169,14 @@ class Card:
         self._ask(problem, driver.cuMemcpyHtoD, place, array.ctypes.data, array.nbytes)
 
     def put(self, array: np.ndarray) -> int:
-        size = max(8, array.nbytes)
-        place = self._ask("the card's memory is full", self._driver.cuMemAlloc, size)
-        self._arrays.append(place)
+        place = self.room(array.nbytes)
         if array.nbytes:
             self._copy_to(place, array)
+        return place
+
+    def room(self, size: int) -> int:
+        place = self._ask("the card's memory is full", self._driver.cuMemAlloc, max(8, size))
+        self._arrays.append(place)
         return int(place)
 
     def get(self, address: int, array: np.ndarray) -> None:

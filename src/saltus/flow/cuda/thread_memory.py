@@ -47,6 +47,7 @@ class Request(NamedTuple):
     going: Any  # their numbers
     flags: Any  # of each motion, and the calls of the scalar kernel in its last launch
     kept: Any  # the rows of all motions, see `kept_fields`
+    first_row: Any  # of a motion that begins
     states: Any  # from here on the arrays of `Work`
     jobs: Any
     parameters: Any
@@ -185,6 +186,8 @@ class ThreadText:
         flags = b.gep(
             b.inttoptr(self._words["flags"], words), [b.mul(motion, LONG(FLAG_WORDS + 1))]
         )
+        with b.if_then(b.icmp_signed("==", b.load(flags), LONG(0))):  # it holds no motion yet
+            self._begin(kept)
         rows = ((own[0], kept, self.fields["memory"]), (own[1], flags, FLAG_WORDS))
         self._place(
             motion, kept, room | {"memory": own[0], "flags": own[1], "work.control": control}
@@ -202,6 +205,18 @@ class ThreadText:
         b.position_at_end(end)
         b.ret_void()
 
+    def _begin(self, kept: Any) -> None:
+        """Fill what a motion keeps before its first launch."""
+        b = self._builder
+        given = b.inttoptr(self._words["first_row"], LONG.as_pointer())
+        self._clear(kept, WORD * self.first_row.size)
+        at = 0
+        for name, size in self.fields.items():
+            if name in KEPT:
+                start = b.gep(given, [LONG(at)]), b.gep(kept, [LONG(at)])
+                self._copy([(*start, size)])
+            at += size
+
     def _clear(self, place: Any, size: int) -> None:
         """Fill so many bytes with zeros."""
         b = self._builder
@@ -209,7 +224,7 @@ class ThreadText:
         clear = self._module.globals.get("zero_words") or ir.Function(
             self._module, ir.FunctionType(ir.VoidType(), kinds), "zero_words"
         )
-        first = b.gep(place, [INDEX(0), INDEX(0)])
+        first = _word(b, place, 0)
         b.call(clear, [first, kinds[1](0), LONG(size), kinds[3](0)])
 
     def _copy(self, rows: Iterable[tuple[Any, Any, int]]) -> None:
