@@ -407,7 +407,9 @@ def _branch(
             np.stack([now + motion.impacts.time, -motion.impacts.velocity_after], axis=1)[within]
         )
         parts.append(part)
-        now, theta, velocity = now + stretch, motion.position, motion.velocity
+        now += stretch
+        theta = motion.position
+        velocity = motion.velocity
     time, thetas, velocities = np.concatenate(parts, axis=1)
     contacts = np.concatenate(impacts) * np.array([-1.0, 1.0])
     return Separatrix(system, saddle.place, -time, thetas, -velocities, contacts, end)

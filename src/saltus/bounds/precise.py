@@ -73,7 +73,8 @@ def precise_residual(shooting: Shooting, x: np.ndarray) -> Ball | None:
     import flint
 
     before = flint.ctx.prec, flint.ctx.cap
-    flint.ctx.prec, flint.ctx.cap = BITS, ORDER + 1
+    flint.ctx.prec = BITS
+    flint.ctx.cap = ORDER + 1
     try:
         rows = _Residual(shooting, x).rows()
     except (TypeError, AttributeError):  # FLINT's words for what it has no series of
