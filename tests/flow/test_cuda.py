@@ -25,7 +25,7 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.flow.cuda import devices
 from saltus.flow.cuda.launch import LaunchSettings, example_of, run_on
 from saltus.flow.cuda.targets import Card, Host
-from saltus.flow.cuda.thread_code import OLDEST, thread_code
+from saltus.flow.cuda.thread_code import BLOCK, BLOCKS, OLDEST, thread_code
 from saltus.flow.kernel.compiled import limits_of, program
 from saltus.flow.lanes import ensemble
 from saltus.flow.lanes.inputs import read_inputs
@@ -214,6 +214,9 @@ def test_a_card_needs_nothing_besides(ptx):
     assert f".target {OLDEST}" in ptx
     assert ".entry follow_all" in ptx
     assert ".extern" not in ptx  # no name is open
+    # the registers that the driver gives follow from these
+    assert f".maxntid {BLOCK}" in ptx
+    assert f".minnctapersm {BLOCKS}" in ptx
     assert "callprototype" not in ptx  # no call through an address, so the stack is known
 
 

@@ -32,8 +32,8 @@ CARD = "nvptx64-nvidia-cuda"
 OLDEST = "sm_80"
 VERSION = "+ptx75"
 BLOCK = 128  # threads that start together
-# Blocks of them that one processor of the card holds at once: the driver then gives a thread at most
-# 255 registers. Three blocks took 1.7 times as long on an H200, as their memory leaves its caches.
+# Blocks of them that one processor of the card holds at once: the driver then gives a thread at
+# most 255 registers. Three took 1.7 times as long on an H200, whose caches their memory leaves.
 BLOCKS = 2
 # Functions that become part of the loop over steps, in which LLVM then knows the numbers of the
 # group: those whose names say that they take lanes, and the structure's own for lanes. The scalar
