@@ -104,8 +104,14 @@ from .systems.pulses import HalfSine as HalfSine
 from .systems.pulses import MavroeidisPapageorgiou as MavroeidisPapageorgiou
 from .systems.pulses import OneCosine as OneCosine
 from .systems.pulses import OneSine as OneSine
+from .systems.pulses import Pulse as Pulse
 from .systems.pulses import Ramp as Ramp
 from .systems.pulses import Ricker as Ricker
+from .systems.pulses import Step as Step
+from .systems.repeating import Sawtooth as Sawtooth
+from .systems.repeating import Square as Square
+from .systems.repeating import Table as Table
+from .systems.repeating import Triangle as Triangle
 from .systems.si_units import PhysicalBlock as PhysicalBlock
 from .systems.si_units import PhysicalCell as PhysicalCell
 from .systems.structure import Structure as Structure

@@ -65,6 +65,19 @@ def wall(rng):
     }
 
 
+def cornered(rng):
+    """A load that jumps: its shape is a setting, of which a page has one."""
+    force = [
+        saltus.Square(rng.uniform(0.2, 1.0), phase=0.4, duty=0.3),
+        saltus.Triangle(rng.uniform(0.2, 1.0), phase=-0.9),
+    ]
+    load = Load(frequency=rng.uniform(0.6, 2.0), force=force)
+    model = saltus.WallOscillator(damping=rng.uniform(0.0, 0.3), wall=rng.uniform(-0.2, 0.5))
+    return System(model=model, load=load, impact=saltus.EnergyRestitution(rng.uniform(0.3, 1.0))), {
+        "x": -0.3
+    }
+
+
 def block(rng):
     pulse = saltus.OneSine(
         amplitude=rng.uniform(1.0, 2.0),
@@ -170,7 +183,20 @@ def masses(rng):
     return system, {name: rng.uniform(-0.03, 0.03) for name in model.coordinates}
 
 
-KINDS = (cell, inelastic_cell, wall, block, recorded, stops, pair, belt, layers, cells, masses)
+KINDS = (
+    cell,
+    inelastic_cell,
+    wall,
+    cornered,
+    block,
+    recorded,
+    stops,
+    pair,
+    belt,
+    layers,
+    cells,
+    masses,
+)
 
 
 def length_of(system):

@@ -148,7 +148,7 @@ def _passing(load: Load) -> list[Any]:
 
 
 def _end(signal: Any) -> float:
-    return float(signal.time[-1] if hasattr(signal, "time") else signal.start + signal.length)
+    return float(signal.time[-1] if hasattr(signal, "time") else signal.settled)
 
 
 # rad; the start of the free vibration whose period is given if the study has no start
@@ -400,6 +400,8 @@ def mean(signal: Signal) -> float:
     return (
         signal.value
         if isinstance(signal, Constant)
+        else signal.constant_part
+        if signal.repeats
         else signal.mean
         if isinstance(signal, Harmonic)
         else 0.0

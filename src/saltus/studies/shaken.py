@@ -12,7 +12,7 @@ import numpy as np
 from saltus.attractors import Equilibrium, equilibria
 from saltus.errors import ParameterError, shown
 from saltus.flow import simulate_many, stop_names
-from saltus.systems import Box, Constant, Pulse, Record, System, check_system
+from saltus.systems import Box, Constant, Record, System, Transient, check_system
 
 if TYPE_CHECKING:
     import xarray
@@ -61,7 +61,7 @@ class Shaken:
             for name, signal in system.load.channels.items()
             if not isinstance(signal, Constant)
         ]
-        if len(varied) != 1 or not isinstance(system.load.channels[varied[0]], (Pulse, Record)):
+        if len(varied) != 1 or not isinstance(system.load.channels[varied[0]], (Transient, Record)):
             raise ParameterError(
                 "overturning needs a load with one pulse or record, such as"
                 f" ground_horizontal=HalfSine(...), besides constants; got {shown(system.load)}",
@@ -170,7 +170,7 @@ class Shaken:
 
 def end_of(signal: Any) -> float:
     """The time at which a pulse or a record is over."""
-    return float(signal.time[-1] if isinstance(signal, Record) else signal.start + signal.length)
+    return float(signal.time[-1] if isinstance(signal, Record) else signal.settled)
 
 
 class Outcomes(NamedTuple):

@@ -36,6 +36,8 @@ from .parameter_tables import check_path as check_path
 from .parameter_tables import distinct_rows as distinct_rows
 from .parameter_tables import finite_array as finite_array
 from .parameter_tables import parameter_table as parameter_table
+from .repeating import SAME_CORNER as SAME_CORNER
+from .repeating import Repeating as Repeating
 from .reversed import reversed_system as reversed_system
 from .scenarios import LayerState as LayerState
 from .scenarios import Scenario as Scenario
@@ -52,10 +54,10 @@ from .serial import signal_class as signal_class
 from .serial import substitute as substitute
 from .signals import Constant as Constant
 from .signals import Harmonic as Harmonic
-from .signals import Pulse as Pulse
 from .signals import Record as Record
 from .signals import Signal as Signal
 from .signals import Sum as Sum
+from .signals import Transient as Transient
 from .states import Box as Box
 from .states import Window as Window
 from .states import arguments_of as arguments_of

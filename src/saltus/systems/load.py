@@ -76,8 +76,8 @@ class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H),
     vertical=-0.5)`.
 
-    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine`, or a sum of
-    them, which may be written as a list; a channel that is not named is 0. Channels that begin with
+    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine` or `Step`, a wave
+    with corners such as `Square`, a `Table`, or a sum of them, which may be written as a list; a channel that is not named is 0. Channels that begin with
     `ground` are displacements of the ground (zeta, nu), all others forces. Frozen.
 
     The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H),
@@ -126,9 +126,18 @@ class Load:
         for name, signal in signals.items():
             if signal.periodic and frequency is None:
                 raise ParameterError(
-                    f"load.{name} is harmonic, so load.frequency must be given", f"load.{name}"
+                    f"load.{name} repeats itself, so load.frequency must be given", f"load.{name}"
                 )
             _check_quantity(name, signal)
+        repeating = [name for name, signal in signals.items() if signal.repeats]
+        passing = [name for name, signal in signals.items() if signal.once]
+        if repeating and passing:
+            raise ParameterError(
+                f"load.{passing[0]} happens once and load.{repeating[0]} repeats itself between"
+                " corners, which are not followed together: write the second one as a Record over"
+                " the time of the motion, or as harmonics",
+                f"load.{passing[0]}",
+            )
         object.__setattr__(self, "frequency", frequency)
         object.__setattr__(self, "channels", signals)
 
@@ -182,7 +191,7 @@ class DeclaredLoad:
 def _check_quantity(name: str, signal: Signal) -> None:
     terms: Any = getattr(signal, "terms", (signal,))
     for term in terms:
-        if term.once and (term.quantity == "force") == name.startswith("ground"):
+        if (term.once or term.repeats) and (term.quantity == "force") == name.startswith("ground"):
             wanted = (
                 "displacement, velocity or acceleration" if name.startswith("ground") else "force"
             )

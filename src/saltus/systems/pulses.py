@@ -17,16 +17,16 @@ import numpy as np
 
 from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.signals import RATE, TIME, Pulse
+from saltus.systems.signals import RATE, TIME, Transient
 
 
 def in_other_units(
-    pulse: Pulse,
+    pulse: Transient,
     by_time: Callable[..., Any],
     by_rate: Callable[..., Any],
     unit: float,
     factor: float,
-) -> Pulse:
+) -> Transient:
     """The pulse with its times and rates converted by the unit of time, and `factor` times as
     high.
     """
@@ -64,7 +64,7 @@ def sinusoid(rate: Any, phase: Any, since: Any, n: int) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HalfSine(Pulse):
+class HalfSine(Transient):
     """amplitude sin(frequency s) for 0 <= s <= pi / frequency, s the time since `start`.
 
     Parameters
@@ -154,7 +154,7 @@ class OneCosine(OneSine):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MavroeidisPapageorgiou(Pulse):
+class MavroeidisPapageorgiou(Transient):
     """The near-fault pulse of Mavroeidis and Papageorgiou (2003), BSSA 93(3), their velocity pulse:
 
         amplitude / 2 (1 + cos(frequency r / gamma)) cos(frequency r + phase),    r from -h to h, h
@@ -213,7 +213,7 @@ class MavroeidisPapageorgiou(Pulse):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ricker(Pulse):
+class Ricker(Transient):
     """The symmetric Ricker wavelet amplitude (1 - 2 u^2) exp(-u^2), u = frequency (s - 7 (2 /
     frequency)) / 2.
 
@@ -260,7 +260,91 @@ class Ricker(Pulse):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ramp(Pulse):
+class Pulse(Transient):
+    """A rectangular pulse: `amplitude` for 0 <= s < duration, s the time since `start`, else 0.
+
+    Pulses that repeat themselves are a `Square` or a `Table`.
+
+    Parameters
+    ----------
+    amplitude
+        What it is while it lasts, in units of the quantity.
+    start
+        The dimensionless time at which it begins.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+    duration
+        How long it lasts, above 0.
+
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.Pulse(amplitude=2.0, start=1.0, duration=0.5))
+    >>> float(load.force(0.9)), float(load.force(1.2)), float(load.force(1.6))
+    (0.0, 2.0, 0.0)
+    """
+
+    duration: float = field(metadata=TIME)
+    moving: ClassVar[tuple[str, ...]] = ("start", "duration")
+
+    @property
+    def length(self) -> Any:
+        """`duration`."""
+        return self.duration
+
+    def shape(self, since: Any, n: int) -> Any:
+        """amplitude s^(-n) / (-n)!, or 0 for derivatives."""
+        return constant_shape(self.amplitude, since, n)
+
+
+def constant_shape(amplitude: Any, since: Any, n: int) -> Any:
+    """A constant, or its integrals from 0; derivatives are 0."""
+    powers = {-2: 0.5 * since * since, -1: since, 0: 1.0}
+    return amplitude * powers.get(n, 0.0)
+
+
+# how long a step lasts: longer than any motion
+FOR_EVER = 1e150
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(Transient):
+    """0 before `start`, and `amplitude` from there on.
+
+    Parameters
+    ----------
+    amplitude
+        The height of the step, in units of the quantity.
+    start
+        The dimensionless time of the step.
+    quantity
+        What it is: "force", or of a ground channel "acceleration".
+
+    Examples
+    --------
+    >>> load = saltus.Load(force=saltus.Step(amplitude=2.0, start=1.0))
+    >>> float(load.force(0.9)), float(load.force(1.0)), float(load.force(99.0))
+    (0.0, 2.0, 2.0)
+    """
+
+    moving: ClassVar[tuple[str, ...]] = ("start",)
+
+    @property
+    def length(self) -> Any:
+        """Longer than any motion."""
+        return FOR_EVER
+
+    @property
+    def settled(self) -> Any:
+        """`start`."""
+        return self.start
+
+    def shape(self, since: Any, n: int) -> Any:
+        """amplitude s^(-n) / (-n)!, or 0 for derivatives."""
+        return constant_shape(self.amplitude, since, n)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(Transient):
     """amplitude s / duration for 0 <= s <= duration, and `amplitude` for ever after.
 
     Parameters
@@ -298,7 +382,7 @@ class Ramp(Pulse):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chirp(Pulse):
+class Chirp(Transient):
     """amplitude sin(frequency s + (end_frequency - frequency) s^2 / (2 duration)) for 0 <= s <=
     duration: a linear sweep.
 

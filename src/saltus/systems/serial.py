@@ -20,7 +20,7 @@ from saltus.systems.gap_coordinates import IN_GAPS, fields_of, in_gap_coordinate
 from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw, NamedParts
 from saltus.systems.load import Load
 from saltus.systems.model import Count, Model, OneContactModel, check_one_contact
-from saltus.systems.signals import Constant, Harmonic, Pulse, Record, Signal, Sum, as_signal
+from saltus.systems.signals import Constant, Harmonic, Record, Setting, Signal, Sum, as_signal
 
 
 def children(node: Any) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def is_number(value: Any) -> bool:
     """Whether a leaf is a number of the system; switches, names and counts belong to its
     structure.
     """
-    return isinstance(value, (int, float)) and not isinstance(value, (bool, Count))
+    return isinstance(value, (int, float)) and not isinstance(value, (bool, Count, Setting))
 
 
 def is_fixed(node: Any) -> bool:
@@ -219,7 +219,21 @@ IMPACTS = NamedTypes(
 )
 PULSES = NamedTypes(
     dict.fromkeys(
-        ("HalfSine", "OneSine", "OneCosine", "MavroeidisPapageorgiou", "Ricker", "Ramp", "Chirp")
+        (
+            "HalfSine",
+            "OneSine",
+            "OneCosine",
+            "MavroeidisPapageorgiou",
+            "Ricker",
+            "Ramp",
+            "Chirp",
+            "Pulse",
+            "Step",
+            "Square",
+            "Triangle",
+            "Sawtooth",
+            "Table",
+        )
     )
 )
 
@@ -285,11 +299,7 @@ def to_dict(part: Any) -> Any:
         return {"type": kind.__name__, **part.to_table()}
     fields = {name: getattr(part, name) for name in fields_of(kind)}
     fields = {name: value for name, value in fields.items() if value is not None}
-    return (
-        fields
-        if isinstance(part, Signal) and not isinstance(part, Pulse)
-        else {"type": kind.__name__, **fields}
-    )
+    return fields if isinstance(part, Harmonic) else {"type": kind.__name__, **fields}
 
 
 def from_dict(kind: str, data: Any) -> Any:

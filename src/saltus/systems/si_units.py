@@ -19,7 +19,7 @@ from saltus.systems.metainterface import Metainterface
 from saltus.systems.oscillators import RockingBlock
 from saltus.systems.pulses import in_other_units
 from saltus.systems.record_files import GRAVITY
-from saltus.systems.signals import Pulse, Record, Signal, Sum, scaled
+from saltus.systems.signals import Record, Signal, Sum, Transient, scaled
 from saltus.systems.system import System
 from saltus.systems.two_layer import TwoLayer
 
@@ -78,11 +78,12 @@ class Physical:
                 scale = signal.scale * units[signal.quantity] ** power
                 time = by_time(signal.time, units["time"])
                 return replace(signal, time=time, scale=scale)
-            if isinstance(signal, Pulse):
+            if isinstance(signal, Transient):
                 return in_other_units(
                     signal, by_time, by_rate, units["time"], units[signal.quantity] ** power
                 )
-            return scaled(signal, units[quantity] ** power)
+            own = getattr(signal, "quantity", quantity)  # of what is given between corners
+            return scaled(signal, units[own] ** power)
 
         channels = {
             name: convert(signal, "displacement" if name.startswith("ground") else "force")

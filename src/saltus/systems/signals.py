@@ -1,9 +1,10 @@
 """Signals: how one load channel varies with time. A constant, a harmonic, a record of samples, a
-sum, or a pulse (whose shapes are in `pulses.py`).
+sum, a pulse (whose shapes are in `pulses.py`), or what repeats itself between corners
+(`repeating.py`).
 
 A signal returns its value or its first or second derivative at a time `t`. This is a number, an
 array, or the symbolic time with which a model is traced (an object with the methods `phase`,
-`record` and `pulse`).
+`record`, `pulse` and `repeating`).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -28,6 +29,13 @@ from saltus.checks import (
 from saltus.errors import ParameterError, shown
 
 
+class Setting(float):
+    """A number of a signal that belongs to its structure, such as a duty: it can be replaced, and
+    is none of the numbers that have dotted paths and vary."""
+
+    __slots__ = ()
+
+
 class Signal:
     """The signal of a load channel.
 
@@ -39,6 +47,13 @@ class Signal:
     __slots__ = ()
     periodic: ClassVar[bool] = False  # needs a base frequency
     once: ClassVar[bool] = False  # happens once, so that nothing repeats itself under it
+    # is given between corners, whose phases in the forcing period are fixed
+    repeats: ClassVar[bool] = False
+
+    @property
+    def constant_part(self) -> float:
+        """Its mean over a forcing period."""
+        return 0.0
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """The `order`-th derivative with respect to tau at `t`."""
@@ -145,6 +160,11 @@ class Sum(Signal):
         """Whether any term happens once."""
         return any(term.once for term in self.terms)
 
+    @property
+    def repeats(self) -> bool:  # type: ignore[override]
+        """Whether any term is given between corners that repeat themselves."""
+        return any(term.repeats for term in self.terms)
+
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """The sum of the terms' derivatives."""
         total = self.terms[0].derivative(t, frequency, order)
@@ -183,7 +203,7 @@ def _extremes(curve: Any) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _samples(where: str, name: str, given: Any) -> np.ndarray:
+def samples_of(where: str, name: str, given: Any) -> np.ndarray:
     """The numbers of a list."""
     check_size(given, name)
     try:
@@ -202,8 +222,9 @@ class Record(Signal):
     every load.
 
     * `force`: linear between samples; 0 before the first and after the last one.
-    * `acceleration` (ground): linear between samples, integrated twice exactly from rest at the
-      first sample.
+      A time that is given twice is a jump, from the first of its values to the second.
+    * `acceleration` (ground): linear between samples, also with jumps, integrated twice exactly
+      from rest at the first sample.
     * `velocity`, `displacement` (ground): a cubic spline through the samples, so that the
       acceleration is continuous. Between samples that are corners, as of a trapezoid, a spline
       swings: one that leaves the range of its samples by more than 20 % is refused, and
@@ -234,7 +255,8 @@ class Record(Signal):
     Raises
     ------
     ParameterError
-        Fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase, NaN,
+        Fewer than 2 samples (4 for a spline), lengths that differ, times that do not increase (but for
+        jumps), NaN,
         a spline that leaves the range of its samples.
 
     Examples
@@ -262,7 +284,7 @@ class Record(Signal):
         where = (
             f"record {self.source!r}" if isinstance(self.source, str) and self.source else "record"
         )
-        time, value = (_samples(where, name, getattr(self, name)) for name in ("time", "value"))
+        time, value = (samples_of(where, name, getattr(self, name)) for name in ("time", "value"))
         if time.shape != value.shape:
             raise ParameterError(
                 f"{where}: time and value must have one length, got {time.size} and {value.size}",
@@ -290,15 +312,21 @@ class Record(Signal):
                 f"{largest:g}",
                 "time",
             )
-        if not (np.diff(time) > 0).all():
-            bad = int(np.argmin(np.diff(time) > 0)) + 1
+        steps = np.diff(time)
+        follows = steps > 0.0
+        if self._curve == "linear" and self.quantity in ("force", "acceleration"):
+            # a time that is given twice is a jump
+            follows |= (steps == 0.0) & (np.append(1.0, steps[:-1]) > 0.0)
+            follows[[0, -1]] &= steps[[0, -1]] > 0.0
+        if not follows.all():
+            bad = int(np.argmin(follows)) + 1
             raise ParameterError(
                 f"{where}: times must increase, but sample {bad} has {time[bad]:g} after "
                 f"{time[bad - 1]:g}; sort the file",
                 "time",
             )
         with np.errstate(over="ignore"):
-            steep = np.abs(np.diff(value) / np.diff(time))
+            steep = np.abs(np.diff(value) / np.where(steps > 0.0, steps, 1.0))
         if not (steep <= LIMITS.value).all():
             bad = int(np.argmax(steep))
             raise ParameterError(
@@ -445,9 +473,11 @@ class Record(Signal):
             curve = kind(self.time, self.value)
             base = PPoly(curve.c, curve.x)
         else:
-            slope = np.diff(self.value) / np.diff(self.time)
+            wide = np.diff(self.time) > 0.0  # the others are jumps
+            slope = np.diff(self.value)[wide] / np.diff(self.time)[wide]
             # older SciPy needs times that can be written
-            base = PPoly(np.vstack([slope, self.value[:-1]]), self.time.copy())
+            times = np.append(self.time[:-1][wide], self.time[-1])
+            base = PPoly(np.vstack([slope, self.value[:-1][wide]]), times)
         if self.quantity == "acceleration":
             return base.antiderivative(2), base.antiderivative(1), base
         if self.quantity == "velocity":
@@ -514,10 +544,12 @@ def scaled(signal: Signal, factor: float) -> Signal:
         return Harmonic(factor * signal.amplitude, factor * signal.mean, signal.phase, signal.order)
     if isinstance(signal, Sum):
         return Sum(tuple(scaled(term, factor) for term in signal.terms))
-    if isinstance(signal, Record):
-        return dataclasses.replace(signal, scale=factor * signal.scale)
-    if signal.once:
-        return dataclasses.replace(signal, amplitude=factor * signal.amplitude)  # type: ignore[type-var, attr-defined]
+    if signal.once or signal.repeats:
+        kind: Any = signal
+        # a record or a table has a scale
+        names = [name for name in ("amplitude", "mean", "scale") if hasattr(signal, name)]
+        changed = {name: factor * getattr(signal, name) for name in names}
+        return cast(Signal, dataclasses.replace(kind, **changed))
     raise ParameterError(f"a {type(signal).__name__} cannot be scaled")
 
 
@@ -525,8 +557,9 @@ def vanishes(signal: Signal) -> bool:
     """Whether the signal is 0 at all times, judged by its numbers."""
     if isinstance(signal, Sum):
         return all(vanishes(term) for term in signal.terms)
-    if isinstance(signal, Record):
-        return signal.scale == 0.0 or not signal.value.any()
+    if hasattr(signal, "scale"):  # a record, or a table
+        samples: Any = getattr(signal, "value", getattr(signal, "values", 0.0))
+        return signal.scale == 0.0 or not np.any(samples)
     return all(getattr(signal, name, 0.0) == 0.0 for name in ("value", "amplitude", "mean"))
 
 
@@ -536,7 +569,7 @@ RATE = {"converts": "rate"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pulse(Signal):
+class Transient(Signal):
     """A load that begins at `start` and lasts for `length`; a pulse by itself is 0 before and
     after.
 
@@ -581,6 +614,11 @@ class Pulse(Signal):
     def length(self) -> Any:
         """The duration of the pulse."""
         raise NotImplementedError
+
+    @property
+    def settled(self) -> Any:
+        """The time from which on it is 0, or keeps its last value."""
+        return self.start + self.length
 
     def shape(self, since: Any, n: int) -> Any:
         """The n-th derivative of the quantity at `since` after the start; for n = -1 and -2 the

@@ -261,7 +261,7 @@ def _instants(load: Load) -> np.ndarray:
             for term in getattr(signal, "terms", (signal,)):
                 if term.once:
                     times = np.ravel(getattr(term, "time", 0.0))
-                    end = getattr(term, "start", 0.0) + getattr(term, "length", 0.0)
+                    end = getattr(term, "settled", 0.0)
                     span = max(span, float(times[-1]), float(end))
     return np.arange(INSTANTS) * (span / INSTANTS) if span > 0.0 else np.zeros(1)
 

@@ -1,5 +1,5 @@
 """Tables of a system's loads between their breakpoints: the polynomials of records, and the times
-that pulses depend on.
+that pulses depend on, and the polynomials of what repeats itself between corners.
 
 A trace reads rows of such a table by (dotted path, order). For a record the order is that of the
 derivative. A pulse is a closed form in its own time; its rows are polynomials of degree 1: SINCE,
@@ -12,15 +12,24 @@ writes the code of one motion.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from saltus.errors import TraceError
-from saltus.systems import Pulse, Record, System, substitute
+from saltus.systems import SAME_CORNER, Record, System, Transient, substitute
 from saltus.taylor.graph import RECORD_WIDTH, Expr, combine
 from saltus.taylor.kernels import jit
+
+# Rows of what repeats itself between corners: the phase of the corner behind, and from PIECES on
+# the coefficients of the polynomials of its derivatives of the orders -2 to 2, all constant between
+# corners. Between two of these numbers is the derivative of the row, which is 0.
+CORNER = 20
+PIECES = 22
+MOST_POWERS = 8
+
 
 SINCE = 0
 WITHIN = 1
@@ -55,6 +64,9 @@ def record_tables(
     if not rows:
         return np.empty((1, 0)), np.empty((1, 0, 1, RECORD_WIDTH))
     signals = {path: system.get(path) for path, _ in rows}
+    if any(signal.repeats for signal in signals.values()):
+        found, table = _repeating_table(signals, rows)
+        return found[None], table[None]
     moving = {
         f"{path}.{name}"
         for path, signal in signals.items()
@@ -64,7 +76,7 @@ def record_tables(
         path: values[:, None] for path, values in columns.items() if path in moving and values.ndim
     }
     pulses = {path: substitute(signal, lambda at, value: varied.get(at, value), path) for path, signal in signals.items()
-              if isinstance(signal, Pulse)}  # fmt: skip
+              if isinstance(signal, Transient)}  # fmt: skip
     count = max((values.shape[0] for values in varied.values()), default=1)
     edges = [_edges(pulses.get(path, signal), count) for path, signal in signals.items()]
     together = np.concatenate(edges, axis=1)
@@ -77,6 +89,36 @@ def record_tables(
             for table, own in zip(tables[:, i], breaks, strict=True):
                 _fill(table, own, signals[path], order)
     return breaks, tables
+
+
+def _repeating_table(
+    signals: Mapping[str, Any], rows: list[tuple[str, int]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Breakpoints, as shares of the forcing period, and coefficients of what repeats itself.
+
+    They cover two periods, as lanes count a period from the phase at which their motion starts.
+    """
+    corners = np.concatenate([signal.pieces(0).corners for signal in signals.values()])
+    corners = np.unique(corners)
+    apart = np.append(True, np.diff(corners) > SAME_CORNER)
+    corners = corners[apart]
+    breaks = np.concatenate([corners, 1.0 + corners, [2.0]])
+    table = np.zeros((len(rows), breaks.size + 1, RECORD_WIDTH))
+    middles = 0.5 * (corners + np.append(corners[1:], 1.0))
+    for row, (path, code) in zip(table, rows, strict=True):
+        if code % 2:  # a derivative
+            continue
+        level, power = divmod((code - PIECES) // 2, MOST_POWERS)
+        pieces = signals[path].pieces(0 if code == CORNER else level - 2)
+        behind = np.searchsorted(pieces.corners, middles, side="right") - 1
+        if code == CORNER:
+            for period in range(2):
+                first = 1 + period * corners.size
+                row[first : first + corners.size, 0] = math.tau * (pieces.corners[behind] + period)
+            continue
+        values = pieces.coefficients[behind, power]
+        row[1:-1, 0] = np.tile(values, 2)
+    return breaks, table
 
 
 def _edges(signal: Any, count: int) -> np.ndarray:
@@ -150,11 +192,24 @@ class LoadTime:
         """The `order`-th derivative of a record at t, times its scale."""
         return combine("mul", record.scale, self._row(record, order))
 
-    def pulse(self, pulse: Pulse) -> tuple[Expr, Expr, Expr]:
+    def pulse(self, pulse: Transient) -> tuple[Expr, Expr, Expr]:
         """The time since the start of a pulse, at most its length; 1 within it, else 0; the time
         since its end.
         """
         return self._row(pulse, SINCE), self._row(pulse, WITHIN), self._row(pulse, AFTER)
+
+    def repeating(self, signal: Any, level: int, frequency: Any) -> Expr:
+        """The derivative by the phase, or the integral, of the shape of what repeats itself."""
+        degree = signal.pieces(level).degree
+        first = PIECES + 2 * MOST_POWERS * (level + 2)
+        coefficients = [self._row(signal, first + 2 * power) for power in range(degree + 1)]
+        value: Any = coefficients[-1]
+        if degree > 0:
+            corner = self._row(signal, CORNER)
+            since = combine("sub", combine("mul", frequency, Expr("time")), corner)
+            for coefficient in coefficients[-2::-1]:
+                value = combine("add", combine("mul", value, since), coefficient)
+        return cast(Expr, value)
 
     def _row(self, signal: Any, order: int) -> Expr:
         row = (signal.path, order)

@@ -12,8 +12,8 @@ from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
     Harmonic,
-    Pulse,
     System,
+    Transient,
     ask,
     friction_margins,
     mass_rows,
@@ -38,7 +38,7 @@ from saltus.taylor.graph import (
     substitute,
     uses_velocity,
 )
-from saltus.taylor.load_tables import LoadTime
+from saltus.taylor.load_tables import CORNER, LoadTime
 from saltus.taylor.memory import (
     ColumnSum,
     LoopRows,
@@ -139,6 +139,11 @@ class Trace:
         structure.
         """
         return self.dof if self.modes is None else self.modes.first
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the breakpoints of its records are corners that return in each forcing period."""
+        return any(code >= CORNER for _, code in self.records)
 
     @property
     def several(self) -> bool:
@@ -385,13 +390,13 @@ def _check_powers(accelerations: list[Expr], edges: dict[str, Any]) -> None:
 
 
 def _name_records(load: Any) -> None:
-    """Give every record and pulse of a symbolic load its path, by which its breakpoints are found
-    when the numbers are known.
+    """Give every record and pulse of a symbolic load, and all that is given between corners, its
+    path, by which its breakpoints are found when the numbers are known.
     """
     for name, signal in load.channels.items():
         terms = {f"load.{name}.{i}": term for i, term in enumerate(getattr(signal, "terms", ()))}
         for path, term in (terms or {f"load.{name}": signal}).items():
-            if term.once:
+            if term.once or term.repeats:
                 object.__setattr__(term, "path", path)
 
 
@@ -606,6 +611,16 @@ def _check_abs(result: Trace, expanded: list[Expr]) -> None:
         )
 
 
+def _jumps(system: System) -> bool:
+    """Whether a load jumps at corners that repeat themselves."""
+    return any(
+        getattr(term, "jumps", False)
+        for signal in system.load.channels.values()
+        for term in getattr(signal, "terms", (signal,))
+        if term.repeats
+    )
+
+
 def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
     """Check that each of the dotted paths to differentiate to names a number that can vary.
 
@@ -625,10 +640,15 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
                 f" {near(str(path), below or known)}"
             )
         owner = system.get(path.rpartition(".")[0])
-        if isinstance(owner, Pulse) and path.rpartition(".")[2] in owner.moving:
+        if isinstance(owner, Transient) and path.rpartition(".")[2] in owner.moving:
             raise ParameterError(
                 f"{path} moves the instants at which the load is not smooth, so there are no"
                 " derivatives to it; take another"
+            )
+        if path == FREQUENCY and _jumps(system):
+            raise ParameterError(
+                f"{path} moves the instants at which the load jumps, so there are no derivatives"
+                " to it; take another"
             )
         if path.endswith(".order") and isinstance(owner, Harmonic):
             raise ParameterError(

@@ -92,6 +92,7 @@ class Sizes(NamedTuple):
     columns: int  # of the tangent
     # the first of its own coordinates, on which impacts act; those behind them have mass 1
     local: int
+    repeats: int  # whether the load's breakpoints return in each forcing period
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,7 @@ def load_structure(trace: Trace) -> CompiledStructure:
     steep = int(is_steep(trace.acceleration))
     first = len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order
     return CompiledStructure(
-        Sizes(*first, trace.dof, trace.columns, trace.local),
+        Sizes(*first, trace.dof, trace.columns, trace.local, int(trace.repeats)),
         max(1, len(constants(trace))),
         tuple(made[name] for name in names),
         (made["constants"], made["matrices" if trace.several else "geometry"]),

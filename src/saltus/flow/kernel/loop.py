@@ -40,6 +40,8 @@ def advance_batch(motion):
                 return Status.DONE
             motion.period += 1
             motion.time -= t_end
+            if motion.repeats > 0:
+                motion.piece = 0
             continue
         status = one_pass(motion, next_target(motion, t_end), t_end)
         if status != Status.PAUSED:

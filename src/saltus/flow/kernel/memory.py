@@ -85,6 +85,8 @@ MOTION = np.dtype(
         ("columns", _WHOLE),  # of the tangent
         # the first of its own coordinates, on which impacts act; those behind them have mass 1
         ("local", _WHOLE),
+        # whether the load's breakpoints are shares of the forcing period, and return in each
+        ("repeats", _WHOLE),
     ]
 )
 _NAMES: Any = MOTION.names

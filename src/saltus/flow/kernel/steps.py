@@ -311,25 +311,33 @@ def record_step(motion, side, t, h):
 
 
 @lean_jit
+def breakpoint_time(motion, piece):
+    """The time of a breakpoint, as counted from the present forcing period."""
+    at = motion.breaks[piece]
+    return at * motion.period_length if motion.repeats > 0 else at - motion.origin
+
+
+@lean_jit
 def next_target(motion, t_end):
     """The time up to which the next step may go: the end of the forcing period, or a breakpoint of
     the records before.
     """
     breaks = motion.breaks
     before = motion.piece
-    while motion.piece < breaks.size and breaks[motion.piece] - motion.origin <= motion.time:
+    while motion.piece < breaks.size and breakpoint_time(motion, motion.piece) <= motion.time:
         motion.piece += 1
     motion.new_piece = 1 if motion.piece != before else 0
     if motion.piece < breaks.size:
-        return min(t_end, breaks[motion.piece] - motion.origin)
+        return min(t_end, breakpoint_time(motion, motion.piece))
     return t_end
 
 
 @lean_jit
 def piece_end(motion):
     """The time of the next breakpoint of the records, inf behind the last one."""
-    breaks = motion.breaks
-    return breaks[motion.piece] - motion.origin if motion.piece < breaks.size else np.inf
+    if motion.piece < motion.breaks.size:
+        return breakpoint_time(motion, motion.piece)
+    return np.inf
 
 
 @lean_jit

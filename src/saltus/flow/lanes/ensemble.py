@@ -292,7 +292,8 @@ def _jobs(
     rows["last_period"] = last
     rows["leave_by"] = side
     records = record_tables(system, run.trace.records, inputs.parameters)
-    rows["piece"] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
+    if not run.trace.repeats:  # else it begins with the forcing period
+        rows["piece"] = np.count_nonzero(records[0] <= np.reshape(time, (-1, 1)), axis=1)
     return Jobs(states, rows, columns, records)
 
 

@@ -169,13 +169,15 @@ def begin_period(lane):
     end = end_of_period(lane)
     limit = end + length if period + 1 < last else end
     piece = lane.piece
-    while piece < breaks.shape[1] and breaks[own, piece] - origin <= lane.now:
+    # of shares of the period, or of times
+    unit, before = (length, 0.0) if lane.sizes.repeats > 0 else (1.0, origin)
+    while piece < breaks.shape[1] and breaks[own, piece] * unit - before <= lane.now:
         piece += 1
     lane.piece = piece
     each = piece < breaks.shape[1] or lane.sizes.every_end > 0
     lane.passed_together = -np.inf if each else float(last - 2)
     if piece < breaks.shape[1]:
-        limit = min(limit, breaks[own, piece] - origin)
+        limit = min(limit, breaks[own, piece] * unit - before)
     lane.origin = origin
     lane.period_end = min(end, limit)
     lane.step_limit = limit
@@ -286,6 +288,8 @@ def arrive(lane, past):
         lane.period = period + 1.0
         lane.now = start + (now - t_end)
         lane.last_check += start - t_end
+        if lane.sizes.repeats > 0:
+            lane.piece = 0
     begin_period(lane)
     return Status.PAUSED, 0
 

@@ -141,6 +141,7 @@ def scalar_state(lane):
     motion.columns = sizes.columns
     motion.first_order = sizes.first_order
     motion.local = sizes.local
+    motion.repeats = sizes.repeats
     motion.time = lane.now
     motion.chatter_speed = lane.chatter_speed
     motion.pull = lane.pull

@@ -189,6 +189,7 @@ class LaneSizes(NamedTuple):
     constant_guards: int
     contacts: int  # the number of contacts of a model with several
     frictions: int
+    repeats: int  # whether the load's breakpoints return in each forcing period
     coordinates: np.ndarray  # of each contact, of each friction, and -1 less that of each surface
     signs: np.ndarray  # of each contact
 

@@ -384,6 +384,7 @@ class Lanes:
             constant_guards=plan.constant_guards,
             contacts=len(trace.signs),
             frictions=len(trace.friction_coordinates),
+            repeats=sizes.repeats,
             coordinates=np.array(
                 [*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64
             ),

@@ -118,7 +118,11 @@ class KernelState:
         # one record MOTION
         self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)
         mode, side, leave_by = self._at_contact(request, run)
-        piece = int(breaks.searchsorted(request.time, side="right")) if breaks.size else 0
+        piece = 0
+        if run.structure.sizes.repeats:
+            piece = int((breaks * at.length).searchsorted(at.local, side="right"))
+        elif breaks.size:
+            piece = int(breaks.searchsorted(request.time, side="right"))
         dense = int(
             request.dense or request.sample_times is not None or _is_nonlinear(request.system)
         )

@@ -33,7 +33,7 @@ from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, 
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.kernel_state import natural_times
 from saltus.flow.motion.simulate import refusal
-from saltus.systems import Pulse, System, children, substitute
+from saltus.systems import System, Transient, children, substitute
 from saltus.taylor import (
     RECORD_WIDTH,
     Case,
@@ -112,7 +112,7 @@ class PortableMotion:
         self.kernel = PortableKernel(self.run.trace.several)
 
         once = {path: part_at(system, path) for path, _ in self._evaluated[0].records}
-        self._pulses = [path for path, signal in once.items() if isinstance(signal, Pulse)]
+        self._pulses = [path for path, signal in once.items() if isinstance(signal, Transient)]
 
     def functions(self) -> list[WrittenFunction]:
         """The functions of the structure, which the kernel calls, and `edges`, when each pulse of
@@ -241,9 +241,9 @@ class PortableMotion:
             else:
                 breaks, table = record_table(self.system, [(path, order)])
                 rows.append({"breaks": breaks.tolist(), "table": table[0].tolist()})
-        most = 2 * len(self._pulses) + sum(
-            {row["breaks"][0]: len(row["breaks"]) for row in rows if "breaks" in row}.values()
-        )
+        # all that the breakpoints of the rows may be together
+        own = {tuple(row["breaks"]) for row in rows if "breaks" in row}
+        most = 2 * len(self._pulses) + sum(map(len, own))
         clocks = {"since": SINCE, "within": WITHIN, "after": AFTER}
         return {
             "rows": rows,

@@ -29,6 +29,7 @@ from saltus.flow.kernel.layout import (
 )
 from saltus.flow.kernel.roots import horner, leading
 from saltus.flow.kernel.steps import (
+    breakpoint_time,
     columns_at_event,
     expand,
     forget,
@@ -237,13 +238,12 @@ def rest_columns(motion, t, tol):
 def release_columns(motion, t):
     """The tangent at a release. Its instant moves with the simple root of the contact acceleration;
     if a jump of the load releases the system, the instant is fixed."""
-    breaks = motion.breaks
     piece = motion.piece
     detail = ReleaseDetail.AT_A_ROOT if motion.skip <= 3 else ReleaseDetail.AT_NONE
     if (
         motion.skip == 2
         and piece > 0
-        and abs(breaks[piece - 1] - motion.origin - t) <= 1e-12 * (abs(t) + abs(motion.origin))
+        and abs(breakpoint_time(motion, piece - 1) - t) <= 1e-12 * (abs(t) + abs(motion.origin))
     ):
         detail = ReleaseDetail.AT_A_JUMP
     columns_at_event(motion, EventCode.RELEASE, detail, t, float(motion.side))

@@ -262,6 +262,11 @@ class OrbitEquations(ABC):
         self.tol = tol
         self.system = system = system.in_gap_coordinates
         self._run: Any = program(system, system.model.margin_names(system.load), paths)
+        if self._run.trace.repeats:
+            raise ParameterError(
+                "orbits under a load with corners, such as a Square, are not yet solved for; "
+                "follow a motion until it settles (settle), or use Harmonic signals"
+            )
         if self._run.trace.records:
             raise ParameterError(
                 "a load with a Record or a pulse is not periodic, so it has no periodic orbits; "

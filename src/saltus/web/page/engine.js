@@ -4,7 +4,7 @@
 // what the numbers of events, modes and reasons mean, it reads from tables of `description.engine`, which Python makes from the
 // types with which the kernel is compiled. Names are Python's.
 
-import { loadTable, placeAbove } from "./load_table.js";
+import { loadTable, pieceAt } from "./load_table.js";
 import { divmod } from "./python_numbers.js";
 import { BUFFER, Refusal, Run } from "./run.js";
 
@@ -274,7 +274,7 @@ export class Engine {
     this.doubles(this.scratch, state.length).set(state);
     const length = system.period ?? 0;
     const [period, local] = length ? divmod(time, length) : [0, time];
-    const piece = BigInt(placeAbove(system.breaks, time));
+    const piece = BigInt(pieceAt(system.breaks, this.layout.sizes.repeats ? length : 0, time, local));
     call(local, period * length, side, ...this.environment(system), piece, this.scratch, this.results);
     return this.doubles(this.results, count);
   }

@@ -62,6 +62,14 @@ function fillRecord(row, breaks, record, width) {
   }
 }
 
+/**
+ * The piece of a load at a time: of breakpoints that are times or, with a forcing period, shares of it.
+ * @param {ArrayLike<number>} breaks @param {number} period 0 for times @param {number} time @param {number} local the time within its period
+ */
+export function pieceAt(breaks, period, time, local) {
+  return period ? placeAbove(Array.from(breaks, (share) => share * period), local) : placeAbove(breaks, time);
+}
+
 /** The place of the first of sorted numbers that is larger than a value. @param {ArrayLike<number>} sorted @param {number} value */
 export function placeAbove(sorted, value) {
   let low = 0;

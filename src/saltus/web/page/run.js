@@ -1,7 +1,7 @@
 /** One motion while it is computed: its start, the kernel that is called until it ends, and the buffers that are emptied between. */
 
 import { divmod, general } from "./python_numbers.js";
-import { placeAbove } from "./load_table.js";
+import { pieceAt } from "./load_table.js";
 import { PageMotion } from "./motion.js";
 import { Steps } from "./steps.js";
 
@@ -89,7 +89,7 @@ export class Run {
     const record = engine.record();
     const numbers = {
       ...layout.sizes, period: clock.first, last_period: clock.last, time: clock.local, end: clock.end, period_length: this.length, natural_time: this.naturalTime(),
-      order: this.order, tolerance: this.tolerance, piece: placeAbove(system.breaks, this.first), leave_by: side, dense: 1,
+      order: this.order, tolerance: this.tolerance, piece: pieceAt(system.breaks, layout.sizes.repeats ? this.length : 0, this.first, clock.local), leave_by: side, dense: 1,
     };
     for (const [name, value] of Object.entries(numbers)) record.set(name, value);
     engine.put("state", [...this.position, ...this.speeds]);
