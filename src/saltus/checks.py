@@ -23,7 +23,7 @@ from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, cast
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
-from saltus.kinds import check_kinds, check_switches, switches_of
+from saltus.kinds import check_kinds, check_switches, check_together, switches_of
 from saltus.progress import silent, watched
 
 RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
@@ -44,6 +44,8 @@ class Limits:
     value: float = 1e100
     # Of a structure: one of more is reduced first, as few of its modes matter.
     coordinates: int = 200
+    # Steps of a search for a zero between two places: one of 1e-300 takes a thousand halvings.
+    halvings: int = 4000
     order: int = 1000  # The order of a harmonic: the step of the integrator shrinks with it.
     seed: int = 2**63 - 1  # The largest number that files and random generators can hold.
     # Bytes that a motion of an ensemble takes; 1000 were measured without its samples.
@@ -636,13 +638,16 @@ def _refuse_kinds(
             bound_arguments(function, given, named)
             # one that went among the coordinates, and is an argument of what is called inside
             twice = re.search(r"multiple values for (?:keyword )?argument '(\w+)'", str(error))
-            known = inspect.signature(function).parameters
+            parameters = inspect.signature(function).parameters.values()
+            known = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]
             if twice and twice[1] in named and twice[1] not in known:
                 name = function.__qualname__
                 raise ParameterError(
                     f"{name}() has no argument {twice[1]!r}; {near(twice[1], known)}", twice[1]
                 )
         check_kinds(function, given, named)
+        if isinstance(error, ValueError):
+            check_together(function, given, named)
 
 
 def told(function: Callable[P, R], /, *given: P.args, **named: P.kwargs) -> R:

@@ -176,6 +176,35 @@ def check_switches(switches: frozenset[str], named: Mapping[str, Any]) -> None:
             raise ParameterError(f"{name} must be True or False, got {shown(named[name])}", name)
 
 
+def check_together(
+    function: Callable[..., Any], given: Iterable[Any], named: Mapping[str, Any]
+) -> None:
+    """Refuse arrays of numbers whose shapes do not fit one another.
+
+    Raises
+    ------
+    ParameterError
+        The error has the shapes.
+    """
+    signature = inspect.signature(function)
+    try:
+        arguments = signature.bind(*given, **named).arguments
+    except TypeError:
+        return
+    shapes = {
+        name: np.shape(value)
+        for name, value in arguments.items()
+        if str(signature.parameters[name].annotation).startswith("Numbers") and _are_numbers(value)
+    }
+    try:
+        np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        texts = " and ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ParameterError(
+            f"the shapes of {texts} do not fit one another", next(iter(shapes))
+        ) from None
+
+
 def check_kinds(
     function: Callable[..., Any], given: Iterable[Any], named: Mapping[str, Any]
 ) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 
 from saltus.attractors.saddle_manifolds import MANIFOLDS, has_left, plane_window
 from saltus.attractors.stroboscopic_section import check_periodic
-from saltus.checks import check_number
+from saltus.checks import LIMITS, check_number
 from saltus.errors import ParameterError
 from saltus.flow import Motion, Stop, simulate
 from saltus.result import Result, result_dataset
@@ -179,7 +179,9 @@ def _zeros(pull: Callable[[float], float], grid: np.ndarray) -> Iterator[float]:
     values = np.array([pull(place) for place in grid])
     yield from (float(place) for place in grid[values == 0.0])
     for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-        yield float(brentq(pull, grid[i], grid[i + 1], xtol=1e-300, rtol=1e-15))
+        low, high = grid[i], grid[i + 1]
+        most = LIMITS.halvings
+        yield float(brentq(pull, low, high, xtol=1e-300, rtol=1e-15, maxiter=most))
 
 
 def _eigenvalues(system: System, place: float, side: int) -> tuple[complex, complex]:

@@ -11,13 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import answered, as_numbers, check_number
+from saltus.checks import LIMITS, answered, as_numbers, check_number
 from saltus.enumerations import Sentence
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow import Ending, Motion, Stop, simulate
+from saltus.flow import Ending, EventKind, Motion, Stop, simulate
 from saltus.progress import Progress, silent
 from saltus.result import Result, provenance
-from saltus.systems import Constant, System, check_system, time_without_period
+from saltus.systems import (
+    Constant,
+    System,
+    check_system,
+    natural_units,
+    time_without_period,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -31,6 +37,8 @@ class FreeOrbitSettings:
     # How long the motion is followed first, in natural times; this is then doubled until it comes
     # back.
     first_duration: float = 8.0
+    # How many falls from near a contact are followed first.
+    falls: float = 100.0
     most_duration: float = (
         # Near a saddle the period grows as the logarithm of the distance from it: with rounding 1e5
         # is never reached.
@@ -54,6 +62,7 @@ class NoFreeOrbit(Sentence):
     EQUILIBRIUM = "it stays where it is"
     LOST = "it does not come back to where it began: energy is lost or gained"
     ENDED = "it is ended by a margin of the model, or cannot go on"
+    AVERAGED = "it lies so near its contact that impacts are averaged instead of followed; begin farther away"
     AWAY = "it does not turn round within 1e5 natural times"
 
 
@@ -260,7 +269,7 @@ def _found(system: System, amplitude: float) -> FreeOrbit | NoFreeOrbit:
     motion is not periodic.
     """
     unit = time_without_period(system) or 1.0
-    duration = SETTINGS.first_duration * unit
+    duration = SETTINGS.first_duration * unit * _share_of_unit(system, amplitude)
     while duration <= SETTINGS.most_duration * unit:
         motion = _followed(system, amplitude, duration)
         turns = _turning_times(motion)
@@ -270,10 +279,33 @@ def _found(system: System, amplitude: float) -> FreeOrbit | NoFreeOrbit:
             return NoFreeOrbit.EQUILIBRIUM
         if motion.stop is Stop.REST:
             return NoFreeOrbit.LOST
+        if any(event.kind is EventKind.CHATTER for event in motion.events):
+            return NoFreeOrbit.AVERAGED
         if motion.stop is not Stop.HORIZON:
             return NoFreeOrbit.ENDED
         duration *= 2.0
     return NoFreeOrbit.AWAY
+
+
+def _share_of_unit(system: System, amplitude: float) -> float:
+    """The share of the natural time in which a motion from so near a contact comes back, a hundred
+    times over; 1 from anywhere else. Followed for a natural time it would bounce for ever.
+    """
+    model: Any = system.model
+    units = natural_units(system)
+    places = (
+        [float(model.contact)]
+        if model.has_one_contact
+        else [
+            float(part.position)
+            for part in (*model.contacts, *model.surfaces)
+            if part.coordinate == model.coordinates[0]
+        ]
+    )
+    distances = [distance for at in places if (distance := abs(amplitude - at)) > 0.0]
+    # a fall takes the root of the distance
+    share = math.sqrt(min(distances, default=math.inf) / units.length)
+    return min(1.0, SETTINGS.falls * share)
 
 
 def _moves(motion: Motion) -> bool:
@@ -335,4 +367,13 @@ def _root(slope: np.ndarray, low: float, high: float) -> float:
     """The zero of a polynomial between two values of different signs."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda time: np.polyval(slope, time), low, high, xtol=1e-300, rtol=1e-15))
+    return float(
+        brentq(
+            lambda time: np.polyval(slope, time),
+            low,
+            high,
+            xtol=1e-300,
+            rtol=1e-15,
+            maxiter=LIMITS.halvings,
+        )
+    )

@@ -132,7 +132,9 @@ class Fit(Result):
             x = np.zeros(0)  # which is refused
         if x.shape != (len(self.values),):
             raise ParameterError(
-                f"values must be {len(self.values)} numbers, for {', '.join(self.values)}", "values"
+                f"values must have a number for each of {', '.join(self.values)}, got"
+                f" {shown(values)}",
+                "values",
             )
         low, high = np.array(list(self.bounds.values())).T
         none = -math.inf, np.zeros(x.size)

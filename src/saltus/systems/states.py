@@ -20,6 +20,10 @@ from saltus.systems.model import Model
 from saltus.systems.system import System
 from saltus.systems.system_units import ANGLES, natural_units, time_without_period
 
+# The largest speed of an angle, in a natural time: steps take a third of a radian or so, so that a
+# natural time then takes half a second.
+TURNS = 1e6
+
 
 def read_start(
     system: System,
@@ -82,6 +86,9 @@ def read_start(
                     name,
                 )
             check_number(name, _plain(value))
+    for i, most in _fastest_turns(system):
+        if abs(values[len(in_order) + i]) > most:
+            _refuse_turns(values[len(in_order) + i], most)
     return system._with_rates(time, np.array(values, dtype=float))
 
 
@@ -109,6 +116,42 @@ def read_starts(
         if not _is_sequence(value) and not hasattr(value, "dims"):
             check_number(name, _plain(value))
     return list(positions), list(speeds)
+
+
+def check_turns(system: System, speeds: Iterable[Any]) -> None:
+    """Refuse speeds of angles, a number or an array for each coordinate, with which a motion takes
+    for ever.
+
+    Raises
+    ------
+    ParameterError
+        The error has the largest speed.
+    """
+    given = list(speeds)
+    for i, most in _fastest_turns(system):
+        if (fastest := np.max(np.abs(np.asarray(given[i])), initial=0.0)) > most:
+            _refuse_turns(float(fastest), most)
+
+
+def _fastest_turns(system: System) -> tuple[tuple[int, float], ...]:
+    """The places of the coordinates that are angles, with their largest speeds."""
+
+    def made() -> tuple[tuple[int, float], ...]:
+        model = system.model
+        places = [i for i, name in enumerate(model.coordinates) if model.unit_of(name) in ANGLES]
+        most = TURNS / natural_units(system).time if places else 0.0
+        return tuple((i, most) for i in places if i < len(model.moving))
+
+    found: tuple[tuple[int, float], ...] = system._remembered(_fastest_turns, made)
+    return found
+
+
+def _refuse_turns(speed: float, most: float) -> None:
+    raise ParameterError(
+        f"velocity must be at most {most:.3g} in size for an angle, got {speed:.6g}: the motion"
+        " would turn by a million radians in a natural time, and take for ever",
+        "velocity",
+    )
 
 
 def _positions(

@@ -73,6 +73,10 @@ class UnitCell:
                 f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}",
                 "alpha0",
             )
+        if not isinstance(self.physical, PhysicalCell | None):
+            raise ParameterError(
+                f"physical must be a PhysicalCell or None, got {shown(self.physical)}", "physical"
+            )
 
     @property
     def lambda_(self) -> float:

@@ -17,8 +17,8 @@ import numpy as np
 
 from saltus.checks import Numbers
 from saltus.errors import ParameterError
-from saltus.systems import Constant, Metainterface, System
-from saltus.theory.arguments import check_side
+from saltus.systems import Constant, Metainterface, System, finite_array, parameter_table
+from saltus.theory.arguments import check_shapes, check_side, numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,7 +310,8 @@ def total_energy(
     >>> round(float(saltus.theory.total_energy(tristable, 0.0, 0.2)), 12)  # 0.2^2 / 2, at the contact
     0.02
     """
-    theta, velocity = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
+    theta, velocity = numbers("theta", theta), numbers("velocity", velocity)
+    check_shapes(theta=theta, velocity=velocity, **({} if side is None else {"side": side}))
     lower, upper = layers(system)
     if side is None:
         if lower.mass != upper.mass and np.any((theta == 0) & (velocity != 0)):
@@ -326,7 +327,7 @@ def total_energy(
 
 
 def _by_side(system: System, theta: Any, function: Any, odd: bool) -> Any:
-    theta = np.asarray(theta, dtype=float)
+    theta = numbers("theta", theta)
     size = np.abs(theta)
     lower, upper = (function(layer, size) for layer in layers(system))
     value = np.where(theta > 0, lower, -upper if odd else upper)
@@ -372,6 +373,11 @@ def amplitude_limits(
     parameters
         Values, by dotted path, that replace those of the system; numbers or arrays.
 
+    Raises
+    ------
+    ParameterError
+        A path that leads to no number of the system, or values that are no finite numbers.
+
     Examples
     --------
     >>> [round(float(limit.value), 9) for limit in saltus.theory.amplitude_limits(system)]  # 100 and 200 degrees
@@ -379,7 +385,9 @@ def amplitude_limits(
     """
     if not isinstance(system.model, Metainterface):
         return ()
-    straight = math.pi - (parameters or {}).get("model.beta0", system.model.beta0)
+    table = parameter_table(system, parameters)
+    values = {path: finite_array(path, given) for path, given in table.items()}
+    straight = math.pi - values.get("model.beta0", system.model.beta0)
     return (
         AmplitudeLimit("line", straight, "the straight line, pi - beta0"),
         AmplitudeLimit("kinematic", 2 * straight, "2 (pi - beta0), where the slider closes again"),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_count, check_number
+from saltus.checks import LIMITS, check_count, check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
 from saltus.theory.layer import Layer, layers
@@ -75,7 +75,8 @@ class Arc:
         bottom = top + half
         if self.position(bottom) >= 0:
             return None
-        t = float(brentq(self.position, top, bottom, xtol=1e-300, rtol=1e-15))
+        most = LIMITS.halvings
+        t = float(brentq(self.position, top, bottom, xtol=1e-300, rtol=1e-15, maxiter=most))
         return t - float(self.position(t) / self.speed(t))
 
 

@@ -405,6 +405,7 @@ def quasi_static_border(
     >>> float(border.vertical.min())
     -1.0
     """
+    check_number("lowest", lowest)
     model = system.model
     channels = system.load.channels
     if tuple(plane) != LOAD_PLANE or not isinstance(model, Metainterface):

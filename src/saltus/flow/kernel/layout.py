@@ -142,6 +142,9 @@ GAP = 0.65
 PAIR_GAP = 3.0
 # The size of a state that is 0 and stays so, to which the error of a step is relative.
 SMALLEST = 1e-6
+# A speed that is a smaller number than this share of its first derivatives is 0: in all units of
+# time it is far below the rounding of the speed that one step gives.
+STANDS = 2.0**-160
 # A shorter step, in units of time, of a shorter forcing period or of a shorter motion, means that
 # the acceleration is singular.
 SHORTEST = 1e-9

@@ -23,6 +23,7 @@ from saltus.flow.kernel.layout import (
     SHORTEST,
     SLOW,
     SMALLEST,
+    STANDS,
     EventCode,
 )
 from saltus.flow.kernel.memory import ModeArrays, StateArrays, StepArrays
@@ -107,21 +108,23 @@ def state_size(motion, first, last):
     relative: a speed, so that it depends on units of length and time as a speed does.
 
     It is the largest of the velocities and of sqrt(abs(q a)), which is the amplitude of the
-    velocity of an oscillation about 0, at its ends too. Where all of these are 0 it is the largest
-    acceleration, and SMALLEST if that is 0, too.
+    velocity of an oscillation about 0, at its ends too. Where all of these are 0, or far below the
+    rounding of what one step gives, it is the largest acceleration; and SMALLEST if that is, too.
     """
     q = motion.coordinate_series
     v = motion.velocity_series
     a = motion.acceleration_series
     size = 0.0
     largest = 0.0
+    rates = 0.0
     for i in range(first, last):
         pull = abs(a[i, 0])
         size = max(size, abs(v[i, 0]), math.sqrt(abs(q[i, 0])) * math.sqrt(pull))
         largest = max(largest, pull)
-    if size > 0.0:
+        rates = max(rates, pull, abs(v[i, 2]), abs(v[i, 3]))
+    if size > STANDS * rates:
         return size
-    return largest if largest > 0.0 else SMALLEST
+    return largest if largest > STANDS * rates else SMALLEST
 
 
 @lean_jit

@@ -19,6 +19,7 @@ from saltus.systems import (
     System,
     broadcast_arrays,
     check_parameters,
+    check_turns,
     finite_array,
     numbers,
     parameter_table,
@@ -111,6 +112,8 @@ def read_inputs(
         name: finite_array(name, value)
         for name, value in (_starts(system, velocity, time, coordinates) | given).items()
     }
+    names = system.model.coordinates
+    check_turns(system, [arrays[rate_name(name, names)] for name in names])
     dims, shape, coords, together = broadcast_arrays(arrays)
     check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)

@@ -368,6 +368,9 @@ class RecorderSettings:
 
     # The largest number of steps of a motion that is kept whole; they take about 2 GB.
     steps: int = 10_000_000
+    # After so many steps a motion is refused that would need so many times more than are kept.
+    seen: int = 500_000
+    far: float = 10.0
     events: int = 20_000_000  # The largest number of events that are kept.
     # The most impacts in a unit of time: more are an accumulation that is not resolved.
     rate: int = 1_000_000
@@ -431,7 +434,10 @@ class Recorder:
         self._width = 1 + 2 * self._own + len(run.structure.signs) if self._several else 3
         self.total = 0  # events so far
         self._kept = 0  # steps so far
-        self._length = request.clock.length
+        at = request.clock
+        self._length = at.length
+        self._start = at.first * at.length + at.local
+        self._end = at.last * at.length + at.end
         self._pieces: list[DenseOutput] = []
         self._events: list[tuple[np.ndarray, ...]] = []
         # of the events, if the equations are in coordinates that bend
@@ -493,6 +499,7 @@ class Recorder:
         if self._times is None:
             self._pieces.append(piece)
             self._kept += piece.start.size
+            self._refuse_too_many(piece)
             if self._kept > MOST.steps:
                 raise MotionError(
                     f"more than {MOST.steps} steps before time {piece.end:.6g}, too many to be"
@@ -504,6 +511,18 @@ class Recorder:
         self._sample(piece, int(np.searchsorted(self._times, piece.end, side="left")))
         self._check.add(piece)
         self._pieces = [piece]
+
+    def _refuse_too_many(self, piece: DenseOutput) -> None:
+        """Refuse a motion that will need far more steps than can be kept, once that is seen."""
+        done = piece.end - self._start
+        if self._kept > MOST.seen and done > 0.0:
+            expected = self._kept * (self._end - self._start) / done
+            if expected > MOST.far * MOST.steps:
+                raise MotionError(
+                    f"the motion would take some {expected:.0e} steps, of which {self._kept} lead"
+                    f" to time {piece.end:.6g}, and {MOST.steps} can be kept; ask for a shorter"
+                    " time, or give times=... to keep the states at those times instead"
+                )
 
     def _check_memory(self, piece: DenseOutput) -> None:
         """Refuse to keep more steps than there is room for; at the end all of them are copied once.
