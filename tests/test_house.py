@@ -27,6 +27,7 @@ SHARED = {
     "result_tree",
     "checks",
     "kinds",
+    "number_ranges",
     "files",
     "progress",
     "branch_tables",

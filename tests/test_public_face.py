@@ -410,6 +410,7 @@ def good(made):
         "UnitCell.line_condition": (CELL.line_condition, {}),
         "UnitCell.phi_velocity": (CELL.phi_velocity, {"theta": 0.1, "velocity": 0.1}),
         "UnitCell.theta": (CELL.theta, {"phi": 0.1}),
+        "saltus.number_range": (saltus.number_range, {"above": 0.0, "below": 1.0}),
         "VelocityReduction": (saltus.VelocityReduction, {"e": 0.9}),
         "WallOscillator": (saltus.WallOscillator, {}),
     }

@@ -29,6 +29,7 @@ ALIKE = {
 # Names with two meanings, which are those of the field in both: what a dimension, a figure of a
 # formula or a file is called.
 SEVERAL = {
+    "below": "an upper bound, or on which side of a surface the surface itself counts",
     "channels": "the names of a load's channels with their symbols, or signals",
     "changes": "values by dotted path, or parts of a system too",
     "coordinates": "starts of one motion or of many, by the names of the model's coordinates",

@@ -16,7 +16,8 @@ from sphinx.ext import autosummary
 import saltus
 from saltus.cli.app import app
 from saltus.config.study import QUESTIONS, functions_of, keys_of
-from saltus.systems import IMPACTS, MODELS
+from saltus.number_ranges import BESIDE, ranges_of
+from saltus.systems import IMPACTS, MODELS, PULSES
 
 FOLDER = Path(__file__).parents[1] / "reference" / "api"
 
@@ -235,15 +236,19 @@ def study_keys():
         "What each means is on the page [A study in a file](../../study.md).",
     ]
     lines += ["A key without a default must be given, or is one of several that may be.", ""]
-    lines += ["## `[model]`", "", "| type | key | default |", "|---|---|---|"]
+    lines += ["## `[model]`", "", "| type | key | default | range |", "|---|---|---|---|"]
     lines += [
         row
         for name, cls in sorted(MODELS.items())
         if cls.__module__.startswith("saltus.")
         for row in _fields(name, cls)
     ]
-    lines += ["", "## `[impact]`", "", "| type | key | default |", "|---|---|---|"]
+    lines += ["", "## `[impact]`", "", "| type | key | default | range |", "|---|---|---|---|"]
     lines += [row for name, cls in sorted(IMPACTS.items()) for row in _fields(name, cls)]
+    lines += ["", "## A signal in `[load]`", ""]
+    lines += ["| type | key | default | range |", "|---|---|---|---|"]
+    signals = {"a harmonic": saltus.Harmonic, "a record": saltus.Record, **PULSES}
+    lines += [row for name, cls in signals.items() for row in _fields(name, cls)]
     for kind in QUESTIONS:
         defaults = {
             k: v.default
@@ -260,9 +265,21 @@ def study_keys():
 
 def _fields(name, cls):
     parameters = inspect.signature(cls).parameters.values()
-    return [f"| `{name}` | `{p.name}` | {_default(p.default)} |" for p in parameters] or [
-        f"| `{name}` | | |"
-    ]
+    ranges = ranges_of(cls)
+    return [
+        f"| `{name}` | `{p.name}` | {_default(p.default)} | {_range(ranges.get(p.name))} |"
+        for p in parameters
+    ] or [f"| `{name}` | | | |"]
+
+
+def _range(declared):
+    """The declared range of a number in words."""
+    if declared is None:
+        return ""
+    beside = [f"{BESIDE[side].partition(' ')[2]} `{other}`" for side, other in declared.beside]
+    whole = ["whole"] if declared.whole else []
+    words = ", ".join([*whole, *([declared.text] if declared.text else []), *beside])
+    return f"{words} {declared.unit}".strip()
 
 
 def _default(value):

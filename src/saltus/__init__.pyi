@@ -41,6 +41,7 @@ from .flow import simulate_many as simulate_many
 from .flow import stop_names as stop_names
 from .flow.motion.differentiable import to_jax as to_jax
 from .flow.motion.differentiable import to_torch as to_torch
+from .number_ranges import number_range as number_range
 from .orbits import Branch as Branch
 from .orbits import PeriodicOrbit as PeriodicOrbit
 from .orbits import SpecialPoint as SpecialPoint

@@ -5,7 +5,6 @@ type Python's own error says enough."""
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import functools
 import inspect
 import itertools
@@ -25,8 +24,6 @@ import numpy as np
 from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.kinds import check_kinds, check_switches, check_together, switches_of
 from saltus.progress import silent, watched
-
-RADIANS = {"unit": "rad"}  # the metadata of a dataclass's field that is an angle
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,7 @@ def number_problem(
             if abs(float(value)) <= LIMITS.value
             else f"must be at most {LIMITS.value:g} in size, got {shown(value)}"
         )
-    wanted = _range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
+    wanted = range_text(above, below, at_least, at_most) + (f" {unit}" if unit else "")
     if not number:
         kind = wanted.replace("lie in", "be a number in").replace("be finite", "be a finite number")
         return f"must {kind}, got {shown(value)}"
@@ -140,9 +137,10 @@ def number_problem(
     return f"must {wanted}, got {shown(value)}{hint}"
 
 
-def _range_text(
+def range_text(
     above: float | None, below: float | None, at_least: float | None, at_most: float | None
 ) -> str:
+    """A range in words, such as "lie in [0, 1]"."""
     if above is None and at_least is None and below is None and at_most is None:
         return "be finite"
     left = (
@@ -477,26 +475,6 @@ def notice_degrees(name: str, value: float) -> None:
             f" {math.radians(value):.6g}"
         )
         warnings.warn(text, UserWarning, stacklevel=2)
-
-
-def settle_numbers(owner: Any, *names: str, **bounds: Any) -> None:
-    """Check fields of a frozen dataclass against the bounds of `check_number` and store them as
-    plain floats.
-
-    The unit of a field is that of its metadata, as in `field(metadata=RADIANS)`.
-    """
-    for name in names:
-        kind = cast(Any, type(owner))
-        value = getattr(owner, name)
-        if bounds or type(value) is not float or not abs(value) <= LIMITS.value:
-            check_number(name, value, unit=_units_of(kind)[name], **bounds)
-            object.__setattr__(owner, name, float(value))
-
-
-@functools.cache
-def _units_of(kind: type) -> dict[str, str]:
-    """The unit of each field of a dataclass."""
-    return {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(kind)}
 
 
 def check_environment() -> None:

@@ -3,15 +3,16 @@ made of one.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
 import saltus
 from saltus import Contact, ContactModel, Friction, Model, OneContactModel, ParameterError, System
+from saltus.flow import PortableMotion
 from saltus.systems import MODELS
-from saltus.web.accepted import accepted
+from saltus.web.description import description, notice_undeclared
 
 
 def fall(self, t, q, velocity, side, load):
@@ -353,8 +354,51 @@ def test_what_the_class_of_a_user_refuses_is_said_with_its_path_and_value():
         saltus.simulate_many(
             system, theta=0.1, duration=1.0, parameters={"model.stiffness": [1.0, -2.0]}
         )
-    ends = {side: bound["end"] for side, bound in accepted(system)["model.stiffness"].items()}
-    assert ends == {"least": 0.0, "most": 5.0}  # which are the ends of the slider of a page
+    # a page cannot know it, and says so; its slider goes to 2 * 4 here
+    far = system.with_({"model.stiffness": 4.0})
+    entries = description(PortableMotion(far))["numbers"]
+    with pytest.warns(
+        UserWarning, match=r"model\.stiffness: that spring is too stiff.*number_range"
+    ):
+        notice_undeclared(far, entries)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declared(OneContactModel):
+    """An oscillator whose numbers declare what they may be."""
+
+    stiffness: float = field(default=1.0, metadata=saltus.number_range(above=0.0, at_most=5.0))
+    stop: float = field(default=0.5, metadata=saltus.number_range(below="far"))
+    far: float = field(default=2.0, metadata=saltus.number_range())
+    cells: int = field(default=2, metadata=saltus.number_range(at_least=1, whole=True))
+
+    coordinates = ("theta",)
+    channels = ()
+
+    def acceleration(self, t, theta, velocity, side, load):
+        return -self.stiffness * theta
+
+
+@pytest.mark.parametrize(
+    ("number", "value", "sentence"),
+    [
+        ("stiffness", 0.0, "model.stiffness must lie in (0, 5], got 0.0"),
+        ("stiffness", 5.5, "model.stiffness must lie in (0, 5], got 5.5"),
+        ("stiffness", None, "model.stiffness must be a number in (0, 5], got None"),
+        ("stop", 2.0, "model.stop must lie below far = 2, got 2"),
+        ("far", -1.0, "model.stop must lie below far = -1, got 0.5"),
+        ("cells", 0, "model.cells must lie in [1, 1e+07], got 0"),
+        ("cells", 1.5, "model.cells must be a whole number, got 1.5"),
+    ],
+)
+def test_declared_ranges_are_checked_where_a_system_is_made(number, value, sentence):
+    with pytest.raises(ParameterError) as refused:
+        System(model=Declared(**{number: value}))
+    assert str(refused.value) == sentence
+    system = System(model=Declared(stiffness=5))
+    assert (type(system.model.stiffness), system.model.stiffness) == (float, 5.0)
+    with pytest.raises(ParameterError, match="must lie in"):
+        system.with_({"model.stiffness": 5.1})
 
 
 NO_NUMBERS = (math.nan, math.inf, -math.inf, 1j, "1", [1.0], np.array([1.0, 2.0]), np.ma.masked, {})

@@ -9,7 +9,6 @@ import pytest
 from test_agreement import NODE, block, cell, layers, page_parts, run_node, stops, wall
 
 from saltus.web import one_file
-from saltus.web.accepted import accepted
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed here")
 
@@ -18,7 +17,6 @@ def answers(kind, folder, damaged, extremes):
     """What `bad_input.mjs` counts for a system of a kind."""
     system, start = kind(np.random.default_rng(5))
     wasm, description = page_parts(system)
-    bounds = accepted(system)
     simulate = {"periods": 20} if system.load.period else {"duration": 20.0}
     names = [
         name
@@ -26,9 +24,6 @@ def answers(kind, folder, damaged, extremes):
         for name in (each["name"], each["velocity"])
     ]
     description |= {
-        "numbers": [
-            entry | {"accepted": bounds[entry["path"]]} for entry in description["numbers"]
-        ],
         "start": dict.fromkeys(["time", *names], 0.0)
         | {name: value for name, value in start.items() if name in names},
         "study": {"system": system.to_dict(), "simulate": simulate},

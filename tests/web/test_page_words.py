@@ -2,7 +2,7 @@
 of one's own; which numbers have sliders, and between which ends; and the jumps of a sweep.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ class Swing(saltus.OneContactModel):
     """A pendulum at a wall that ends where it is upright, with a landmark on its way."""
 
     wall: float = -0.3
-    restitution: float = 0.8
+    restitution: float = field(default=0.8, metadata=saltus.number_range(at_least=0, at_most=1))
 
     coordinates = ("phi",)
     channels = ("torque",)
@@ -54,10 +54,6 @@ class Swing(saltus.OneContactModel):
         "upright": saltus.systems.MarginKind.LIMIT,
         "level": saltus.systems.MarginKind.LANDMARK,
     }
-
-    def __post_init__(self):
-        if not 0.0 <= self.restitution <= 1.0:
-            raise ValueError(f"restitution must lie in [0, 1], got {self.restitution!r}")
 
     @property
     def contact(self):

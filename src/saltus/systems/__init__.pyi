@@ -1,4 +1,5 @@
 from .contact_model import ContactModel as ContactModel
+from .contact_model import called_part as called_part
 from .contact_model import mass_and_force as mass_and_force
 from .contact_model import mass_rows as mass_rows
 from .contact_model import reactions as reactions
@@ -7,6 +8,7 @@ from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape
 from .drawings import drawing_of as drawing_of
 from .drawings import stops_of as stops_of
+from .gap_coordinates import fields_of as fields_of
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw
 from .impact_laws import VelocityReduction as VelocityReduction
@@ -46,6 +48,7 @@ from .scenarios import other_impulse as other_impulse
 from .scenarios import table_1 as table_1
 from .serial import IMPACTS as IMPACTS
 from .serial import MODELS as MODELS
+from .serial import PULSES as PULSES
 from .serial import children as children
 from .serial import is_number as is_number
 from .serial import numbers as numbers

@@ -7,7 +7,7 @@ The accelerations take numbers, arrays or symbols.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from decimal import Decimal
 from numbers import Complex
@@ -17,6 +17,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, number_problem
 from saltus.errors import ParameterError, shown
+from saltus.number_ranges import number_range, ranges_of
 from saltus.systems.load import LoadOnSides, Sides
 from saltus.systems.model import Jet, Model, ask, is_zero
 
@@ -70,7 +71,9 @@ class Contact:
     sign: int = 1
     position: Number = 0.0
     group: str = ""
-    restitution: Number | None = None
+    restitution: Number | None = field(
+        default=None, metadata=number_range(at_least=0.0, at_most=1.0)
+    )
 
     def __post_init__(self) -> None:
         if (
@@ -88,7 +91,7 @@ class Contact:
         _check_sign(self)
         _check_numbers(self, "position")
         if self.restitution is not None:
-            _check_numbers(self, "restitution", at_least=0.0, at_most=1.0)
+            _check_numbers(self, "restitution")
 
     def gap(self, position: Any) -> Any:
         """sign (q - p), at a position q.
@@ -143,28 +146,27 @@ class Friction:
 
     name: str
     coordinate: Any
-    kinetic: Number
-    static: Number | None = None
+    kinetic: Number = field(metadata=number_range(at_least=0.0))
+    static: Number | None = field(default=None, metadata=number_range(at_least="kinetic"))
     ground_speed: Number = 0.0
     contact: str | None = None
-    stribeck_speed: Number | None = None
+    stribeck_speed: Number | None = field(default=None, metadata=number_range(above=0.0))
 
     def __post_init__(self) -> None:
         _check_texts(self, "name", *(() if self.contact is None else ("contact",)))
-        _check_numbers(self, "kinetic", at_least=0.0)
-        _check_numbers(self, "ground_speed")
+        _check_numbers(self, "kinetic", "ground_speed")
         if self.static is not None:
             _check_numbers(self, "static")
             lowest = _real(self.kinetic)
             highest = _real(self.static)
             if _is_number(lowest) and _is_number(highest) and highest < lowest:
-                pair = f"kinetic = {lowest:g} and static = {highest:g}"
                 raise ParameterError(
-                    f"the friction {shown(self.name)} must have 0 <= kinetic <= static, got {pair}",
+                    f"static of {called_part(self)} must be at least kinetic = {lowest:g}, got"
+                    f" {highest:g}",
                     "static",
                 )
         if self.stribeck_speed is not None:
-            _check_numbers(self, "stribeck_speed", above=0.0)
+            _check_numbers(self, "stribeck_speed")
 
     @property
     def limit(self) -> str:
@@ -284,16 +286,21 @@ def _real(value: Any) -> Any:
     return value.real if small else value
 
 
-def _check_numbers(part: Contact | Friction | Surface, *names: str, **bounds: Any) -> None:
-    """Refuse anything but finite numbers within bounds in the fields of a part of a model."""
+def _check_numbers(part: Contact | Friction | Surface, *names: str) -> None:
+    """Refuse anything but finite numbers within their declared ranges in the fields of a part of a
+    model.
+    """
+    kind: Any = type(part)
+    ranges = ranges_of(kind)
     for name in names:
         value = getattr(part, name)
+        bounds: dict[str, Any] = dict(ranges[name].bounds) if name in ranges else {}
         if type(value) is float and not bounds and -LIMITS.value <= value <= LIMITS.value:
             continue
         value = _real(value)
         problem = number_problem(value, **bounds) if _is_number(value) else None
         if problem is not None:
-            raise ParameterError(f"{name} of {_called(part)} {problem}", name)
+            raise ParameterError(f"{name} of {called_part(part)} {problem}", name)
 
 
 def _check_texts(part: Contact | Friction | Surface, *names: str) -> None:
@@ -310,11 +317,11 @@ def _check_sign(part: Contact | Surface) -> None:
     value = part.sign
     if number_problem(value) is not None or value not in (1, -1):
         raise ParameterError(
-            f"the sign of {_called(part)} must be +1 or -1, got {shown(value)}", "sign"
+            f"the sign of {called_part(part)} must be +1 or -1, got {shown(value)}", "sign"
         )
 
 
-def _called(part: Contact | Friction | Surface) -> str:
+def called_part(part: Contact | Friction | Surface) -> str:
     """What a part of a model is called in a sentence."""
     return f"the {type(part).__name__.lower()} {shown(part.name)}"
 

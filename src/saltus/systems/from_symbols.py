@@ -10,13 +10,13 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, make_dataclass, replace
+from dataclasses import dataclass, field, make_dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from saltus.checks import settle_numbers
 from saltus.errors import ParameterError, shown
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.contact_model import Contact, ContactModel
 from saltus.systems.serial import MODELS
 
@@ -304,12 +304,12 @@ def _class_of(made: _Equations) -> Any:
         "force": push,
     }
     body |= {"kinetic_energy": energy, "contacts": property(touching), "__module__": __name__}
-    body["__post_init__"] = lambda self: settle_numbers(self, *made.parameters)
+    body["__post_init__"] = lambda self: settle_numbers(self)
     body["__reduce__"] = lambda self: (
         _made_again,
         (made, {name: getattr(self, name) for name in made.parameters}),
     )
-    fields = [(name, float) for name in made.parameters]
+    fields = [(name, float, field(metadata=number_range())) for name in made.parameters]
     found = make_dataclass(
         made.name, fields, bases=(ContactModel,), namespace=body, frozen=True, kw_only=True
     )

@@ -7,13 +7,14 @@ from __future__ import annotations
 import itertools
 from collections import UserDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import answered, check_number, settle_numbers
+from saltus.checks import answered
 from saltus.errors import ParameterError
+from saltus.number_ranges import NumberRange, number_range, settle_numbers
 from saltus.systems.contact_model import (
     Contact,
     ContactModel,
@@ -107,10 +108,10 @@ class VelocityReduction(ImpactLaw):
     True
     """
 
-    e: float = 1.0
+    e: float = field(default=1.0, metadata=number_range(at_least=0.0, at_most=1.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "e", at_least=0.0, at_most=1.0)
+        settle_numbers(self)
 
     def velocity_after(
         self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
@@ -153,10 +154,10 @@ class EnergyRestitution(ImpactLaw):
     0.5000000000000006
     """
 
-    r: float
+    r: float = field(metadata=number_range(above=0.0, at_most=1.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "r", above=0.0, at_most=1.0)
+        settle_numbers(self)
 
     def velocity_after(
         self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load
@@ -286,17 +287,15 @@ class NewtonImpact(ImpactLaw):
     [-0.5]
     """
 
-    e: Any = 0.0
-    transfer: float = 0.0
+    e: Any = field(
+        default=0.0, metadata={"range": NumberRange(at_least=0.0, at_most=1.0, each=True)}
+    )
+    transfer: float = field(default=0.0, metadata=number_range(at_least=0.0, at_most=1.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "transfer", at_least=0.0, at_most=1.0)
-        several = isinstance(self.e, (tuple, list))
-        for i, value in enumerate(self.e if several else (self.e,)):
-            check_number(f"e.{i}" if several else "e", value, at_least=0.0, at_most=1.0)
-        object.__setattr__(
-            self, "e", Factors(float(x) for x in self.e) if several else float(self.e)
-        )
+        settle_numbers(self)
+        if isinstance(self.e, (tuple, list)):
+            object.__setattr__(self, "e", Factors(self.e))
 
     def velocity_after(
         self, model: OneContactModel, t: Any, velocity: Any, side: Any, next_side: Any, load: Load

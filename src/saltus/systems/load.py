@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from saltus.checks import check_number
 from saltus.errors import ParameterError, TraceError, near
+from saltus.number_ranges import number_range, ranges_of, settled
 from saltus.systems.signals import Record, Signal, as_signal, scaled
 
 
@@ -105,7 +105,7 @@ class Load:
     (1.0, -0.5)
     """
 
-    frequency: float | None
+    frequency: float | None = field(metadata=number_range(above=0.0))
     channels: dict[str, Signal]
 
     def __init__(
@@ -116,8 +116,7 @@ class Load:
     ) -> None:
         signals = {name: as_signal(value, f"load.{name}") for name, value in channels.items()}
         if frequency is not None:
-            check_number("load.frequency", frequency, above=0.0)
-            frequency = float(frequency)
+            frequency = settled("load.frequency", frequency, ranges_of(Load)["frequency"])
             if not 2.0 * math.pi / frequency < 1e300:
                 raise ParameterError(
                     f"load.frequency must make a finite forcing period, got {frequency!r}",

@@ -10,11 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.model import IMAGE_ROUNDING, MarginKind, Model, OneContactModel
 from saltus.systems.signals import Constant, Signal, scaled, vanishes
+
+BETWEEN_0_AND_PI = number_range(above=0.0, below=math.pi, unit="rad")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,11 +25,13 @@ class LayeredCell(Model):
     (paper, `m_k_ratio`).
     """
 
-    beta0: float = field(metadata=RADIANS)  # angle of the undeformed cell, in (0, pi)
-    damping: float = 0.0  # C, at least 0
-    stiffness_ratio: float = 1.0  # k = K1 / K2, above 0
-    mass_ratio: float = 0.0  # m = M1 / M2, at least 0
-    dissipation_ratio: float = 1.0  # c = C1 / C2, at least 0
+    beta0: float = field(metadata=BETWEEN_0_AND_PI)  # angle of the undeformed cell
+    damping: float = field(default=0.0, metadata=number_range(at_least=0.0))  # C
+    stiffness_ratio: float = field(default=1.0, metadata=number_range(above=0.0))  # k = K1 / K2
+    mass_ratio: float = field(default=0.0, metadata=number_range(at_least=0.0))  # m = M1 / M2
+    dissipation_ratio: float = field(
+        default=1.0, metadata=number_range(at_least=0.0)
+    )  # c = C1 / C2
 
     dimensionless: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = (
@@ -40,9 +44,7 @@ class LayeredCell(Model):
     )
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "beta0", above=0.0, below=math.pi)
-        settle_numbers(self, "stiffness_ratio", above=0.0)
-        settle_numbers(self, "damping", "mass_ratio", "dissipation_ratio", at_least=0.0)
+        settle_numbers(self)
 
     @property
     def cell_numbers(self) -> dict[str, Any]:
@@ -95,7 +97,7 @@ class Metainterface(LayeredCell, OneContactModel):
     ('theta',)
     """
 
-    smoothing: float | None = None
+    smoothing: float | None = field(default=None, metadata=number_range(above=0.0))
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     margin_kinds: ClassVar[dict[str, MarginKind]] = {
@@ -106,14 +108,13 @@ class Metainterface(LayeredCell, OneContactModel):
 
     def __post_init__(self) -> None:
         LayeredCell.__post_init__(self)
-        if self.smoothing is not None:
-            settle_numbers(self, "smoothing", above=0.0)
-            if (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio) != (1.0, 0.0, 1.0):
-                raise ParameterError(
-                    "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0,"
-                    " dissipation_ratio 1); drop it to compute the exact motion of unequal ones",
-                    "smoothing",
-                )
+        ratios = (self.stiffness_ratio, self.mass_ratio, self.dissipation_ratio)
+        if self.smoothing is not None and ratios != (1.0, 0.0, 1.0):
+            raise ParameterError(
+                "smoothing is for symmetric layers only (stiffness_ratio 1, mass_ratio 0,"
+                " dissipation_ratio 1); drop it to compute the exact motion of unequal ones",
+                "smoothing",
+            )
 
     def check_load(self, load: Load) -> None:
         """Refuse loads on the lower layer with a smoothed sign, which makes no difference between

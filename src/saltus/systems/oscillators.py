@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
-from saltus.errors import ParameterError
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.contact_model import Contact, ContactModel, Friction
 from saltus.systems.impact_laws import ImpactLaw, InelasticImpact
 from saltus.systems.load import Load, reversed_load
@@ -43,16 +42,15 @@ class WallOscillator(OneContactModel):
     array([2.])
     """
 
-    stiffness: float = 1.0
-    damping: float = 0.0
-    wall: float = 1.0
+    stiffness: float = field(default=1.0, metadata=number_range(at_least=0.0))
+    damping: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    wall: float = field(default=1.0, metadata=number_range())
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "stiffness", "damping", at_least=0.0)
-        settle_numbers(self, "wall")
+        settle_numbers(self)
 
     @property
     def sides(self) -> tuple[int, ...]:
@@ -111,21 +109,16 @@ class TwoStops(ContactModel):
     ['left', 'right']
     """
 
-    stiffness: float = 1.0
-    damping: float = 0.0
-    left: float = -1.0
-    right: float = 1.0
+    stiffness: float = field(default=1.0, metadata=number_range(at_least=0.0))
+    damping: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    left: float = field(default=-1.0, metadata=number_range(below="right"))
+    right: float = field(default=1.0, metadata=number_range())
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "stiffness", "damping", at_least=0.0)
-        settle_numbers(self, "left", "right")
-        if not self.left < self.right:
-            raise ParameterError(
-                f"left must lie below right = {self.right:g}, got {self.left:g}", "left"
-            )
+        settle_numbers(self)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -182,17 +175,16 @@ class ImpactPair(ContactModel):
     ['left', 'right']
     """
 
-    mass_ratio: float = 0.1
-    stiffness: float = 1.0
-    damping: float = 0.0
-    clearance: float = 1.0
+    mass_ratio: float = field(default=0.1, metadata=number_range(above=0.0))
+    stiffness: float = field(default=1.0, metadata=number_range(at_least=0.0))
+    damping: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    clearance: float = field(default=1.0, metadata=number_range(above=0.0))
 
     coordinates: ClassVar[tuple[str, ...]] = ("z", "x")
     channels: ClassVar[tuple[str, ...]] = ("force", "ground")
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "mass_ratio", "clearance", above=0.0)
-        settle_numbers(self, "stiffness", "damping", at_least=0.0)
+        settle_numbers(self)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -256,24 +248,18 @@ class BeltOscillator(ContactModel):
     (3.0, 'slip')
     """
 
-    stiffness: float = 1.0
-    damping: float = 0.0
-    kinetic: float = 0.2
-    static: float = 0.3
-    normal_force: float = 1.0
-    belt_speed: float = 0.1
+    stiffness: float = field(default=1.0, metadata=number_range(at_least=0.0))
+    damping: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    kinetic: float = field(default=0.2, metadata=number_range(at_least=0.0))
+    static: float = field(default=0.3, metadata=number_range(at_least="kinetic"))
+    normal_force: float = field(default=1.0, metadata=number_range(above=0.0))
+    belt_speed: float = field(default=0.1, metadata=number_range())
 
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("force", "normal")
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "stiffness", "damping", "kinetic", "static", at_least=0.0)
-        settle_numbers(self, "normal_force", above=0.0)
-        settle_numbers(self, "belt_speed")
-        if self.static < self.kinetic:
-            raise ParameterError(
-                f"static must be at least kinetic = {self.kinetic:g}, got {self.static:g}", "static"
-            )
+        settle_numbers(self)
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
@@ -334,7 +320,7 @@ class RockingBlock(OneContactModel):
     0.9999999999999871
     """
 
-    alpha: float = field(metadata=RADIANS)
+    alpha: float = field(metadata=number_range(above=0.0, below=math.pi / 2, unit="rad"))
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
     dimensionless: ClassVar[bool] = True
@@ -344,7 +330,7 @@ class RockingBlock(OneContactModel):
     usual_impact: ClassVar[ImpactLaw] = InelasticImpact()
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "alpha", above=0.0, below=math.pi / 2)
+        settle_numbers(self)
 
     def acceleration(self, t: Any, theta: Any, velocity: Any, side: Any, load: Load) -> Any:
         """theta'' of `EOM&Rock` in the time p t."""

@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import RADIANS, settle_numbers
 from saltus.errors import ParameterError
-from saltus.systems.signals import RATE, TIME, Transient
+from saltus.number_ranges import number_range
+from saltus.systems.signals import DURATION, RATE, Transient
 
 
 def in_other_units(
@@ -187,15 +187,10 @@ class MavroeidisPapageorgiou(Transient):
     """
 
     frequency: float = field(metadata=RATE)
-    gamma: float
-    phase: float = field(default=0.0, metadata=RADIANS)
+    gamma: float = field(metadata=number_range(above=1.0))
+    phase: float = field(default=0.0, metadata=number_range(unit="rad"))
     moving: ClassVar[tuple[str, ...]] = ("start", "frequency", "gamma")
     quantities: ClassVar[tuple[str, ...]] = ("force", "velocity", "acceleration")
-
-    def __post_init__(self) -> None:
-        settle_numbers(self, "phase")
-        settle_numbers(self, "gamma", above=1.0)
-        super().__post_init__()
 
     @property
     def length(self) -> Any:
@@ -283,7 +278,7 @@ class Pulse(Transient):
     (0.0, 2.0, 0.0)
     """
 
-    duration: float = field(metadata=TIME)
+    duration: float = field(metadata=DURATION)
     moving: ClassVar[tuple[str, ...]] = ("start", "duration")
 
     @property
@@ -365,7 +360,7 @@ class Ramp(Transient):
     (0.5, 2.0)
     """
 
-    duration: float = field(metadata=TIME)
+    duration: float = field(metadata=DURATION)
     holds: ClassVar[bool] = True
     moving: ClassVar[tuple[str, ...]] = ("start", "duration")
 
@@ -413,7 +408,7 @@ class Chirp(Transient):
 
     frequency: float = field(metadata=RATE)
     end_frequency: float = field(metadata=RATE)
-    duration: float = field(metadata=TIME)
+    duration: float = field(metadata=DURATION)
     moving: ClassVar[tuple[str, ...]] = ("start", "duration")
 
     @property

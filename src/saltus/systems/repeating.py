@@ -15,8 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import LIMITS, RADIANS, notice_degrees, settle_numbers
+from saltus.checks import LIMITS, notice_degrees
 from saltus.errors import ParameterError, shown
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.signals import QUANTITIES, QUANTITY_ORDER, Setting, Signal, samples_of
 
 # Corners nearer than this share of the forcing period are one.
@@ -218,9 +219,9 @@ def _wave(kind: str, phase: float, duty: float) -> Pieces:
 class Wave(Repeating):
     """What square waves, triangles and saws share: mean + amplitude w(Omega tau + phase)."""
 
-    amplitude: float
-    mean: float = 0.0
-    phase: float = field(default=0.0, metadata=RADIANS)
+    amplitude: float = field(metadata=number_range())
+    mean: float = field(default=0.0, metadata=number_range())
+    phase: float = field(default=0.0, metadata=number_range(unit="rad"))
     quantity: str = "force"
 
     def __post_init__(self) -> None:
@@ -273,10 +274,10 @@ class Square(Wave):
     (2.0, -2.0, 2.0)
     """
 
-    duty: float = 0.5
+    duty: float = field(default=0.5, metadata=number_range(above=0.0, below=1.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "duty", above=0.0, below=1.0)
+        settle_numbers(self, "duty")
         object.__setattr__(self, "duty", Setting(self.duty))
         Wave.__post_init__(self)
 
@@ -376,7 +377,7 @@ class Table(Repeating):
     periodic: bool = True  # type: ignore[misc]
     interpolation: str = "linear"
     quantity: str = "force"
-    scale: float = 1.0
+    scale: float = field(default=1.0, metadata=number_range())
 
     def __post_init__(self) -> None:
         if self.periodic is not True:

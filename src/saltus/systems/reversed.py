@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from saltus.checks import settle_numbers
 from saltus.errors import ParameterError
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model
@@ -33,10 +33,10 @@ RESET_SPEEDS = (0.3, 2.0)  # speeds at which a reset is compared with its invers
 class VelocityGain(ImpactLaw):
     """v+ = v- / e, with e in (0, 1]: `VelocityReduction(e)` reversed in time."""
 
-    e: float = 1.0
+    e: float = field(default=1.0, metadata=number_range(above=0.0, at_most=1.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "e", above=0.0, at_most=1.0)
+        settle_numbers(self)
 
     def velocity_after(
         self, model: Model, t: Any, velocity: Any, side: Any, next_side: Any, load: Load

@@ -7,12 +7,13 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from operator import mul, truediv
 from typing import Any
 
-from saltus.checks import check_number, settle_numbers, with_answers
+from saltus.checks import check_number, with_answers
 from saltus.errors import ParameterError
+from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.impact_laws import ImpactLaw
 from saltus.systems.load import Load
 from saltus.systems.metainterface import Metainterface
@@ -152,13 +153,13 @@ class PhysicalCell(Physical):
     0.09999999999999998
     """
 
-    length: float
-    upper_mass: float
-    upper_stiffness: float
-    lower_mass: float = 0.0
-    lower_stiffness: float | None = None
-    upper_damping: float = 0.0
-    lower_damping: float | None = None
+    length: float = field(metadata=number_range(above=0.0))
+    upper_mass: float = field(metadata=number_range(above=0.0))
+    upper_stiffness: float = field(metadata=number_range(above=0.0))
+    lower_mass: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    lower_stiffness: float | None = field(default=None, metadata=number_range(above=0.0))
+    upper_damping: float = field(default=0.0, metadata=number_range(at_least=0.0))
+    lower_damping: float | None = field(default=None, metadata=number_range(at_least=0.0))
 
     def __post_init__(self) -> None:
         for name, twin in (
@@ -167,10 +168,7 @@ class PhysicalCell(Physical):
         ):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, getattr(self, twin))
-        settle_numbers(
-            self, "length", "upper_mass", "upper_stiffness", "lower_stiffness", above=0.0
-        )
-        settle_numbers(self, "lower_mass", "upper_damping", "lower_damping", at_least=0.0)
+        settle_numbers(self)
         if self.upper_damping == 0.0 and self.lower_damping != 0.0:
             raise ParameterError(
                 f"lower_damping is {self.lower_damping!r} but upper_damping is 0, so the ratio C1 /"
@@ -310,12 +308,12 @@ class PhysicalBlock(Physical):
     ('rest', 0.8)
     """
 
-    half_width: float
-    half_height: float
-    gravity: float = GRAVITY
+    half_width: float = field(metadata=number_range(above=0.0))
+    half_height: float = field(metadata=number_range(above=0.0))
+    gravity: float = field(default=GRAVITY, metadata=number_range(above=0.0))
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "half_width", "half_height", "gravity", above=0.0)
+        settle_numbers(self)
 
     @property
     def half_diagonal(self) -> float:

@@ -19,14 +19,12 @@ import numpy as np
 
 from saltus.checks import (
     LIMITS,
-    RADIANS,
-    check_count,
     check_number,
     check_size,
     notice_degrees,
-    settle_numbers,
 )
 from saltus.errors import ParameterError, shown
+from saltus.number_ranges import number_range, settle_numbers
 
 
 class Setting(float):
@@ -70,10 +68,10 @@ class Signal:
 class Constant(Signal):
     """A channel that does not vary: value."""
 
-    value: float
+    value: float = field(metadata=number_range())
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "value")
+        settle_numbers(self)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """`value`, or 0 for a derivative."""
@@ -106,19 +104,17 @@ class Harmonic(Signal):
     3.0
     """
 
-    amplitude: float
-    mean: float = 0.0
-    phase: float = field(default=0.0, metadata=RADIANS)
-    order: int = 1
+    amplitude: float = field(metadata=number_range())
+    mean: float = field(default=0.0, metadata=number_range())
+    phase: float = field(default=0.0, metadata=number_range(unit="rad"))
+    order: int = field(
+        default=1, metadata=number_range(at_least=1, at_most=LIMITS.order, whole=True)
+    )
     periodic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "amplitude", "mean", "phase")
+        settle_numbers(self)
         notice_degrees("phase", self.phase)
-        order: Any = self.order
-        if isinstance(order, float) and order.is_integer():  # from a column of numbers
-            object.__setattr__(self, "order", int(order))
-        check_count("order", self.order, 1)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """mean + amplitude sin(...), or -- differentiated -- amplitude (order Omega)^n sin(...
@@ -269,7 +265,7 @@ class Record(Signal):
     time: np.ndarray
     value: np.ndarray
     quantity: str = "force"
-    scale: float = 1.0
+    scale: float = field(default=1.0, metadata=number_range())
     once: ClassVar[bool] = True
     source: str = field(default="", compare=False)
     interpolation: str = ""
@@ -565,7 +561,8 @@ def vanishes(signal: Signal) -> bool:
 
 # the metadata of fields that units of time convert
 TIME = {"converts": "time"}
-RATE = {"converts": "rate"}
+DURATION = TIME | number_range(above=0.0)
+RATE = {"converts": "rate"} | number_range(above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -581,8 +578,8 @@ class Transient(Signal):
     the numbers on which the beginning or the end depends.
     """
 
-    amplitude: float
-    start: float = field(default=0.0, metadata=TIME)
+    amplitude: float = field(metadata=number_range())
+    start: float = field(default=0.0, metadata=TIME | number_range())
     quantity: str = "force"
     once: ClassVar[bool] = True
     holds: ClassVar[bool] = False  # whether it keeps its last value after its end
@@ -596,18 +593,14 @@ class Transient(Signal):
                 f"{', '.join(self.quantities)}, got {self.quantity!r}",
                 "quantity",
             )
-        settle_numbers(self, "amplitude", "start")
-        positive = [
-            f.name
-            for f in dataclasses.fields(self)
-            if f.metadata in (TIME, RATE) and f.name != "start"
-        ]
-        settle_numbers(self, *positive, above=0.0)
+        settle_numbers(self)
+        timed = [f.name for f in dataclasses.fields(self) if "converts" in f.metadata]
+        timed.sort(key="start".__eq__)  # the start is named last
         if not (math.isfinite(self.length) and self.start + self.length > self.start):
             raise ParameterError(
                 f"a {type(self).__name__} of the duration {self.length:g} does not end after its "
                 "start",
-                positive[0],
+                timed[0],
             )
 
     @property

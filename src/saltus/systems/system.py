@@ -14,6 +14,7 @@ import numpy as np
 from saltus.checks import Numbers
 from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
+from saltus.number_ranges import settle_numbers
 from saltus.progress import html_table
 from saltus.systems.contact_model import ContactModel
 from saltus.systems.gap_coordinates import in_gap_coordinates
@@ -383,10 +384,21 @@ def _passes(model: Model, impact: ImpactLaw) -> bool:
     global _passed
     last = _passed
     if last.model is not model or last.impact is not impact or not is_fixed(model):
+        _settle("model", model)
+        _settle("impact", impact)
         has_sums = check_works(model)
         _check_impact(model, impact)
         _passed = last = _CheckedParts(model, impact, has_sums)
     return last.has_sums
+
+
+def _settle(name: str, part: Any) -> None:
+    """Check the declared ranges of a class of one's own; saltus's check them where they are made."""
+    if not type(part).__module__.startswith("saltus."):
+        try:
+            settle_numbers(part)
+        except ParameterError as error:
+            raise error.inside(name) from None
 
 
 def _check_parts(system: System) -> None:

@@ -4,14 +4,14 @@ chains of such cells, with springs between the masses of neighbouring cells."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
-from saltus.checks import check_count, settle_numbers
+from saltus.number_ranges import number_range
 from saltus.systems.contact_model import MOST_CONTACTS, Contact, ContactModel, reactions
 from saltus.systems.load import Load, reversed_load
 from saltus.systems.metainterface import LayeredCell
@@ -341,16 +341,17 @@ class CellChain(LayeredCell, ContactModel):
     ('lower_1', 'upper_1', 'lower_2', 'upper_2', 'lower_3', 'upper_3')
     """
 
-    cells: int = 2
-    coupling: float = 0.1  # kappa = stiffness of a spring times length squared, over K2; at least 0
+    cells: int = field(
+        default=2, metadata=number_range(at_least=1, at_most=MOST_CONTACTS // 2, whole=True)
+    )
+    # kappa = stiffness of a spring times length squared, over K2
+    coupling: float = field(default=0.1, metadata=number_range(at_least=0.0))
 
     singularity: ClassVar[str] = "massless_hinge"
     transfers: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         LayeredCell.__post_init__(self)
-        settle_numbers(self, "coupling", at_least=0.0)
-        check_count("cells", self.cells, at_least=1, at_most=MOST_CONTACTS // 2)
         object.__setattr__(self, "cells", Count(self.cells))
 
     @property

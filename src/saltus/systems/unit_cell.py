@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from saltus.checks import RADIANS, Numbers, check_number, settle_numbers, with_answers
+from saltus.checks import Numbers, check_number, with_answers
 from saltus.errors import ParameterError, shown
-from saltus.systems.metainterface import Metainterface
+from saltus.number_ranges import settle_numbers
+from saltus.systems.metainterface import BETWEEN_0_AND_PI, Metainterface
 from saltus.systems.si_units import PhysicalCell
 from saltus.systems.two_layer import TwoLayer
 
@@ -62,12 +63,12 @@ class UnitCell:
     0.10000000000000009
     """
 
-    alpha0: float = field(metadata=RADIANS)
-    beta0: float = field(metadata=RADIANS)
+    alpha0: float = field(metadata=BETWEEN_0_AND_PI)
+    beta0: float = field(metadata=BETWEEN_0_AND_PI)
     physical: PhysicalCell | None = None
 
     def __post_init__(self) -> None:
-        settle_numbers(self, "beta0", "alpha0", above=0.0, below=math.pi)
+        settle_numbers(self)
         if self.alpha0 + self.beta0 >= math.pi:
             raise ParameterError(
                 f"alpha0 + beta0 must lie below pi rad, got {self.alpha0!r} + {self.beta0!r}",

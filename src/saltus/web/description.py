@@ -9,16 +9,27 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
 import saltus
-from saltus.errors import SaltusError
+from saltus.errors import SaltusError, shown
 from saltus.flow import PortableMotion, state_names
-from saltus.systems import System, children, numbers, stops_of
+from saltus.number_ranges import BESIDE, NumberRange, ranges_of
+from saltus.systems import (
+    System,
+    called_part,
+    children,
+    fields_of,
+    numbers,
+    stops_of,
+)
 from saltus.web.objects import KERNEL_DATA, KERNEL_FUNCTIONS, kernel_code, structure_code
 
 FREQUENCY = "load.frequency"
+# How far beside its value a number is tried, odd in its digits so that no sentence has them.
+BESIDE_IT = 0.0070173
 
 
 def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
@@ -123,9 +134,11 @@ def _stops(system: System) -> Iterator[dict[str, Any]]:
 
 def _numbers(system: System) -> Iterator[dict[str, Any]]:
     """Each number of a system, in the order in which compiled code has them."""
+    given = {path for path, _ in numbers(system, given=True)}
     for path, value in numbers(system):
-        unit = _unit(system, path)
-        whole = path.endswith(".order")
+        where, called, declared = _declared(system, path)
+        unit = declared.unit
+        whole = declared.whole
         reach = math.pi if unit == "rad" else max(1.0, 2.0 * abs(value))
         yield {
             "path": path,
@@ -137,18 +150,119 @@ def _numbers(system: System) -> Iterator[dict[str, Any]]:
             "low": value - reach,
             "high": value + reach,
             "step": 1.0 if whole else 10.0 ** (math.floor(math.log10(reach)) - 3),
+            "range": _range(system, path, where, called, declared) if path in given else {},
         }
 
 
-def _unit(system: System, path: str) -> str:
-    """The unit of a number, as the field that holds it declares it."""
+def _declared(system: System, path: str) -> tuple[str, str, NumberRange]:
+    """Of a number: the path of the part that holds it, how refusals call a part that has a name of
+    its own, and the range that its field declares.
+    """
     node: Any = system
-    *above, name = path.split(".")
-    for part in above:
-        node = children(node)[part]
-    fields = (
-        {field.name: field for field in dataclasses.fields(node)}
-        if dataclasses.is_dataclass(node)
-        else {}
-    )
-    return str(fields[name].metadata.get("unit", "")) if name in fields else ""
+    field = where = ""
+    holder: Any = system
+    for number, name in enumerate(names := path.split(".")):
+        if dataclasses.is_dataclass(node):
+            holder, field = node, name
+            where = ".".join(names[:number])
+        node = children(node).get(name)
+    kind: Any = type(holder)
+    called = f" of {called_part(holder)}" if "coordinate" in fields_of(kind) else ""
+    if field in ranges_of(kind):
+        return where, called, ranges_of(kind)[field]
+    # a constant of a load has its channel's path; a field may declare its unit alone
+    units = {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(holder)}
+    return where, called, NumberRange(unit=str(units.get(field, "")))
+
+
+def _range(
+    system: System, path: str, where: str, called: str, declared: NumberRange
+) -> dict[str, Any]:
+    """Which values the page takes for a number, and what it says to others, as Python does:
+
+    * `least` and `most`: their `end`, or the path `of` the number that it is, and whether it is
+      `taken`;
+    * `demand`, "must lie in (0, pi) rad", and `beside`, "must lie below right = " another number;
+    * `only`, the value of a number that may have no other one here, and the sentence.
+    """
+    ends: dict[str, Any] = {}
+    sides = {"above": "least", "at_least": "least", "below": "most", "at_most": "most"}
+    for bound, side in sides.items():
+        end = getattr(declared, bound)
+        if end is not None:
+            which = {"of": f"{where}.{end}"} if isinstance(end, str) else {"end": end}
+            ends[side] = which | {"taken": bound.startswith("at_")}
+    for other, found in ranges_of(_part(system, where)).items():
+        for bound, name in found.beside:
+            if f"{where}.{name}" == path:
+                side = "most" if sides[bound] == "least" else "least"
+                bounded = {"of": f"{where}.{other}", "taken": bound.startswith("at_")}
+                ends[side] = bounded | ends.get(side, {})
+    beside = [
+        {
+            "side": sides[bound],
+            "of": f"{where}.{name}",
+            "taken": bound.startswith("at_"),
+            "demand": f"{called.lstrip()} must {BESIDE[bound]} {name} = ".lstrip(),
+        }
+        for bound, name in declared.beside
+    ]
+    only = _only_value(system, path, declared)
+    return {
+        **ends,
+        "demand": f"{called.lstrip()} {declared.demand}".lstrip(),
+        **({"beside": beside} if beside else {}),
+        **({"only": only} if only else {}),
+    }
+
+
+def _part(system: System, where: str) -> Any:
+    """The class of the part at a path."""
+    node: Any = system
+    for name in where.split(".") if where else ():
+        node = children(node)[name]
+    return type(node)
+
+
+def _only_value(system: System, path: str, declared: NumberRange) -> dict[str, Any] | None:
+    """For a number that may have one value alone in this system, such as the restitution of a model
+    without impacts: the value, and Python's sentence with marks for another one.
+    """
+    value = float(system.parameters[path])
+    size = max(1.0, abs(value))
+    near = [value + step * size for step in (-BESIDE_IT, BESIDE_IT)]
+    near = [x for x in near if declared.holds(x)]
+    said = [_refusal(system, path, x) for x in near]
+    if not near or not all(said):
+        return None
+    sentence = str(said[0]).replace(shown(near[0]), "{value}").replace(f"{near[0]:g}", "{short}")
+    return {"value": value, "said": sentence}
+
+
+def notice_undeclared(system: System, entries: list[dict[str, Any]]) -> None:
+    """Warn where a class of one's own refuses what a slider reaches, as its range is not declared:
+    the page would go on where Python does not.
+    """
+    for entry in entries:
+        declared = entry["range"]
+        if not declared or "only" in declared:
+            continue
+        for side, end in (("least", entry["low"]), ("most", entry["high"])):
+            refused = None if side in declared else _refusal(system, entry["path"], end)
+            if refused:
+                text = (
+                    f"{refused}: the slider of the page goes there, as the field does not declare"
+                    " its range, field(metadata=saltus.number_range(...))"
+                )
+                warnings.warn(text, UserWarning, stacklevel=4)
+
+
+def _refusal(system: System, path: str, value: float) -> str | None:
+    """Python's sentence where it refuses a value, else None."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # nobody means the values that are tried
+            system.with_({path: value})
+    except SaltusError as error:
+        return str(error)
+    return None

@@ -26,8 +26,7 @@ from saltus.systems import (
     rest_state,
     state_of,
 )
-from saltus.web.accepted import accepted
-from saltus.web.description import page_parts
+from saltus.web.description import notice_undeclared, page_parts
 from saltus.web.one_file import PAGE, one_file
 from saltus.web.results import differ_in_numbers, digest, results_as_json
 
@@ -353,14 +352,11 @@ def page_content(
 ) -> tuple[bytes, dict[str, Any]]:
     """The WebAssembly of a page and all that it is told."""
     content, described = page_parts(system)
-    bounds = accepted(system)
-    fixed = {path for path, bound in bounds.items() if _has_one_value(bound)}
+    notice_undeclared(system, described["numbers"])
+    fixed = {each["path"] for each in described["numbers"] if "only" in each["range"]}
     for part in (described["model"], described["impact"], *described["load"]):
         part["parameters"] = [path for path in part["parameters"] if path not in fixed]
     return content, described | {
-        "numbers": [
-            entry | {"accepted": bounds.get(entry["path"], {})} for entry in described["numbers"]
-        ],
         "title": title or type(system.model).__name__,
         "start": _agreed(system, motion)["start"],
         "study": {
@@ -370,11 +366,6 @@ def page_content(
         "digest": digest(system),
         "results": results,
     }
-
-
-def _has_one_value(bound: Mapping[str, Any]) -> bool:
-    """Whether a number may have one value alone, as the restitution of a model without impacts."""
-    return {"least", "most"} <= set(bound) and bound["least"]["end"] == bound["most"]["end"]
 
 
 def _agreed(system: System, motion: Mapping[str, Any]) -> dict[str, Any]:

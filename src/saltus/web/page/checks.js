@@ -1,42 +1,54 @@
-/** Python's own refusals of numbers: the bounds that it was asked for, and its sentences with the numbers of the page in them. */
+/** Python's own refusals of numbers: the ranges that their fields declare, and its sentences about others. */
 
 /** @typedef {import("./types.js").NumberEntry} NumberEntry */
-/** @typedef {{end: number, taken: boolean, of?: string, said: [number, string][]}} Bound */
+/** @typedef {{end?: number, of?: string, taken: boolean}} Bound */
+/** @typedef {{side: string, of: string, taken: boolean, demand: string}} Beside  A bound by another number, and the words for it. */
+/** @typedef {{least?: Bound, most?: Bound, demand?: string, beside?: Beside[], only?: {value: number, said: string}}} Range */
 
 const ASIDE = 60; // A slider keeps this share of its range from an end that is not taken.
+const LARGEST = 1e100; // `Limits.value` of Python
+const TURN = 360; // degrees: up to it Python asks whether a large angle is in degrees
 
 /** What Python says to these numbers: null, or the first refusal; how two numbers lie to one another is looked at last. @param {NumberEntry[]} entries @param {Record<string, number>} values */
 export function refusedNumbers(entries, values) {
-  /** @type {{where: string, message: string}|null} */
-  let between = null;
-  for (const entry of entries) {
-    const refused = refusedNumber(entry, values);
-    if (!refused) continue;
-    const said = { where: entry.path, message: refused.message };
-    if (!refused.between) return said;
-    between ??= said;
+  for (const refusal of [refusedNumber, refusedBesideOthers]) {
+    for (const entry of entries) {
+      const message = refusal(entry, values[entry.path] ?? NaN, values);
+      if (message) return { where: entry.path, message };
+    }
   }
-  return between;
+  return null;
 }
 
-/** @param {NumberEntry} entry @param {Record<string, number>} values @returns {{message: string, between: boolean}|null} */
-function refusedNumber(entry, values) {
-  const value = values[entry.path] ?? NaN;
-  const { least, most, whole } = entry.accepted ?? {};
-  const alone = (/** @type {string} */ message) => ({ message, between: false });
-  if (!Number.isFinite(value)) return alone(`${entry.path} must be finite, got ${pythonRepr(value)}`);
-  const outside = (least && beyond(least, value, -1, values)) || (most && beyond(most, value, 1, values));
-  return outside || (whole && !Number.isInteger(value) ? alone(whole.replace("{value}", pythonRepr(value))) : null);
+/** @param {NumberEntry} entry @param {number} value */
+function refusedNumber(entry, value) {
+  const { least, most, demand = "must be finite" } = entry.range ?? {};
+  const got = `, got ${pythonRepr(value)}`;
+  const inside = Number.isFinite(value) && !beyond(least, value, -1) && !beyond(most, value, 1);
+  const size = Math.abs(value);
+  const hint = entry.angle && size > 3.2 && size <= TURN ? " (degrees?)" : "";
+  if (!inside) return `${entry.path} ${demand}${got}${hint}`;
+  if (size > LARGEST) return `${entry.path} must be at most 1e+100 in size${got}`;
+  return entry.whole && !Number.isInteger(value) ? `${entry.path} must be a whole number${got}` : "";
 }
 
-/** @param {Bound} bound @param {number} value @param {number} sign @param {Record<string, number>} values */
-function beyond(bound, value, sign, values) {
-  const end = bound.of === undefined ? bound.end : (values[bound.of] ?? bound.end);
-  const distance = sign * (value - end);
-  if (distance < 0 || (distance === 0 && bound.taken)) return null;
-  const said = bound.said.slice(1).reduce((last, [from, sentence]) => (sign * (value - from) >= 0 ? sentence : last), bound.said[0]?.[1] ?? "");
-  const message = said.replace("{value}", pythonRepr(value)).replace("{short}", pythonShort(value)).replace("{other}", pythonShort(end));
-  return { message, between: said.includes("{other}") };
+/** @param {NumberEntry} entry @param {number} value @param {Record<string, number>} values */
+function refusedBesideOthers(entry, value, values) {
+  const { beside = [], only } = entry.range ?? {};
+  for (const { side, of, taken, demand } of beside) {
+    const end = values[of] ?? NaN;
+    if (beyond({ end, taken }, value, side === "least" ? -1 : 1)) return `${entry.path} ${demand}${pythonShort(end)}, got ${pythonShort(value)}`;
+  }
+  if (!only || value === only.value) return "";
+  const text = pythonRepr(value);
+  return only.said.replace("{value}", /^-?\d+$/.test(text) ? `${text}.0` : text).replace("{short}", pythonShort(value));
+}
+
+/** Whether a value lies beyond a bound that is a number. @param {Bound|undefined} bound @param {number} value @param {number} sign */
+function beyond(bound, value, sign) {
+  if (bound?.end === undefined) return false;
+  const distance = sign * (value - bound.end);
+  return distance > 0 || (distance === 0 && !bound.taken);
 }
 
 /** A number as Python writes it in six digits. @param {number} value */
@@ -58,9 +70,9 @@ export function pythonRepr(value) {
 
 /** The range of a slider within what Python takes. @param {NumberEntry} entry @returns {NumberEntry} */
 export function withinBounds(entry) {
-  const { least, most } = entry.accepted ?? {};
-  const least_ = least && !least.of ? Math.max(entry.low, least.end) : entry.low;
-  const most_ = most && !most.of ? Math.min(entry.high, most.end) : entry.high;
+  const { least, most } = entry.range ?? {};
+  const least_ = Math.max(entry.low, least?.end ?? -Infinity);
+  const most_ = Math.min(entry.high, most?.end ?? Infinity);
   const aside = (most_ - least_) / ASIDE;
   const low = least && !least.taken && least_ === least.end ? least_ + aside : least_;
   const high = most && !most.taken && most_ === most.end ? most_ - aside : most_;
@@ -72,7 +84,7 @@ export function withinBounds(entry) {
  * @param {NumberEntry} entry @param {(path: string) => number} valueOf @param {[number, number]} range @returns {[number, number]}
  */
 export function withinOthers(entry, valueOf, [low, high]) {
-  const { least, most } = entry.accepted ?? {};
+  const { least, most } = entry.range ?? {};
   const aside = (high - low) / ASIDE;
   const from = least?.of === undefined ? low : Math.max(low, valueOf(least.of) + (least.taken ? 0 : aside));
   const to = most?.of === undefined ? high : Math.min(high, valueOf(most.of) - (most.taken ? 0 : aside));

@@ -3,7 +3,7 @@
  *
  * @typedef {{path: string, symbol?: string, unit: string, value: number, low: number, high: number, step?: number,
  *   angle?: boolean, whole?: boolean, text?: string,
- *   accepted?: {least?: import("./checks.js").Bound, most?: import("./checks.js").Bound, whole?: string}}} NumberEntry  One number of the system, by the path that Python uses.
+ *   range?: import("./checks.js").Range}} NumberEntry  One number of the system, by the path that Python uses.
  * @typedef {{channel: string, kind: string, parameters: NumberEntry[]}} LoadEntry
  * @typedef {{name: string, kind: string, meaning?: string}} MarginEntry  `kind`: "landmark", "assumption" or "limit".
  * @typedef {{name: string, velocity: string, unit: string}} CoordinateEntry

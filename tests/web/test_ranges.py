@@ -8,13 +8,15 @@ import json
 import math
 import shutil
 import subprocess
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
 import saltus
+from saltus.flow import PortableMotion
 from saltus.web import one_file
-from saltus.web.accepted import accepted
+from saltus.web.description import description
 
 NODE = shutil.which("node")
 Harmonic = saltus.Harmonic
@@ -22,6 +24,32 @@ HARD, PULSED = (
     saltus.NewtonImpact(e=0.4),
     saltus.OneSine(amplitude=0.6, frequency=2.0, start=0.5, quantity="acceleration"),
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Own(saltus.ContactModel):
+    """A model of one's own, which declares what its numbers may be and checks nothing itself."""
+
+    stiffness: float = field(default=1.0, metadata=saltus.number_range(above=0.0, at_most=50.0))
+    low: float = field(default=-0.5, metadata=saltus.number_range(below="high"))
+    high: float = field(default=0.5, metadata=saltus.number_range(at_least=0.1, below=4.0))
+    tilt: float = field(
+        default=0.1, metadata=saltus.number_range(above=-1.0, below=1.0, unit="rad")
+    )
+    coordinates = ("x",)
+    channels = ("force",)
+
+    @property
+    def contacts(self):
+        return (
+            saltus.Contact(name="low", coordinate="x", position=self.low),
+            saltus.Contact(name="high", coordinate="x", position=self.high, sign=-1),
+        )
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - self.stiffness * x + np.sin(self.tilt)
+
+
 SYSTEMS = {
     "cell": saltus.System(
         model=saltus.Metainterface(beta0=math.radians(80), damping=0.1),
@@ -48,16 +76,48 @@ SYSTEMS = {
         load=saltus.Load(frequency=1.0, force=Harmonic(0.3)),
         impact=HARD,
     ),
+    "own": saltus.System(
+        model=Own(), load=saltus.Load(frequency=1.0, force=Harmonic(0.3)), impact=HARD
+    ),
+    "smoothed": saltus.System(
+        model=saltus.Metainterface(beta0=1.4, smoothing=50.0),
+        load=saltus.Load(frequency=0.9, horizontal=Harmonic(0.5)),
+    ),
+    "structure": saltus.System(
+        model=saltus.Structure(
+            mass=np.eye(2),
+            stiffness=np.diag([1.0, 4.0]),
+            forces={"force": [1.0, 0.0]},
+            contacts=[
+                saltus.Contact(name="tip", coordinate=1, position=0.5, sign=-1, restitution=0.3)
+            ],
+        ),
+        load=saltus.Load(frequency=1.0, force=Harmonic(0.3)),
+        impact=HARD,
+    ),
 }  # with numbers that bound one another: stops, and static and kinetic friction
 
 
-BOUNDS = {name: accepted(system) for name, system in SYSTEMS.items()}
+ENTRIES = {
+    name: {
+        entry["path"]: entry
+        for entry in description(PortableMotion(system))["numbers"]
+        if entry["path"] in system.parameters
+    }
+    for name, system in SYSTEMS.items()
+}
 
 
-def tried(system, bounds, rng):
+def tried(system, entries, rng):
     """Values of each number about its own and about its bounds, from near and from far."""
     for path, value in system.parameters.items():
-        ends = [bound["end"] for side in ("least", "most") if (bound := bounds[path].get(side))]
+        bounds = [entries[path]["range"].get(side, {}) for side in ("least", "most")]
+        ends = [
+            end
+            for bound in bounds
+            for end in (bound.get("end"), system.parameters.get(bound.get("of")))
+            if end is not None
+        ]
         near = [x + s * d for x in (value, *ends) for s in (-1, 1) for d in (0.0, 1e-3, 0.3, 4.0)]
         far = [*rng.normal(0.0, 3.0, 3), *rng.normal(0.0, 300.0, 3), -1e9, 1e9]
         for x in (*near, *far):
@@ -87,12 +147,11 @@ def test_the_page_refuses_what_python_refuses_in_the_same_sentence():
     rng = np.random.default_rng(1)
     asked = []
     for name, system in SYSTEMS.items():
-        entries = [{"path": path, "accepted": bounds} for path, bounds in BOUNDS[name].items()]
         asked.append(
             {
-                "entries": entries,
+                "entries": list(ENTRIES[name].values()),
                 "values": dict(system.parameters),
-                "tried": list(tried(system, BOUNDS[name], rng)),
+                "tried": list(tried(system, ENTRIES[name], rng)),
             }
         )
     script = ASK % (one_file.PAGE.as_uri(), json.dumps(asked))
@@ -118,22 +177,37 @@ def test_the_page_refuses_what_python_refuses_in_the_same_sentence():
     assert 200 < refused < counted - 200
 
 
-def test_the_ends_of_a_restitution_are_0_and_1_whatever_else_is_1():
-    """The order of a harmonic is 1, too, and takes no fractions."""
+def test_an_end_is_a_number_or_another_number_of_the_system():
     for name in ("cell", "block", "stops", "pair"):
-        (path,) = [path for path in BOUNDS[name] if path.startswith("impact.e")]
-        for side, end in (("least", 0.0), ("most", 1.0)):
-            bound = BOUNDS[name][path][side]
-            assert (bound["end"], bound["taken"], bound.get("of")) == (end, True, None)
+        (path,) = [path for path in ENTRIES[name] if path.startswith("impact.e")]
+        declared = ENTRIES[name][path]["range"]
+        assert declared["least"] == {"end": 0.0, "taken": True}
+        assert declared["most"] == {"end": 1.0, "taken": True}
+    stops = ENTRIES["stops"]
+    assert stops["model.left"]["range"]["most"] == {"of": "model.right", "taken": False}
+    assert stops["model.right"]["range"]["least"] == {"of": "model.left", "taken": False}
+    angle = ENTRIES["cell"]["model.beta0"]["range"]
+    assert angle["least"] == {"end": 0.0, "taken": False}
+    assert angle["most"] == {"end": math.pi, "taken": False}
 
 
-def test_bounds_that_move_with_another_number_name_it():
-    stops, cell = BOUNDS["stops"], BOUNDS["cell"]
-    assert stops["model.left"]["most"]["of"] == "model.right"
-    assert stops["model.right"]["least"]["of"] == "model.left"
-    for side, end in (("least", 0.0), ("most", math.pi)):
-        assert (cell["model.beta0"][side]["end"], cell["model.beta0"][side]["taken"]) == (
-            end,
-            False,
-        )
-    assert (cell["impact.e"]["most"]["end"], cell["impact.e"]["most"]["taken"]) == (1.0, True)
+def test_numbers_that_can_have_one_value_here():
+    only = {
+        name: [path for path, entry in entries.items() if "only" in entry["range"]]
+        for name, entries in ENTRIES.items()
+    }
+    assert only == {
+        "cell": [],
+        "block": [],
+        "stops": [],
+        "pair": [],
+        "belt": ["impact.e"],
+        "own": [],
+        "smoothed": [
+            "model.stiffness_ratio",
+            "model.mass_ratio",
+            "model.dissipation_ratio",
+            "impact.e",
+        ],
+        "structure": [],
+    }
