@@ -197,9 +197,9 @@ def test_impossible_records_are_refused_in_a_sentence(time, value, options, mess
         (lambda: Record([0.0, 1e-320], [0.0, 1e10]), "samples 0 and 1 are too near in time"),
         (
             lambda: Load(horizontal=Harmonic(0.5)),
-            "load.horizontal is harmonic, so load.frequency must be given",
+            "load.horizontal repeats itself, so load.frequency must be given",
         ),
-        (lambda: Load(horizontal=0.5 + Harmonic(0.5)), "load.horizontal is harmonic"),
+        (lambda: Load(horizontal=0.5 + Harmonic(0.5)), "load.horizontal repeats itself"),
         (lambda: Load(frequency=0.0), r"load.frequency must lie in \(0, inf\), got 0.0"),
         (lambda: Load(frequency=-1.0), "load.frequency"),
         (lambda: Load(vertical=math.nan), "load.vertical must be finite, got nan"),
