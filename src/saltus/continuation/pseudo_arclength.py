@@ -62,10 +62,16 @@ class Units:
     bounded: Any = True
     # Whether linear equations are solved in these units, as they must be where units differ much.
     scaled: bool = True
+    # How many units the terms are of which a residual is the difference, an array (m,) or a number.
+    terms: Any = 1.0
 
     def residual(self, values: np.ndarray) -> float:
         """The largest of residuals (m,) in their units."""
         return float(np.abs(values / self.residuals).max(initial=0.0))
+
+    def residual_of_terms(self, values: np.ndarray) -> float:
+        """The largest of residuals (m,) as a share of their terms, which rounding is, too."""
+        return float(np.abs(values / (self.residuals * self.terms)).max(initial=0.0))
 
     def length(self, step: np.ndarray, place: np.ndarray) -> float:
         """The largest component of a step from a place, in units of what it may be."""
@@ -138,7 +144,11 @@ def newton(
         error = units.residual(found.residual)
         scale = max(1.0, np.abs(place / units.unknowns).max())
         slow = error > NEWTON.slowdown * before
-        if error <= NEWTON.converged * scale or (slow and error <= NEWTON.stalled * scale):
+        rounded = slow and (
+            error <= NEWTON.stalled * scale
+            or units.residual_of_terms(found.residual) <= NEWTON.converged * scale
+        )
+        if error <= NEWTON.converged * scale or rounded:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
         step = _step(*linear(found, place), units, place) if error < NEWTON.diverged else None
@@ -202,7 +212,7 @@ class EquationCurve(Curve[P]):
         units = np.empty(len(place))
         units[:inner] = own.unknowns
         units[inner:] = np.maximum(np.abs(place[inner:]), 3.0 / self.weights[inner:])
-        return Units(units, own.residuals, self._bounded, self._scaled)
+        return Units(units, own.residuals, self._bounded, self._scaled, own.terms)
 
     @cached_property
     def _scaled(self) -> bool:
@@ -331,7 +341,9 @@ class EquationCurve(Curve[P]):
             return found.derivatives()[:, free], -found.residual
 
         units = self.units_at(guess)
-        of_free = Units(units.unknowns[free], units.residuals, units.bounded[free], units.scaled)
+        of_free = Units(
+            units.unknowns[free], units.residuals, units.bounded[free], units.scaled, units.terms
+        )
         floor = self.residual_floor
         found = newton(evaluate, linear, guess[free], self.iterations_at, floor, units=of_free)
         if found is None:

@@ -54,6 +54,20 @@ def find_minimum(motion, c, t, h):
 
 
 @lean_jit
+def from_rest(guard, units):
+    """Make 0 what rounding leaves of the first terms of a gap that opens from rest: its speed, and
+    its acceleration after a release. They would give it minima just behind the event.
+    """
+    length = units[0]
+    time = units[1]
+    at_rest = AT_REST * length
+    if abs(guard[0]) < at_rest and abs(guard[1]) * time < at_rest:
+        guard[1] = 0.0
+        if abs(guard[2]) * time**2 < at_rest:
+            guard[2] = 0.0
+
+
+@lean_jit
 def unit_of(units, place):
     """The unit of a minimum: `units` are the natural ones of length, time and force."""
     if place == SegmentExtremes.GAP:
@@ -62,9 +76,9 @@ def unit_of(units, place):
 
 
 @lean_jit
-def extremes_at_step(motion, t, h, begin, end, units, seen):
+def extremes_at_step(motion, t, h, begin, end, after_event, units, seen):
     """Update the extremes with a step: extrema of the coordinates, inner minima of the guards,
-    least values of the margins.
+    least values of the margins. The segment begins at an event if `after_event`.
     """
     order = motion.order
     own = motion.own
@@ -89,6 +103,8 @@ def extremes_at_step(motion, t, h, begin, end, units, seen):
             guard = motion.margin_series[i]
         else:
             gap_series(motion, i, contact_position(motion, i), order, guard)
+            if after_event and t == begin:
+                from_rest(guard, units)
         least[0] = np.inf
         least[1] = 0.0
         find_minimum(motion, guard, t, h)

@@ -115,7 +115,7 @@ def in_propagators(motion, power, begin, end):
     """Whether the columns of a segment are carried by propagators: those of a structure, but for
     an excursion of one step, whose guard is made of their series.
     """
-    if motion.eigenmodes.size == 0 or end < begin:
+    if motion.eigenmodes.size == 0 or end <= begin:
         return False
     if power == 0:
         return True
@@ -124,13 +124,17 @@ def in_propagators(motion, power, begin, end):
 
 
 @lean_jit
-def follow_segment(motion, begin, end, carried, contact, power, slopes, units, seen):
-    """Follow one segment with the given contacts closed; returns the number of steps, or 0 if it
-    cannot be followed. Whether the columns are `carried` by propagators was decided before.
+def follow_segment(motion, begin, end, carried, row, slopes, units, seen):
+    """Follow one segment of the plan with the present contacts closed; returns the number of steps,
+    or 0 if it cannot be followed. Whether the columns are `carried` by propagators was decided
+    before.
 
-    Of an excursion of a contact, with `power` > 0, the integrals of `end_excursion` are taken, in
+    Of an excursion of a contact, with a power > 0, the integrals of `end_excursion` are taken, in
     `slopes` for the columns.
     """
+    contact = row[SegmentPlan.CONTACT]
+    power = row[SegmentPlan.POWER]
+    after_event = row[SegmentPlan.KIND] >= 0
     order = motion.order
     t = begin
     forwards = end >= begin
@@ -154,7 +158,7 @@ def follow_segment(motion, begin, end, carried, contact, power, slopes, units, s
         last = natural >= abs(end - t)
         h = end - t if last else (natural if forwards else -natural)
         if seen.size > 1 and h > 0.0:
-            extremes_at_step(motion, t, h, begin, end, units, seen)
+            extremes_at_step(motion, t, h, begin, end, after_event, units, seen)
         if power > 0 and not (last and count == 0 and not carried):
             along_excursion(motion, contact, power, end - t, h, carried, slopes)
         if carried:
@@ -433,7 +437,7 @@ def follow_with(numbers, parts, request, results):
         power = plan[s, SegmentPlan.POWER]
         carried = in_propagators(motion, power, begin, end)
         steps = follow_segment(
-            motion, begin, end, carried, contact, power, columns[s, 2 * own], units, seen
+            motion, begin, end, carried, plan[s], columns[s, 2 * own], units, seen
         )
         if steps == 0:
             return s

@@ -87,7 +87,9 @@ class ConditionedCurve(OrbitCurve):
         """Those of the orbit's equations, and behind them that of the condition: a speed, or 1."""
         known = self.equations.units
         last = self.equations.natural.speed if isinstance(self.condition, Slow) else 1.0
-        return Units(known.unknowns, np.append(known.residuals, last), known.bounded)
+        terms = np.append(np.broadcast_to(known.terms, np.shape(known.residuals)), 1.0)
+        residuals = np.append(known.residuals, last)
+        return Units(known.unknowns, residuals, known.bounded, terms=terms)
 
     def evaluate(self, place: np.ndarray, thorough: bool) -> Conditioned | None:
         """The orbit's equations and the condition."""

@@ -258,7 +258,11 @@ class ContactsEquations(OrbitEquations):
             )
         ]
         unknowns = np.append(state, np.ones(len(guards)))
-        return Units(unknowns, np.append(guards, state), self.is_phase)
+        # forces, and gaps divided by a power of the time, are differences of elastic forces
+        elastic = (rows[:, SegmentPlan.KIND] != EventCode.IMPACT) | (rows[:, SegmentPlan.POWER] > 0)
+        stiffness = max(1.0, (natural.time / natural.free_time) ** 2)
+        terms = np.append(np.where(elastic, stiffness, 1.0), np.ones(len(state)))
+        return Units(unknowns, np.append(guards, state), self.is_phase, terms=terms)
 
     @cached_property
     def is_phase(self) -> np.ndarray:
