@@ -1,0 +1,111 @@
+"""The branch of a cantilever with a stop at its tip over its whole resonance: rests of the tip
+appear and end, and its stiffest mode is 500 times as fast as the load.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import saltus
+
+FIRST = 1.875104068711961**2  # the lowest natural frequency of a cantilever of unit data
+FORCE = 0.01
+GAP = 0.02
+ELEMENTS = 4
+
+
+def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, stiffness and damping of beam elements, the tip's displacement in the row before the
+    last."""
+    h = 1.0 / ELEMENTS
+    size = 2 * (ELEMENTS + 1)
+    mass = np.zeros((size, size))
+    stiffness = np.zeros((size, size))
+    inertia = np.array(
+        [
+            [156.0, 22.0 * h, 54.0, -13.0 * h],
+            [22.0 * h, 4.0 * h**2, 13.0 * h, -3.0 * h**2],
+            [54.0, 13.0 * h, 156.0, -22.0 * h],
+            [-13.0 * h, -3.0 * h**2, -22.0 * h, 4.0 * h**2],
+        ]
+    )
+    bending = np.array(
+        [
+            [12.0, 6.0 * h, -12.0, 6.0 * h],
+            [6.0 * h, 4.0 * h**2, -6.0 * h, 2.0 * h**2],
+            [-12.0, -6.0 * h, 12.0, -6.0 * h],
+            [6.0 * h, 2.0 * h**2, -6.0 * h, 4.0 * h**2],
+        ]
+    )
+    for i in range(ELEMENTS):
+        rows = slice(2 * i, 2 * i + 4)
+        mass[rows, rows] += h / 420.0 * inertia
+        stiffness[rows, rows] += bending / h**3
+    mass = mass[2:, 2:]
+    stiffness = stiffness[2:, 2:]
+    return mass, stiffness, 0.02 / FIRST * stiffness + 0.02 * FIRST * mass
+
+
+def tip() -> np.ndarray:
+    return np.eye(2 * ELEMENTS)[-2]
+
+
+def system(share: float) -> saltus.System:
+    """The cantilever under a load with this share of its first natural frequency."""
+    mass, stiffness, damping = matrices()
+    stop = saltus.Contact(name="stop", coordinate="tip", position=GAP, sign=-1)
+    beam = saltus.Structure(
+        mass=mass,
+        stiffness=stiffness,
+        damping=damping,
+        points={"tip": tip()},
+        contacts=[stop],
+        forces={"f": tip()},
+    )
+    load = saltus.Load(frequency=share * FIRST, f=saltus.Harmonic(FORCE))
+    return saltus.System(model=beam, load=load, impact=saltus.NewtonImpact(0.0))
+
+
+@functools.cache
+def branch(share: float) -> saltus.Branch:
+    """The branch from the orbit of a load, over the resonance."""
+    whole = system(share)
+    orbit = saltus.find_orbit(whole, **whole.model.start())
+    return saltus.continue_orbit(orbit, "load.frequency", (0.8 * FIRST, 1.4 * FIRST))
+
+
+def without_stop(share: float) -> float:
+    """The amplitude of the tip without its stop."""
+    mass, stiffness, damping = matrices()
+    rate = share * FIRST
+    dynamic = stiffness - rate**2 * mass + 1j * rate * damping
+    return FORCE * float(np.abs(np.linalg.solve(dynamic, tip())[-2]))
+
+
+def test_the_branch_goes_over_the_resonance_from_one_free_motion_to_the_other() -> None:
+    followed = branch(0.9)
+    assert [str(end) for end in followed.ends] == ["bound 2.81281", "bound 4.92242"]
+    grazings = [
+        brentq(lambda share: without_stop(share) - GAP, low, high, xtol=1e-14) * FIRST
+        for low, high in ((0.8, 1.0), (1.0, 1.4))
+    ]
+    located = np.array([point.parameter for point in followed.special if point.kind == "GR"])
+    for grazing in grazings:
+        assert np.abs(located - grazing).min() < 1e-9
+
+
+def test_the_branch_is_the_same_from_beyond_the_resonance() -> None:
+    one, other = ([(p.kind, p.parameter) for p in branch(share).special] for share in (0.9, 1.2))
+    assert len(one) > 10
+    assert [kind for kind, _ in one] == [kind for kind, _ in other]
+    parameters = np.array([[value for _, value in points] for points in (one, other)])
+    assert np.ptp(parameters, axis=0).max() < 1e-7
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05, 1.1])
+def test_motions_settle_on_the_branch(share: float) -> None:
+    settled = saltus.find_orbit(system(share), **system(share).model.start())
+    amplitudes = [orbit.amplitude for orbit in branch(0.9).at(share * FIRST) if orbit.stable]
+    assert np.abs(np.array(amplitudes) - settled.amplitude).min() < 1e-10
