@@ -34,14 +34,6 @@ def chain(request: pytest.FixtureRequest) -> saltus.System:
     return cells(saltus.CellChain, cells=count, coupling=coupling)
 
 
-def lost_by_rounding(request: pytest.FixtureRequest, chain: saltus.System) -> None:
-    """Expect that three cells fail: their branch sees grazings where rounding decides which of three
-    accumulations ends first, and ends there. Whether it does depends on the processor."""
-    if chain.model.cells > 2:
-        reason = "rounding decides the order in which three cells come to rest, and makes grazings"
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=False))
-
-
 def begun(chain: saltus.System, last: float) -> dict[str, float]:
     """Angles from which motions begin, with the lower layer of the last cell at this one."""
     angles = {
@@ -163,7 +155,6 @@ def test_rounding_makes_no_special_points_along_their_branch(
     """What the cells do at one instant comes in an order that rounding decides, at each point
     anew.
     """
-    lost_by_rounding(request, chain)
     assert not branch.special
     assert [str(end) for end in branch.ends] == ["bound 0.999", "bound 1.01"]
     assert all(same_orbit(orbit, orbit) for orbit in branch.orbits)
@@ -208,7 +199,6 @@ def test_motions_whose_impacts_die_away_lie_on_the_branch_of_their_orbit(
     request: pytest.FixtureRequest, chain: saltus.System, branch: saltus.Branch
 ) -> None:
     """Orbits list impacts above 1e-5, motions in lanes all that were followed: down to 1e-6."""
-    lost_by_rounding(request, chain)
     values = np.array([1.002, 1.008])
     states = np.tile([*begun(chain, 0.12).values(), *(0.0,) * len(chain.model.coordinates)], (2, 1))
     motions = simulate_from(chain, "load.frequency", values, states, 300)

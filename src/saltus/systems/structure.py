@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import check_number
+from saltus.checks import LIMITS, check_count, check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
 from saltus.systems.eigenmodes import eigenmodes_of
@@ -41,6 +41,7 @@ from saltus.systems.record_files import (
     check_matrices,
     read_array,
 )
+from saltus.systems.reduction import check_symmetric, shapes_of, sparse_matrix
 
 MODE = "mode_"  # begins the names of the amplitudes
 # The names of the arrays in files, and what they are called in papers.
@@ -254,6 +255,9 @@ class Structure(ContactModel):
         1.0, "x5": -1.0}; or one row.
     names
         The names of the rows, by default x0, x1, ...
+    basis
+        The displacements of a larger model for each row, (rows of the larger model, n), which
+        `displacements` and `start` then take and give; `reduced` finds it.
     coefficients, records, form
         Computed from the others and not to be given: the numbers of the equations, and which there
         are.
@@ -290,6 +294,7 @@ class Structure(ContactModel):
     forces: Any = None
     points: Any = None
     names: tuple[str, ...] = ()
+    basis: Any = None
     # What follows from the others: numbers of the local equations; those of the modes, which
     # without local displacements are among the first; and which blocks of numbers there are, with
     # the names of the local displacements.
@@ -313,37 +318,16 @@ class Structure(ContactModel):
                 if m is not None
             }
         )
-        for name in ("forces", "points"):
-            value = getattr(self, name)
-            if value is not None and not isinstance(value, Mapping):
-                raise ParameterError(
-                    f"{name} must be a dict of vectors by name, got {shown(value)}", name
-                )
         names = _names_of(self.names, len(mass.array))
-        points = {
-            name: _vector(row, names, f"points.{name}")
-            for name, row in dict(self.points or {}).items()
-        }
-        forces = {
-            name: _vector(row, names, f"forces.{name}")
-            for name, row in dict(self.forces or {}).items()
-        }
-        parts = {
-            field: NamedParts(
-                _part(part, kind, field, names, points)
-                for part in _each(getattr(self, field), field)
-            )
-            for field, kind in (
-                ("contacts", Contact),
-                ("surfaces", Surface),
-                ("friction", Friction),
-            )
-        }
+        points = _vectors(self.points, "points", names)
+        forces = _vectors(self.forces, "forces", names)
+        parts = _parts(self.contacts, self.surfaces, self.friction, names, points)
         local = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
         rows = np.array([points.get(name) or _vector(name, names, name) for name in local]).reshape(
             len(local), len(names)
         )
         check_independent(rows, tuple(local))
+        basis = _basis(self.basis, len(names))
         columns = np.array([*forces.values()]).reshape(len(forces), len(names)).T
         modes = modes_of(
             mass,
@@ -359,6 +343,7 @@ class Structure(ContactModel):
             "damping": damping,
             "file": "",
             "names": names,
+            "basis": basis,
             **parts,
         }
         made |= {
@@ -369,6 +354,122 @@ class Structure(ContactModel):
         made |= {"records": ConstantNumbers(modes.records(), "records")}
         made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
         vars(self).update(made, _modes=modes)
+
+    @classmethod
+    def reduced(
+        cls,
+        mass: Any,
+        stiffness: Any,
+        damping: Any = None,
+        *,
+        modes: int,
+        keep: Sequence[Any] = (),
+        contacts: Any = (),
+        surfaces: Any = (),
+        friction: Any = (),
+        forces: Any = None,
+        points: Any = None,
+        names: Sequence[str] = (),
+    ) -> Structure:
+        """A structure of thousands of rows in few coordinates, by the method of Craig and Bampton:
+        the displacements of its contacts, surfaces and frictions and those that are kept, and its
+        slowest modes while these are held.
+
+        Static deflections under forces on the kept displacements are exact. Rows without mass, as
+        rotations of lumped masses, follow statically. Take the double number of modes to see what
+        the others change.
+
+        Parameters
+        ----------
+        mass, stiffness, damping
+            M, K and C, (rows, rows): arrays, sparse matrices of SciPy, or the paths of files of
+            Matrix Market (`.mtx`) or of `scipy.sparse.save_npz` (`.npz`). One triangle of a
+            symmetric matrix is enough.
+        modes
+            How many modes.
+        keep
+            Further rows or points that become coordinates of their own, as where loads act.
+        contacts, surfaces, friction, forces, points, names
+            As `Structure` takes them, for the rows of these matrices.
+
+        Returns
+        -------
+        Structure
+            Its rows are the kept displacements, under their names, and `amplitude_1`, ... of the
+            modes. Its `displacements` are those of all rows of the matrices.
+
+        Raises
+        ------
+        ParameterError
+            Matrices that are not square, of different sizes, complex or not finite; mass or
+            stiffness that is not symmetric; too many modes; nothing that is kept; or what
+            `Structure` refuses.
+
+        References
+        ----------
+        R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal
+        6(7), 1968.
+
+        Examples
+        --------
+        >>> import scipy.sparse as sp
+        >>> n = 1000  # elements of a bar of length 1, density 1 and wave speed 1
+        >>> ones = np.ones(n)
+        >>> stiffness = n * sp.diags_array([2.0 * ones, -ones[1:], -ones[1:]], offsets=[0, 1, -1])
+        >>> mass = sp.diags_array(ones / n)
+        >>> wall = saltus.Contact(name="wall", coordinate=n - 1, position=0.1, sign=-1)
+        >>> bar = saltus.Structure.reduced(mass, stiffness, modes=8, contacts=[wall])
+        >>> len(bar.coordinates), len(bar.displacements([0.0] * 9))
+        (9, 1000)
+        """
+        check_count("modes", modes, 0, LIMITS.coordinates)
+        given = {"mass": mass, "stiffness": stiffness, "damping": damping}
+        matrices = {
+            name: sparse_matrix(matrix, name)
+            for name, matrix in given.items()
+            if matrix is not None or name != "damping"
+        }
+        size = matrices["mass"].shape[0]
+        for name, matrix in matrices.items():
+            if matrix.shape[0] != size:
+                raise ParameterError(
+                    f"{name} must be {size} x {size} as the mass is, got "
+                    f"{matrix.shape[0]} x {matrix.shape[0]}",
+                    name,
+                )
+            if name != "damping":
+                check_symmetric(matrix, name)
+        all_names = _names_of(names, size)
+        all_points = _vectors(points, "points", all_names)
+        all_forces = _vectors(forces, "forces", all_names)
+        parts = _parts(contacts, surfaces, friction, all_names, all_points)
+        kept = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
+        for row in _each(keep, "keep"):
+            known = isinstance(row, str) and row in all_points
+            kept[row if known else all_names[_place(row, all_names, "keep")]] = None
+        if not kept:
+            raise ParameterError(
+                "nothing is kept: give contacts, surfaces or frictions, or keep=[...] with rows or "
+                "points",
+                "keep",
+            )
+        rows = np.array([all_points.get(name) or _vector(name, all_names, name) for name in kept])
+        check_independent(rows, tuple(kept))
+        shapes = shapes_of(matrices["mass"], matrices["stiffness"], rows, int(modes))
+        basis = np.hstack([shapes.static, shapes.modes])
+        small = {name: basis.T @ (matrix @ basis) for name, matrix in matrices.items()}
+        for name in ("mass", "stiffness"):
+            small[name] = 0.5 * (small[name] + small[name].T)
+        return cls(
+            **small,
+            **parts,
+            names=(*kept, *(f"amplitude_{i + 1}" for i in range(int(modes)))),
+            forces={name: np.array(row) @ basis for name, row in all_forces.items()},
+            points={
+                name: np.array(row) @ basis for name, row in all_points.items() if name not in kept
+            },
+            basis=basis,
+        )
 
     @property
     def coordinates(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -410,7 +511,9 @@ class Structure(ContactModel):
     def to_table(self) -> dict[str, Any]:
         """Plain tables and texts, of which `Structure(**table)` makes it again."""
         table: dict[str, Any] = {
-            name: m.packed() for name in IN_FILES if (m := getattr(self, name)) is not None
+            name: m.packed()
+            for name in (*IN_FILES, "basis")
+            if (m := getattr(self, name)) is not None
         }
         for field in ("contacts", "surfaces", "friction"):
             if parts := getattr(self, field):
@@ -519,7 +622,7 @@ class Structure(ContactModel):
 
     def displacements(self, of: Any) -> np.ndarray:
         """The displacements u, (n,) or (n, times), of coordinates of this model; velocities u' of
-        their rates.
+        their rates. Those of all rows of the larger model, if it is `reduced`.
 
         Parameters
         ----------
@@ -533,7 +636,8 @@ class Structure(ContactModel):
                 f"{shown(of)}",
                 "of",
             )
-        return np.asarray(vars(self)["_modes"].basis @ given)
+        found = np.asarray(vars(self)["_modes"].basis @ given)
+        return found if self.basis is None else np.asarray(self.basis.array @ found)
 
     def start(self, displacement: Any = 0.0, velocity: Any = 0.0) -> dict[str, Any]:
         """The state with these displacements u and velocities u', by the names of the arguments of
@@ -542,8 +646,12 @@ class Structure(ContactModel):
         Parameters
         ----------
         displacement, velocity
-            Numbers for all rows of the matrices, (n,), or one for all of them; by default 0.
+            Numbers for all rows of the matrices, (n,), or one for all of them; by default 0. Of a
+            `reduced` structure those of the larger model, of which the nearest shape is taken.
         """
+        if self.basis is not None:
+            displacement = _nearest(self.basis.array, displacement, "displacement")
+            velocity = _nearest(self.basis.array, velocity, "velocity")
         found = []
         for name, given in (("displacement", displacement), ("velocity", velocity)):
             vector = _vector(
@@ -586,6 +694,59 @@ def _matrix(given: Any, name: str) -> Any:
         if given is None or isinstance(given, ConstantNumbers)
         else ConstantNumbers(given, name)
     )
+
+
+def _vectors(given: Any, field: str, names: tuple[str, ...]) -> dict[str, RowNumbers]:
+    """The coefficients of all rows of each force or point, by its name."""
+    if given is not None and not isinstance(given, Mapping):
+        raise ParameterError(
+            f"{field} must be a dict of vectors by name, got {shown(given)}", field
+        )
+    return {name: _vector(row, names, f"{field}.{name}") for name, row in dict(given or {}).items()}
+
+
+def _parts(
+    contacts: Any,
+    surfaces: Any,
+    friction: Any,
+    names: tuple[str, ...],
+    points: dict[str, RowNumbers],
+) -> dict[str, NamedParts]:
+    """The parts of each kind on rows or points; sums of rows are added to the points."""
+    return {
+        field: NamedParts(_part(part, kind, field, names, points) for part in _each(given, field))
+        for field, kind, given in (
+            ("contacts", Contact, contacts),
+            ("surfaces", Surface, surfaces),
+            ("friction", Friction, friction),
+        )
+    }
+
+
+def _basis(given: Any, size: int) -> ConstantNumbers | None:
+    """The displacements of a larger model for each row."""
+    if given is None or isinstance(given, ConstantNumbers):
+        return given
+    found = ConstantNumbers(given, "basis")
+    if found.array.ndim != 2 or found.array.shape[1] != size:
+        raise ParameterError(
+            f"basis must have {size} columns, one for each row of the mass, got {shown(given)}",
+            "basis",
+        )
+    return found
+
+
+def _nearest(basis: np.ndarray, given: Any, name: str) -> np.ndarray:
+    """The numbers of the rows whose shape is nearest to displacements of the larger model, (rows,),
+    or to one number for all of them."""
+    wanted = read_array(np.full(len(basis), given) if np.ndim(given) == 0 else given, name)
+    if wanted.shape != (len(basis),):
+        raise ParameterError(
+            f"{name} must have {len(basis)} numbers, one for each row of the larger model, or be "
+            f"one number, got {shown(given)}",
+            name,
+        )
+    return np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0])
 
 
 def _names_of(given: Any, size: int) -> tuple[str, ...]:

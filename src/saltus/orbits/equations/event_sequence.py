@@ -182,11 +182,12 @@ def _listed(
     groups = reading.groups(motion.position, smooth)
     chosen &= codes[:, 1] & sum(parts for parts, _ in groups) != 0
     kept = np.flatnonzero(chosen)
+    together = ONE_INSTANT * (motion.time - motion.start)
     for parts, _ in groups:
         own = kept[codes[kept, 1] & parts != 0]
-        chosen[
-            own[_dying(np.column_stack([codes[own, 0], codes[own, 1] & parts]), speeds[own])]
-        ] = False
+        own_codes = np.column_stack([codes[own, 0], codes[own, 1] & parts])
+        chosen[own[_dying(own_codes, speeds[own])]] = False
+        chosen[own[_repeated(own_codes, times[own], together)]] = False
     times, codes = times[chosen], codes[chosen]
     if dense is None or not times.size:
         return [], times, speeds[chosen]
@@ -209,6 +210,18 @@ def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
         growing = np.flatnonzero(run[1:] > (1.0 + SETTINGS.grows) * run[:-1])
         dying[first + growing[-1] + 1 if growing.size else first : last] = True
     return dying
+
+
+def _repeated(codes: np.ndarray, times: np.ndarray, together: float) -> np.ndarray:
+    """Which events of a group, (n, 2), are impacts at the instant of an earlier event of their
+    contacts: what is held or released just before an event of another group may touch again there,
+    by rounding and without speed.
+    """
+    again = np.zeros(len(codes), dtype=bool)
+    for i in np.flatnonzero(codes[:, 0] == EventCode.IMPACT):
+        same = codes[:i, 1] & codes[i, 1] == codes[i, 1]
+        again[i] = (same & (times[i] - times[:i] <= together)).any()
+    return again
 
 
 def _in_order(
