@@ -52,9 +52,9 @@ def tip() -> np.ndarray:
     return np.eye(2 * ELEMENTS)[-2]
 
 
-def system(share: float) -> saltus.System:
+def system(share: float, mass_unit: float = 1.0) -> saltus.System:
     """The cantilever under a load with this share of its first natural frequency."""
-    mass, stiffness, damping = matrices()
+    mass, stiffness, damping = (matrix / mass_unit for matrix in matrices())
     stop = saltus.Contact(name="stop", coordinate="tip", position=GAP, sign=-1)
     beam = saltus.Structure(
         mass=mass,
@@ -64,14 +64,14 @@ def system(share: float) -> saltus.System:
         contacts=[stop],
         forces={"f": tip()},
     )
-    load = saltus.Load(frequency=share * FIRST, f=saltus.Harmonic(FORCE))
+    load = saltus.Load(frequency=share * FIRST, f=saltus.Harmonic(FORCE / mass_unit))
     return saltus.System(model=beam, load=load, impact=saltus.NewtonImpact(0.0))
 
 
 @functools.cache
-def branch(share: float) -> saltus.Branch:
+def branch(share: float, mass_unit: float = 1.0) -> saltus.Branch:
     """The branch from the orbit of a load, over the resonance."""
-    whole = system(share)
+    whole = system(share, mass_unit)
     orbit = saltus.find_orbit(whole, **whole.model.start())
     return saltus.continue_orbit(orbit, "load.frequency", (0.8 * FIRST, 1.4 * FIRST))
 
@@ -96,11 +96,14 @@ def test_the_branch_goes_over_the_resonance_from_one_free_motion_to_the_other() 
         assert np.abs(located - grazing).min() < 1e-9
 
 
-def test_the_branch_is_the_same_from_beyond_the_resonance() -> None:
-    one, other = ([(p.kind, p.parameter) for p in branch(share).special] for share in (0.9, 1.2))
-    assert len(one) > 10
-    assert [kind for kind, _ in one] == [kind for kind, _ in other]
-    parameters = np.array([[value for _, value in points] for points in (one, other)])
+@pytest.mark.parametrize("other", [(1.2, 1.0), (0.9, 1e3), (0.9, 1e-6)])
+def test_the_branch_is_the_same_from_beyond_the_resonance_and_in_other_units_of_mass(
+    other: tuple[float, float],
+) -> None:
+    ways = [branch(0.9).special, branch(*other).special]
+    assert len(ways[0]) > 10
+    assert [point.kind for point in ways[0]] == [point.kind for point in ways[1]]
+    parameters = np.array([[point.parameter for point in special] for special in ways])
     assert np.ptp(parameters, axis=0).max() < 1e-7
 
 

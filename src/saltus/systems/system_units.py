@@ -51,7 +51,8 @@ class NaturalUnits:
        through which the inertia of the mass lets it move: that of d = max(abs(J), Omega^2)^-1 a,
        where a is the acceleration at rest at a contact and J = da/dq. Under a constant load it is d
        itself, the distance of the equilibrium from the contact. The contact is the one with the
-       smallest unit. A coordinate that is an angle has the unit 1 rad.
+       smallest unit. A coordinate that is an angle has the unit 1 rad. The amplitude of a mode of
+       mass 1 has the unit of length times the root of a mass, the mean of the displacements' masses.
     4. Where there is no such distance, friction gives one, then the positions of contacts, then a
        ground that moves. What has none at all is 1: the system itself has no unit then.
     5. They are all finite and above 0.
@@ -72,6 +73,9 @@ class NaturalUnits:
         Whether the system has a time; if not, `time` is 1 in the units of its user.
     has_length
         Whether it has a length, likewise.
+    displacements
+        How many of the coordinates are displacements or angles; the amplitudes of modes are behind
+        them.
     """
 
     lengths: np.ndarray
@@ -81,11 +85,12 @@ class NaturalUnits:
     free_time: float
     has_time: bool = True
     has_length: bool = True
+    displacements: int | None = None
 
     @cached_property
     def length(self) -> float:
-        """The largest unit of a coordinate."""
-        return float(self.lengths.max())
+        """The largest unit of a displacement."""
+        return float(self.lengths[: self.displacements].max())
 
     @cached_property
     def speed(self) -> float:
@@ -108,6 +113,11 @@ class NaturalUnits:
         return np.asarray(self.masses * self.lengths / self.time**2)
 
     @cached_property
+    def force(self) -> float:
+        """The largest unit of a force along a displacement."""
+        return float(self.forces[: self.displacements].max())
+
+    @cached_property
     def state(self) -> np.ndarray:
         """The units of a state, coordinates and then velocities, (2 n,)."""
         return np.concatenate([self.lengths, self.speeds])
@@ -125,7 +135,14 @@ class NaturalUnits:
         times = (self.time, self.own_time, self.free_time)
         time, own_time, free_time = map(_power_of_two, times)
         return NaturalUnits(
-            lengths, time, masses, own_time, free_time, self.has_time, self.has_length
+            lengths,
+            time,
+            masses,
+            own_time,
+            free_time,
+            self.has_time,
+            self.has_length,
+            self.displacements,
         )
 
 
@@ -208,10 +225,32 @@ def _found(system: System) -> NaturalUnits:
     sound = np.isfinite(lengths) & (lengths > 0.0)
     own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
     free_time = 1.0 / math.sqrt(stiffest) if stiffest > 0.0 else time
-    lengths = np.where(sound, lengths, 1.0)
+    lengths = np.where(sound, lengths, 1.0) * _scales(model)
     return NaturalUnits(
-        lengths, time, _masses(model), own_time, free_time, known > 0.0, bool(sound.any())
+        lengths,
+        time,
+        _masses(model),
+        own_time,
+        free_time,
+        known > 0.0,
+        bool(sound.any()),
+        _displacements(model),
     )
+
+
+def _displacements(model: Any) -> int:
+    """How many of the coordinates are no amplitudes of modes."""
+    return int(getattr(model, "local_count", len(model.coordinates)))
+
+
+def _scales(model: Any) -> np.ndarray:
+    """The amplitude of each coordinate (n,) that counts as a displacement of 1: for a mode of mass 1
+    the root of a mass, else 1."""
+    scales = np.ones(len(model.coordinates))
+    count = _displacements(model)
+    if count < len(scales):
+        scales[count:] = math.sqrt(float(_masses(model)[:count].mean()))
+    return scales
 
 
 def _places(model: Any, load: Any, instants: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -287,18 +326,19 @@ def _held_away(
     accelerations.
     """
     pushes = []
+    scales = _scales(model)
     for t in instants:
         for beside in _on_both_sides(model, float(t), place, load):
             for side in model.every_side:
                 value = _acceleration(model, float(t), place.tolist(), side, beside)
                 if value is not None:
-                    pushes.append(value)
+                    pushes.append(value / scales)
     if not pushes:
         return None
     moved = np.zeros((len(pushes), len(place)))
     stiffness = 0.0
     for slopes in _slopes_beside(model, place, load):
-        left, sizes, right = np.linalg.svd(slopes)
+        left, sizes, right = np.linalg.svd(slopes * scales / scales[:, None])
         # bodies that nothing holds have a stiffness of rounding, which would put them infinitely far
         sizes = np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, 0.0)
         stiffness = max(stiffness, float(sizes.max(initial=0.0)))

@@ -632,7 +632,7 @@ class ContactsEquations(OrbitEquations):
     def _units_of_extremes(self) -> np.ndarray:
         """The natural units of length, time and force."""
         natural = self.natural
-        return np.array([natural.length, natural.time, natural.forces.max()])
+        return np.array([natural.length, natural.time, natural.force])
 
     def _followed(
         self,

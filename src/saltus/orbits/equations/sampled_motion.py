@@ -495,7 +495,7 @@ class SampledMotion:
             least.append((speed / units.speed, "sliding speed"))
         # what holds a single contact is given as an acceleration
         alone = self.motion.system.model.has_one_contact
-        largest = units.acceleration if alone else float(units.forces.max())
+        largest = units.acceleration if alone else units.force
         for chosen, forces in modes.holding(self.side):
             steps = np.flatnonzero(np.any(chosen, axis=0)) if chosen else np.empty(0, dtype=int)
             if steps.size:
