@@ -191,3 +191,14 @@ def test_bad_input_is_refused_in_a_sentence(change: dict, sentence: str | None) 
         return
     with pytest.raises(saltus.ParameterError, match=sentence):
         saltus.Structure.reduced(**given)
+
+
+def test_a_motion_of_many_coordinates_is_printed_in_short() -> None:
+    mass, stiffness = bar(100)
+    model = saltus.Structure.reduced(mass, stiffness, modes=30, contacts=[wall(99)])
+    system = saltus.System(model=model, impact=saltus.NewtonImpact(0.5))
+    printed = repr(saltus.simulate(system, **model.start(0.01), duration=0.5))
+    assert "mode_7=" in printed
+    assert "23 more" in printed
+    assert "mode_8=" not in printed
+    assert printed.count(",") < 25

@@ -442,7 +442,7 @@ class Structure(ContactModel):
         all_names = _names_of(names, size)
         all_points = _vectors(points, "points", all_names)
         all_forces = _vectors(forces, "forces", all_names)
-        parts = _parts(contacts, surfaces, friction, all_names, all_points)
+        parts: dict[str, Any] = dict(_parts(contacts, surfaces, friction, all_names, all_points))
         kept = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
         for row in _each(keep, "keep"):
             known = isinstance(row, str) and row in all_points

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+MOST_SHOWN = 8  # coordinates in the printed form of a motion
 PERIOD_SAMPLES = 200  # samples in a forcing period if no times are given
 
 
@@ -136,12 +138,16 @@ class Motion(Result):
 
     def __repr__(self) -> str:
         names = self.system.model.coordinates
-        state = ", ".join(
-            f"{n}={x:.12g}" for n, x in zip(names, np.atleast_1d(self.position), strict=True)
-        )
+        numbers = zip(names, np.atleast_1d(self.position), strict=True)
+        shown = [f"{name}={x:.12g}" for name, x in islice(numbers, MOST_SHOWN)]
+        velocity = self.velocity
+        if len(names) > MOST_SHOWN:
+            shown.append(f"... {len(names) - MOST_SHOWN} more")
+            first = ", ".join(repr(v) for v in velocity[:MOST_SHOWN])
+            velocity = f"({first}, ...)"
         where = f"{self.stop.value} ({self.limit})" if self.limit else self.stop.value
         return (
-            f"Motion(time={self.time:.12g}, {state}, velocity={self.velocity}, "
+            f"Motion(time={self.time:.12g}, {', '.join(shown)}, velocity={velocity}, "
             f"impacts={len(self.impacts)}, stop={where})"
         )
 
