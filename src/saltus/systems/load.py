@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import ParameterError, TraceError, near
 from saltus.number_ranges import number_range, ranges_of, settled
 from saltus.systems.signals import Record, Signal, as_signal, scaled
@@ -165,6 +167,26 @@ class Load:
     def period(self) -> float | None:
         """The forcing period 2 pi / Omega, or None for a load without a base frequency."""
         return None if self.frequency is None else 2.0 * math.pi / self.frequency
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The corners that repeat themselves, as shares of the forcing period from 0 on."""
+        signals = [
+            term
+            for signal in self.channels.values()
+            for term in getattr(signal, "terms", (signal,))
+            if term.repeats
+        ]
+        return np.unique(np.concatenate([np.empty(0), *(term.corners for term in signals)]))
+
+    def corners_between(self, start: float, end: float) -> np.ndarray:
+        """The times of these corners between two times."""
+        shares = self.corners
+        if not shares.size or self.period is None:
+            return np.empty(0)
+        periods = np.arange(math.floor(start / self.period), math.ceil(end / self.period) + 1)
+        times = self.period * (periods[:, None] + shares).ravel()
+        return times[(start < times) & (times < end)]
 
 
 class DeclaredLoad:

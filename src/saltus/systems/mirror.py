@@ -16,6 +16,7 @@ from saltus.errors import ParameterError, SaltusError
 from saltus.systems.contact_model import ContactModel, mass_and_force, mass_rows, normal_forces
 from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.model import IMAGE_ROUNDING, Model
+from saltus.systems.repeating import Repeating
 from saltus.systems.signals import Constant, Harmonic, Signal, Sum, scaled
 from saltus.systems.system_units import natural_units
 
@@ -325,13 +326,15 @@ def _has_even_orders_alone(signal: Signal) -> bool:
 
 
 def _half_a_period_later(signal: Signal) -> Signal:
-    """The signal half a period later; signals that are no sums of harmonics are reversed."""
+    """The signal half a period later; signals that do not repeat themselves are reversed."""
     if isinstance(signal, Constant):
         return signal
     if isinstance(signal, Harmonic):
         return replace(signal, amplitude=(-1.0) ** signal.order * signal.amplitude)
     if isinstance(signal, Sum):
         return Sum(tuple(_half_a_period_later(term) for term in signal.terms))
+    if isinstance(signal, Repeating):
+        return signal.half_a_period_later()
     return scaled(signal, -1.0)
 
 

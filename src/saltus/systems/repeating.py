@@ -8,6 +8,7 @@ that they move in time with the frequency of the load.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -94,8 +95,8 @@ class Repeating(Signal):
     """A signal that is piecewise a polynomial of the phase and repeats itself with the forcing
     period: `scale` times its shape, and a mean.
 
-    Contract: a subclass gives `shape()`, its `Pieces`, which no number of the system changes, and
-    `factors()`, the numbers (factor, mean) by which the value is factor shape + mean. `quantity` is
+    Contract: a subclass gives `shape()`, its `Pieces`, which no number of the system changes;
+    `half_a_period_later()`; and `factors()`, the numbers (factor, mean) by which the value is factor shape + mean. `quantity` is
     that of the signal: a force, or of a ground channel an acceleration or a displacement.
     """
 
@@ -113,6 +114,11 @@ class Repeating(Signal):
         raise NotImplementedError
 
     @property
+    def corners(self) -> np.ndarray:
+        """Its corners, as shares of the forcing period."""
+        return self.shape().corners
+
+    @property
     def constant_part(self) -> float:
         """Its mean over a forcing period."""
         factor, mean = self.factors()
@@ -123,6 +129,10 @@ class Repeating(Signal):
         """Whether it jumps at any corner: a force, or the acceleration of a ground."""
         level = 0 if self.quantity == "force" else 2 - QUANTITY_ORDER[self.quantity]
         return self.pieces(level).jumps
+
+    def half_a_period_later(self) -> Repeating:
+        """The signal as it is half a period later."""
+        raise NotImplementedError
 
     def pieces(self, level: int) -> Pieces:
         """The derivative of the shape by the phase of an order, or for -1 and -2 its integrals."""
@@ -234,6 +244,10 @@ class Wave(Repeating):
         """The wave of amplitude 1."""
         duty = float(getattr(self, "duty", 0.5))
         return _wave(type(self).__name__, float(self.phase), duty)
+
+    def half_a_period_later(self) -> Wave:
+        """The wave as it is half a period later."""
+        return dataclasses.replace(self, phase=float(self.phase) + math.pi)
 
     def factors(self) -> tuple[Any, Any]:
         """The amplitude and the mean."""
@@ -474,6 +488,11 @@ class Table(Repeating):
         given = {"times": self.times.tolist(), "values": self.values.tolist()}
         named = {name: getattr(self, name) for name in ("interpolation", "quantity", "scale")}
         return given | named
+
+    def half_a_period_later(self) -> Table:
+        """The table as it is half a period later."""
+        ahead = 0.5 * float(self.times[-1] - self.times[0])
+        return dataclasses.replace(self, times=self.times - ahead)
 
     def __eq__(self, other: object) -> bool:
         return (

@@ -49,6 +49,11 @@ class Signal:
     repeats: ClassVar[bool] = False
 
     @property
+    def corners(self) -> np.ndarray:
+        """Its corners that repeat themselves, as shares of the forcing period."""
+        return np.empty(0)
+
+    @property
     def constant_part(self) -> float:
         """Its mean over a forcing period."""
         return 0.0

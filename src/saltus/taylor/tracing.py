@@ -146,6 +146,12 @@ class Trace:
         return any(code >= CORNER for _, code in self.records)
 
     @property
+    def corner_column(self) -> int:
+        """1 plus the column along the frequency, with which these corners move; 0 without them."""
+        moves = self.repeats and FREQUENCY in self.paths
+        return 1 + 2 * self.dof + self.paths.index(FREQUENCY) if moves else 0
+
+    @property
     def several(self) -> bool:
         """Whether there are contacts or frictions that may hold its coordinates, one by one."""
         return bool(self.signs or self.friction_coordinates)
@@ -611,16 +617,6 @@ def _check_abs(result: Trace, expanded: list[Expr]) -> None:
         )
 
 
-def _jumps(system: System) -> bool:
-    """Whether a load jumps at corners that repeat themselves."""
-    return any(
-        getattr(term, "jumps", False)
-        for signal in system.load.channels.values()
-        for term in getattr(signal, "terms", (signal,))
-        if term.repeats
-    )
-
-
 def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
     """Check that each of the dotted paths to differentiate to names a number that can vary.
 
@@ -644,11 +640,6 @@ def check_paths(system: System, paths: tuple[str, ...]) -> tuple[str, ...]:
             raise ParameterError(
                 f"{path} moves the instants at which the load is not smooth, so there are no"
                 " derivatives to it; take another"
-            )
-        if path == FREQUENCY and _jumps(system):
-            raise ParameterError(
-                f"{path} moves the instants at which the load jumps, so there are no derivatives"
-                " to it; take another"
             )
         if path.endswith(".order") and isinstance(owner, Harmonic):
             raise ParameterError(

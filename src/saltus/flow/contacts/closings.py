@@ -75,21 +75,24 @@ from saltus.flow.contacts.layout import (
 )
 from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
 from saltus.flow.contacts.tangent import (
-    clear_shifts,
     closing_columns,
     fill_slopes,
     gap_derivative,
     hold_columns,
     impulse_columns,
     jump_columns,
-    move_columns,
     note_shifts,
     note_velocities,
     slope,
 )
 from saltus.flow.kernel.layout import ZERO, EventCode, Status
 from saltus.flow.kernel.roots import leading
-from saltus.flow.kernel.steps import expand, forget
+from saltus.flow.kernel.steps import (
+    clear_shifts,
+    expand,
+    forget,
+    move_columns,
+)
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------

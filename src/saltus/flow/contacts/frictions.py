@@ -25,10 +25,16 @@ from saltus.flow.contacts.layout import (
     ground_speed,
     is_sum,
 )
-from saltus.flow.contacts.tangent import move_columns, note_shifts, slope
+from saltus.flow.contacts.tangent import note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
-from saltus.flow.kernel.steps import columns_at_event, expand, step_size, time_scale
+from saltus.flow.kernel.steps import (
+    columns_at_event,
+    expand,
+    move_columns,
+    step_size,
+    time_scale,
+)
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------

@@ -94,10 +94,8 @@ from saltus.flow.contacts.rubbing import (
 )
 from saltus.flow.contacts.tangent import (
     accumulation_shifts,
-    clear_shifts,
     event_shifts,
     fill_slopes,
-    move_columns,
     note_shifts,
     release_columns,
     start_columns,
@@ -114,13 +112,18 @@ from saltus.flow.kernel.roots import (
     value_and_slope,
 )
 from saltus.flow.kernel.steps import (
+    clear_shifts,
     columns_at_event,
+    columns_from_corner,
+    columns_to_corner,
     expand,
+    forget,
     in_modes,
     is_away,
     mode_arrays,
     motion_end,
     move,
+    move_columns,
     natural_speed,
     note_impact,
     record_step,
@@ -654,6 +657,19 @@ def spare_events(motion):
     releases, of all contacts, what all frictions do, and a rest.
     """
     return 4 + 2 * (motion.contacts.shape[0] + motion.frictions.shape[0])
+
+
+@lean_jit
+def at_corner(motion):
+    """Transform the columns where the load has just had a corner. If anything is held, they are
+    taken back from it once it is known what holds behind it."""
+    settle(motion)
+    if motion.mode == Mode.CONTACT:  # an impact at the same instant
+        forget(motion)
+        return
+    columns_to_corner(motion, 1.0)
+    if closed_bits(motion) == 0 and motion.frictions.shape[0] == 0:
+        columns_from_corner(motion, 1.0)
 
 
 @lean_jit

@@ -37,33 +37,10 @@ from saltus.flow.contacts.layout import (
     restitution,
 )
 from saltus.flow.kernel.layout import EventCode
-from saltus.flow.kernel.steps import columns_at_event, expand
+from saltus.flow.kernel.steps import columns_at_event, expand, move_columns
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
-
-
-@lean_jit
-def move_columns(motion, sign):
-    """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time
-    (-1): u + v dt, z + a dt.
-    """
-    own = motion.own
-    a = motion.acceleration_series
-    for j in range(motion.columns):
-        shift = sign * motion.shifts[j]
-        for i in range(own):
-            place = own * (1 + j) + i
-            if shift != 0.0:
-                motion.coordinates[place] += shift * motion.velocities[i]
-                motion.velocities[place] += shift * a[i, 0]
-
-
-@lean_jit
-def clear_shifts(motion):
-    """Set the shifts of the event to 0, after the columns have been taken back from it."""
-    for j in range(motion.columns):
-        motion.shifts[j] = 0.0
 
 
 @lean_jit

@@ -93,6 +93,7 @@ class Sizes(NamedTuple):
     # the first of its own coordinates, on which impacts act; those behind them have mass 1
     local: int
     repeats: int  # whether the load's breakpoints return in each forcing period
+    corner_column: int  # 1 plus the column along the frequency that moves them, or 0
 
 
 @dataclass(frozen=True)
@@ -224,7 +225,9 @@ def load_structure(trace: Trace) -> CompiledStructure:
     steep = int(is_steep(trace.acceleration))
     first = len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order
     return CompiledStructure(
-        Sizes(*first, trace.dof, trace.columns, trace.local, int(trace.repeats)),
+        Sizes(
+            *first, trace.dof, trace.columns, trace.local, int(trace.repeats), trace.corner_column
+        ),
         max(1, len(constants(trace))),
         tuple(made[name] for name in names),
         (made["constants"], made["matrices" if trace.several else "geometry"]),

@@ -10,6 +10,7 @@ from saltus.flow.kernel.layout import BATCH, Status
 from saltus.flow.kernel.memory import ADVANCE, MotionMemory
 from saltus.flow.kernel.steps import next_target, state_arrays
 from saltus.flow.one_contact.kernel import (
+    at_corner,
     begin,
     is_smooth,
     one_pass,
@@ -43,7 +44,10 @@ def advance_batch(motion):
             if motion.repeats > 0:
                 motion.piece = 0
             continue
-        status = one_pass(motion, next_target(motion, t_end), t_end)
+        target = next_target(motion, t_end)
+        if motion.corner_column > 0 and motion.new_piece > 0:
+            at_corner(motion)
+        status = one_pass(motion, target, t_end)
         if status != Status.PAUSED:
             return status
     return Status.PAUSED

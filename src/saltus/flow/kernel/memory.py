@@ -87,6 +87,8 @@ MOTION = np.dtype(
         ("local", _WHOLE),
         # whether the load's breakpoints are shares of the forcing period, and return in each
         ("repeats", _WHOLE),
+        # 1 plus the tangent's column along the frequency with which they move, 0 without one
+        ("corner_column", _WHOLE),
     ]
 )
 _NAMES: Any = MOTION.names

@@ -314,6 +314,64 @@ def record_step(motion, side, t, h):
 
 
 @lean_jit
+def move_columns(motion, sign):
+    """Take the columns to the event, whose instant moves (sign +1), or back from it to a fixed time
+    (-1): u + v dt, z + a dt.
+    """
+    own = motion.own
+    a = motion.acceleration_series
+    for j in range(motion.columns):
+        shift = sign * motion.shifts[j]
+        for i in range(own):
+            place = own * (1 + j) + i
+            if shift != 0.0:
+                motion.coordinates[place] += shift * motion.velocities[i]
+                motion.velocities[place] += shift * a[i, 0]
+
+
+@lean_jit
+def clear_shifts(motion):
+    """Set the shifts of the event to 0, after the columns have been taken back from it."""
+    for j in range(motion.columns):
+        motion.shifts[j] = 0.0
+
+
+@lean_jit
+def set_corner_shifts(motion):
+    """Put the shifts of a corner of the load into the state: it has a phase, and so moves with the
+    frequency W alone, by -time / W."""
+    clear_shifts(motion)
+    length = motion.period_length
+    motion.shifts[motion.corner_column - 1] = (
+        -(motion.origin + motion.time) * length / (2.0 * math.pi)
+    )
+
+
+@lean_jit
+def columns_to_corner(motion, side):
+    """Take the columns to a corner of the load that the motion has just come to, whose instant
+    moves with the frequency."""
+    set_corner_shifts(motion)
+    piece = motion.piece
+    time = motion.time
+    motion.piece = piece - 1
+    if motion.piece == 0:  # from the end of the forcing period; the table has two of them
+        motion.piece = motion.breaks.size // 2
+        time += motion.period_length
+    expand(motion, time, side, 0)
+    move_columns(motion, 1.0)
+    motion.piece = piece
+
+
+@lean_jit
+def columns_from_corner(motion, side):
+    """Take the columns back from a corner to a fixed time, behind it."""
+    expand(motion, motion.time, side, 0)
+    move_columns(motion, -1.0)
+    clear_shifts(motion)
+
+
+@lean_jit
 def breakpoint_time(motion, piece):
     """The time of a breakpoint, as counted from the present forcing period."""
     at = motion.breaks[piece]

@@ -39,6 +39,7 @@ from saltus.flow.kernel.steps import (
     record_event,
     record_shift,
     record_step,
+    set_corner_shifts,
     slow_share,
 )
 from saltus.taylor import lean_jit
@@ -247,6 +248,12 @@ def release_columns(motion, t):
     ):
         detail = ReleaseDetail.AT_A_JUMP
     columns_at_event(motion, EventCode.RELEASE, detail, t, float(motion.side))
+    if detail == ReleaseDetail.AT_A_JUMP and motion.corner_column > 0:
+        set_corner_shifts(motion)
+        expand(motion, t, float(motion.side), 0)
+        place = motion.own * motion.corner_column
+        shift = motion.shifts[motion.corner_column - 1]
+        motion.velocities[place] -= shift * motion.acceleration_series[0, 0]
     for j in range(motion.columns):
         if math.isnan(motion.coordinates[motion.own + j]):
             motion.shifts[j] = math.nan

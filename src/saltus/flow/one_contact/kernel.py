@@ -46,7 +46,10 @@ from saltus.flow.kernel.roots import (
 from saltus.flow.kernel.steps import (
     column_step,
     columns_at_event,
+    columns_from_corner,
+    columns_to_corner,
     expand,
+    forget,
     is_away,
     leaps,
     move,
@@ -258,6 +261,17 @@ def spare_events(motion):
 def waits(motion):
     """Whether a decision is due before the motion may end."""
     return False
+
+
+@lean_jit
+def at_corner(motion):
+    """Transform the columns where the load has just had a corner; those of a motion at rest do not
+    change."""
+    if motion.mode == Mode.ARC:
+        columns_to_corner(motion, float(motion.side))
+        columns_from_corner(motion, float(motion.side))
+    elif motion.mode == Mode.CONTACT:  # an impact at the same instant
+        forget(motion)
 
 
 @lean_jit

@@ -146,6 +146,7 @@ class ContactsEquations(OrbitEquations):
             known is None
             or known.frictions
             or known.surfaces
+            or base.has_corners
             or base.system.dependent
             or _has_moving_mass(known)
         ):

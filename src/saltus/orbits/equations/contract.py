@@ -262,15 +262,12 @@ class OrbitEquations(ABC):
         self.tol = tol
         self.system = system = system.in_gap_coordinates
         self._run: Any = program(system, system.model.margin_names(system.load), paths)
-        if self._run.trace.repeats:
-            raise ParameterError(
-                "orbits under a load with corners, such as a Square, are not yet solved for; "
-                "follow a motion until it settles (settle), or use Harmonic signals"
-            )
-        if self._run.trace.records:
+        # whether the load has corners, at which the motion is not smooth between its events
+        self.has_corners: bool = self._run.trace.repeats
+        if self._run.trace.records and not self.has_corners:
             raise ParameterError(
                 "a load with a Record or a pulse is not periodic, so it has no periodic orbits; "
-                "use Harmonic signals"
+                "use Harmonic signals, waves with corners such as Square, or a Table"
             )
         names = [path for path, _ in numbers(system)]
         self._values = np.array([value for _, value in numbers(system)])

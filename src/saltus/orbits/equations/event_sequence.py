@@ -275,7 +275,7 @@ def section_of(
     motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
 ) -> tuple[float, np.ndarray]:
     """The phase and the state of a motion at a section: the middle of its longest smooth stretch
-    within the first `duration` in which not all coordinates are held; or the state at a phase that
+    within the first `duration`, also between corners of its load, in which not all coordinates are held; or the state at a phase that
     is given.
 
     The longer that stretch, the longer a branch can be followed before an event comes to the
@@ -287,6 +287,7 @@ def section_of(
         bounds = np.unique(
             [
                 motion.start,
+                *motion.system.load.corners_between(motion.start, end),
                 *(event.time for event in motion.events if motion.start < event.time < end),
                 end,
             ]

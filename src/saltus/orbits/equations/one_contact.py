@@ -82,7 +82,7 @@ class OneContactEquations(OrbitEquations):
     def read(
         cls, base: OrbitEquations, motion: MotionToRead
     ) -> tuple[OrbitEquations, np.ndarray] | None:
-        if not isinstance(base, cls):
+        if not isinstance(base, cls) or base.has_corners:
             return None
         once = motion.once
         periods = motion.periods

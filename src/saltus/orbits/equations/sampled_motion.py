@@ -135,6 +135,8 @@ class SideModes:
         """The gaps of the contacts, that of a single contact on each side; and the distances from
         surfaces, without those of the numbers `smooth`.
         """
+        if not self.system.model.has_one_contact:  # or none
+            return []
         one = self.system.one_contact
         return [
             GapAlong(0, one.inward(number), float(one.contact), side == number)
@@ -157,6 +159,8 @@ class SideModes:
         """Where coordinates are held, and the function of (model, t, q, v, a, load) whose values
         then are positive.
         """
+        if not self.system.model.has_one_contact:
+            return []
         pulls = [contact_pull(self.system, one) for one in self.system.one_contact.sides]
         return [([side == 0 for _ in pulls], lambda model, t, *_: [-pull(t) for pull in pulls])]
 

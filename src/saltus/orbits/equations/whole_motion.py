@@ -1,5 +1,5 @@
 """Orbits that are followed through all of their events, x = Phi(x): those with accumulations of
-impacts, or with dry friction.
+impacts, with dry friction, or under a load with corners.
 
 The unknowns are the state at a section, a phase of the load at which no event happens. The motion
 Phi may have any events. Its derivatives come from `sensitivities`, in which an accumulation of
@@ -60,7 +60,7 @@ from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, substitute
-from saltus.taylor import FREQUENCY
+from saltus.taylor import FREQUENCY, record_table
 
 # A contact is closed at the section if its gap and the gap's rate are smaller than this there, in
 # natural units.
@@ -104,7 +104,7 @@ class WholeMotionEquations(OrbitEquations):
         twice = motion.twice
         periods = motion.periods
         if (
-            not (modes_in(system).needs_whole(twice) and twice.phase_known)
+            not ((base.has_corners or modes_in(system).needs_whole(twice)) and twice.phase_known)
             or twice.limit is not None
         ):
             return None
@@ -468,7 +468,9 @@ class WholeMotionEquations(OrbitEquations):
             dense_tangent=False,
         )
         run = self._plain_program if paths is None else self._program
-        return request, run.with_numbers(parameters, self._records)
+        # breakpoints are shares of the forcing period, whatever the numbers are
+        records = record_table(system, run.trace.records) if self.has_corners else self._records
+        return request, run.with_numbers(parameters, records)
 
     def _extremes(self, sampled: SampledMotion | None) -> np.ndarray:
         """The extrema of all coordinates and the least values of the margins, in the columns that
