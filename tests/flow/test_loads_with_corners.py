@@ -250,3 +250,39 @@ def test_a_system_comes_back_from_toml(name):
         model=WallOscillator(wall=0.3), load=Load(frequency=W, force=[LOADS[name][0], Harmonic(0.1)])
     )  # fmt: skip
     assert System.from_toml(system.to_toml()) == system
+
+
+@pytest.mark.parametrize("name", ["square", "triangle", "sawtooth"])
+@pytest.mark.parametrize("rests", [False, True])
+def test_derivatives_to_the_frequency_that_moves_the_corners(name, rests):
+    """Corners move with the frequency: differences of fourth order, also through rests that the
+    jump ends."""
+    force = [LOADS[name][0], 1.0] if rests else LOADS[name][0]
+    wall, e = (0.0, 0.3) if rests else (0.3, 0.8)
+
+    @dataclass(frozen=True, kw_only=True)
+    class At(Bounded):
+        contacts = (Contact(name="wall", coordinate="x", position=wall, sign=-1),)
+
+    load = Load(frequency=W, force=force)
+    one = WallOscillator(wall=wall, damping=0.1)
+    start = {"x": -0.5, "velocity": 0.1, "duration": 17.3}
+    for system in (
+        System(model=one, load=load, impact=VelocityReduction(e)),
+        System(model=At(), load=load, impact=NewtonImpact(e)),
+    ):
+        tangent = sensitivities(system, parameters=["load.frequency"], **start)
+        h = 1e-6
+        ends = []
+        for step in (h, -h, 2 * h, -2 * h):
+            motion = simulate(system.with_({"load.frequency": W + step}), **start)
+            ends.append(np.array([motion.x, motion.velocity]))
+        slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+        assert tangent.undefined is None
+        assert tangent.parameters[:, 0] == pytest.approx(slope, abs=2e-7)
+
+
+def test_ensembles_have_no_derivative_to_a_frequency_that_moves_jumps():
+    system = System(model=Duffing(), load=Load(frequency=W, force=Square(1.0)))
+    with pytest.raises(ParameterError, match=r"take saltus\.sensitivities"):
+        simulate_many(system, x=[0.1], periods=2, sensitivities=["load.frequency"])

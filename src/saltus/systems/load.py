@@ -169,15 +169,15 @@ class Load:
         return None if self.frequency is None else 2.0 * math.pi / self.frequency
 
     @property
+    def jumps(self) -> bool:
+        """Whether any channel jumps at corners that repeat themselves."""
+        return any(signal.jumps for signal in self.channels.values())
+
+    @property
     def corners(self) -> np.ndarray:
         """The corners that repeat themselves, as shares of the forcing period from 0 on."""
-        signals = [
-            term
-            for signal in self.channels.values()
-            for term in getattr(signal, "terms", (signal,))
-            if term.repeats
-        ]
-        return np.unique(np.concatenate([np.empty(0), *(term.corners for term in signals)]))
+        own = [signal.corners for signal in self.channels.values()]
+        return np.unique(np.concatenate([np.empty(0), *own]))
 
     def corners_between(self, start: float, end: float) -> np.ndarray:
         """The times of these corners between two times."""
@@ -186,7 +186,7 @@ class Load:
             return np.empty(0)
         periods = np.arange(math.floor(start / self.period), math.ceil(end / self.period) + 1)
         times = self.period * (periods[:, None] + shares).ravel()
-        return times[(start < times) & (times < end)]
+        return np.asarray(times[(start < times) & (times < end)])
 
 
 class DeclaredLoad:

@@ -70,6 +70,19 @@ class Pieces:
         return bool((steps > 1e-9 * max(np.abs(self.coefficients[:, 0]).max(), 1e-300)).any())
 
     @property
+    def kinks(self) -> np.ndarray:
+        """The corners at which the polynomial changes, which not all need be: (m,) shares."""
+        changed = []
+        for k, corner in enumerate(self.corners):
+            before = np.polynomial.Polynomial(self.coefficients[k - 1])
+            moved = before(np.polynomial.Polynomial([self.lengths[k - 1], 1.0])).coef
+            apart = np.resize([*moved, *np.zeros(self.degree + 1)], self.degree + 1)
+            size = np.abs(self.coefficients).max(axis=0, initial=1e-300)
+            if (np.abs(apart - self.coefficients[k]) > 1e-9 * size.max()).any():
+                changed.append(float(corner))
+        return np.array(changed)
+
+    @property
     def mean(self) -> float:
         """The mean over a period."""
         integrals = self.lengths[:, None] ** np.arange(1, self.degree + 2)
@@ -116,7 +129,7 @@ class Repeating(Signal):
     @property
     def corners(self) -> np.ndarray:
         """Its corners, as shares of the forcing period."""
-        return self.shape().corners
+        return self.shape().kinks
 
     @property
     def constant_part(self) -> float:

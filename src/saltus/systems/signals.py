@@ -49,6 +49,11 @@ class Signal:
     repeats: ClassVar[bool] = False
 
     @property
+    def jumps(self) -> bool:
+        """Whether it jumps at any of its corners that repeat themselves."""
+        return False
+
+    @property
     def corners(self) -> np.ndarray:
         """Its corners that repeat themselves, as shares of the forcing period."""
         return np.empty(0)
@@ -165,6 +170,21 @@ class Sum(Signal):
     def repeats(self) -> bool:  # type: ignore[override]
         """Whether any term is given between corners that repeat themselves."""
         return any(term.repeats for term in self.terms)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether any term jumps."""
+        return any(term.jumps for term in self.terms)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The corners of all terms."""
+        return np.unique(np.concatenate([term.corners for term in self.terms]))
+
+    @property
+    def constant_part(self) -> float:
+        """The sum of those of the terms."""
+        return sum(term.constant_part for term in self.terms)
 
     def derivative(self, t: Any, frequency: Any, order: int = 0) -> Any:
         """The sum of the terms' derivatives."""

@@ -191,6 +191,12 @@ def run_ensemble(
     if run.structure.several and any(path.startswith("model.") for path in inputs.parameters):
         # the table of eigenmodes has the model's numbers
         run = replace(run, model=run.model._replace(eigenmodes=np.zeros(0)))
+    if run.trace.corner_column and system.load.jumps:
+        raise ParameterError(
+            "load.frequency moves the instants at which the load jumps, and ensembles have no"
+            " derivatives to it: take saltus.sensitivities, one motion at a time",
+            "sensitivities",
+        )
     jobs = _jobs(system, run, inputs, options.periods, duration, side)
     if Until.REST in options.until:
         jobs.rows["capture_speed"] = capture_speeds(

@@ -33,13 +33,14 @@ from saltus.flow import EventCode, EventKind
 from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import is_image, nearest, parent_of
-from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.event_sequence import (
+    CORNER,
     TIME_BETWEEN,
     EventSequence,
     OrbitEvent,
     section_of,
 )
+from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.sampled_motion import REACTION
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
@@ -587,7 +588,10 @@ def kind_between(before: EventSequence, after: EventSequence) -> SpecialKind | N
     """The kind of change between two neighbouring orbits; None if only the number of impacts of an
     accumulation changes.
     """
-    kinds = [Counter(event.kind for event in found.sequence) for found in (before, after)]
+    kinds = [
+        Counter(event.kind for event in found.sequence if event.kind > CORNER)
+        for found in (before, after)
+    ]
     more = {
         kind: kinds[1][kind] - kinds[0][kind]
         for kind in {*kinds[0], *kinds[1]}
@@ -643,5 +647,7 @@ def first_change(before: EventSequence, after: EventSequence) -> SpecialKind:
             EventCode.SLIP: SpecialKind.AS,
             EventCode.IMPACT: SpecialKind.GR,
         }
-        return names.get(EventCode(min(here)[1].kind), SpecialKind.SW)
+        return next(
+            (kind for code, kind in names.items() if code == min(here)[1].kind), SpecialKind.SW
+        )
     return SpecialKind.SW

@@ -50,7 +50,11 @@ class SpecialKind(StrEnum):
             " has no duration"
         ),
     )
-    SW = "SW", "switching: a contact's release, or its closing, appears or is lost"
+    SW = (
+        "SW",
+        "switching: a contact's release, or its closing, appears or is lost, or an event comes to"
+        " a corner of the load",
+    )
     GS = (
         "GS",
         "grazing-sliding: the sliding velocity touches 0; beyond, the mass sticks for a while",

@@ -15,7 +15,7 @@ from saltus.flow import EventCode, EventKind, Motion
 from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import NaturalUnits, System, mass_rows
+from saltus.systems import Load, NaturalUnits, System, mass_rows
 
 CHANGES = (
     EventCode.IMPACT,
@@ -27,6 +27,11 @@ CHANGES = (
     EventCode.REVERSAL,
     EventCode.CROSSING,
 )
+
+
+# The kind of the first corner of the load in a forcing period, beside those of `EventCode`; the kinds
+# of others are lower. Where an impact comes to one, the map over a period gets other derivatives.
+CORNER = -1
 
 
 @dataclass(frozen=True)
@@ -45,10 +50,11 @@ class EventSettings:
 
 SETTINGS = EventSettings()
 TIME_BETWEEN = "time between events"  # one of the quantities that vanish at a change of events
+TIME_TO_CORNER = "time between an event and a corner of the load"
 
 
 class OrbitEvent(NamedTuple):
-    """An event: its kind as in `EventCode`, the contacts and frictions as bits, and the number of
+    """An event: its kind as in `EventCode`, or CORNER; the contacts and frictions as bits, and the number of
     the mode after it.
     """
 
@@ -102,8 +108,12 @@ class EventSequence:
         n = len(self.events)
         least = math.inf
         for i, event in enumerate(self.events):
+            if event.kind <= CORNER:
+                continue
             later = next(
-                j for j in range(i + 1, i + n + 1) if self.events[j % n].parts & event.parts
+                j
+                for j in range(i + 1, i + n + 1)
+                if self.events[j % n].parts & event.parts and self.events[j % n].kind > CORNER
             )
             if (event.kind, self.events[later % n].kind) == kinds:
                 least = min(
@@ -131,6 +141,7 @@ def sequence_of(
     listed, when, all_speeds = _listed(motion, smooth)
     events = tuple(listed)
     times = tuple(when.tolist())
+    groups = modes.groups(motion.position, smooth)
     speeds = [
         speed
         for event, speed in zip(events, all_speeds.tolist(), strict=True)
@@ -144,17 +155,23 @@ def sequence_of(
         )
         times, period = times + tuple(time + period for time in times), 2.0 * period
     apart = [FARTHEST * units.time]
-    groups = modes.groups(motion.position, smooth)
     for group in groups:
         own = [time for event, time in zip(events, times, strict=True) if event.parts & group.parts]
         apart += np.diff([*own, own[0] + period]).tolist() if len(own) > 1 else []
     later = min(time for time in apart if time > ONE_INSTANT * period)
-    distance, witness = min(
+    quantities = [
         sampled.nearest_touch(units, smooth),
         (min(speeds, default=math.inf) / units.speed, "speed of an impact"),
         (float(later) / units.time, TIME_BETWEEN),
-    )
+    ]
     events, times = _in_order(events, times, ONE_INSTANT * period)
+    halves = [0.0] if images is None else [0.0, 0.5 * period]
+    corners = _corners(motion, events, times, period, halves)
+    if corners.size and events:
+        to_corner = np.abs(np.array(times)[:, None] - corners)
+        quantities.append((float(to_corner.min()) / units.time, TIME_TO_CORNER))
+        events, times = _with_corners(motion.system.load, events, times, corners, groups)
+    distance, witness = min(quantities)
     return EventSequence(
         events, times, period, units.time, max(distance, 0.0), section_distance, groups, witness
     )
@@ -194,6 +211,52 @@ def _listed(
     modes = reading.numbers(dense.side[np.searchsorted(dense.start, times, side="right") - 1])
     events = [OrbitEvent(*numbers) for numbers in np.column_stack([codes, modes]).tolist()]
     return events, times, speeds[chosen]
+
+
+def _corners(
+    motion: Motion,
+    events: tuple[OrbitEvent, ...],
+    times: tuple[float, ...],
+    period: float,
+    halves: list[float],
+) -> np.ndarray:
+    """The times of the load's corners in a period, without those whose jump is an event itself, as
+    it releases what rests."""
+    corners = motion.system.load.corners_between(motion.start, motion.time)
+    corners = np.concatenate([corners + later for later in halves])
+    jumps = [
+        time
+        for event, time in zip(events, times, strict=True)
+        if event.kind not in (EventCode.IMPACT, EventCode.CROSSING)
+    ]
+    apart = np.abs(corners[:, None] - np.array(jumps)).min(axis=1, initial=math.inf)
+    return np.asarray(corners[apart > ONE_INSTANT * period])
+
+
+def _with_corners(
+    load: Load,
+    events: tuple[OrbitEvent, ...],
+    times: tuple[float, ...],
+    corners: np.ndarray,
+    groups: tuple[Group, ...],
+) -> tuple[tuple[OrbitEvent, ...], tuple[float, ...]]:
+    """Events with the corners of the load between them, each of which acts on all parts and has
+    the mode before it."""
+    parts = 0
+    for group in groups:
+        parts |= group.parts
+    modes = [events[int(np.searchsorted(times, corner)) - 1].mode for corner in corners]
+    shares = load.corners
+    frequency = float(load.frequency or 0.0)
+    ahead = (corners[:, None] * frequency / math.tau - shares + 0.5) % 1.0 - 0.5
+    numbers = np.abs(ahead).argmin(axis=1)
+    added = [
+        OrbitEvent(CORNER - int(number), parts, mode)
+        for number, mode in zip(numbers, modes, strict=True)
+    ]
+    order = np.argsort([*times, *corners], kind="stable")
+    together = [*zip(events, times, strict=True), *zip(added, corners.tolist(), strict=True)]
+    return tuple(together[i][0] for i in order), tuple(together[i][1] for i in order)
 
 
 def _dying(codes: np.ndarray, speeds: np.ndarray) -> np.ndarray:
@@ -256,6 +319,8 @@ def _in_order(
 
 def _section_distance(motion: Motion, period: float) -> float:
     times = motion.events.times[np.isin(motion.events.codes[:, 0], CHANGES)]
+    corners = motion.system.load.corners_between(motion.start, motion.start + period)
+    times = np.sort(np.concatenate([times, corners])) if times.size else times
     if not times.size:
         return 0.5
     after = times[0] - motion.start
