@@ -6,7 +6,7 @@ from saltus.plots.conventions import LOOK, RC
 
 GROUPS = {  # by subject, as the first paragraph of the gallery lists them
     "Impacts and stops": (
-        "wall_orbits grazing two_stops preloaded_stop impact_pair shaken_table up_and_down"
+        "wall_orbits hammered grazing two_stops preloaded_stop impact_pair shaken_table up_and_down"
     ),
     "Rocking blocks and records": (
         "rocking_block housner overturning overturning_spectrum at2_record record falling_block"
@@ -15,7 +15,7 @@ GROUPS = {  # by subject, as the first paragraph of the gallery lists them
     "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop",
     "Harvesters and coordinates of first order": "harvester piezo_harvester",
     "Orbits, branches, spectra": (
-        "orbits period_doubling resting_orbit proved_orbit proved_fold response_spectrum duffing smoothing"
+        "orbits period_doubling resting_orbit proved_orbit proved_fold response_spectrum duffing square_wave smoothing"
     ),
     "Attractors and chaos": (
         "basins erosion capture chaos coming_to_rest potential_wells ensemble stability_chart"

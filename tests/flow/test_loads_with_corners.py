@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from saltus import (
     Contact,
@@ -286,3 +287,30 @@ def test_ensembles_have_no_derivative_to_a_frequency_that_moves_jumps():
     system = System(model=Duffing(), load=Load(frequency=W, force=Square(1.0)))
     with pytest.raises(ParameterError, match=r"take saltus\.sensitivities"):
         simulate_many(system, x=[0.1], periods=2, sensitivities=["load.frequency"])
+
+
+@pytest.mark.parametrize("name", LOADS)
+def test_a_load_backward_and_half_a_period_later(name):
+    signal = LOADS[name][0]
+    times = np.linspace(0.013, 3.0 * T, 97)
+    forward = Load(frequency=W, force=signal)
+    for changed, at in ((signal.backward(), -times), (signal.half_a_period_later(), times + T / 2)):
+        other = Load(frequency=W, force=changed)
+        assert other.force(times) == pytest.approx(forward.force(at), abs=1e-12)
+
+
+def test_meissners_equation_has_the_multipliers_of_its_two_halves():
+    """x'' + 0.1 x' + (1.5 +- 0.8) x = 0 in each half of a period: a stiffness that is switched."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Meissner(Model):
+        coordinates: ClassVar = ("x",)
+        channels: ClassVar = ("stiffness",)
+
+        def acceleration(self, t, x, v, side, load):
+            return -0.1 * v - load.stiffness(t) * x
+
+    system = System(model=Meissner(), load=Load(frequency=W, stiffness=Square(0.8, mean=1.5)))
+    tangent = sensitivities(system, x=0.1, velocity=0.2, periods=1)
+    halves = [expm(0.5 * T * np.array([[0.0, 1.0], [-k, -0.1]])) for k in (2.3, 0.7)]
+    assert tangent.state == pytest.approx(halves[1] @ halves[0], abs=1e-12)

@@ -211,6 +211,21 @@ def _wall() -> System:
     )
 
 
+def _smooth_under_a_square_wave() -> System:
+    return System(
+        model=TwoMasses(), load=Load(frequency=0.8, force=saltus.Square(0.4, phase=0.3, duty=0.4))
+    )
+
+
+def _wall_under_pulses() -> System:
+    pulses = saltus.Table([0.0, 1.0, 1.0, 3.0], [0.4, 0.4, -0.2, -0.2])
+    return System(
+        model=saltus.WallOscillator(damping=0.2, wall=0.3),
+        load=Load(frequency=0.8, force=pulses),
+        impact=saltus.VelocityReduction(0.6),
+    )
+
+
 def _two_stops() -> System:
     return System(
         model=saltus.TwoStops(damping=0.2, left=-0.5, right=0.4),
@@ -296,6 +311,18 @@ CLASSES = (
         0.05,
     ),
     ModelClass("wall", "`WallOscillator`", _wall, {"x": 0.1}),
+    ModelClass(
+        "smooth, square wave",
+        "a smooth model under a `Square`",
+        _smooth_under_a_square_wave,
+        {"x": 0.1, "y": 0.0},
+    ),
+    ModelClass(
+        "wall, pulses",
+        "`WallOscillator` under a `Table` with jumps",
+        _wall_under_pulses,
+        {"x": 0.1},
+    ),
     ModelClass("two stops", "`TwoStops`", _two_stops, {"x": 0.1}),
     ModelClass("impact pair", "`ImpactPair`", _impact_pair, {"z": 0.1, "x": 0.1}),
     ModelClass(

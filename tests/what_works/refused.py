@@ -13,6 +13,7 @@ MANY = "lyapunov_many works on models with one coordinate"
 
 SEVERAL_COORDINATES = (
     "smooth",
+    "smooth, square wave",
     "impact pair",
     "both layers",
     "chain of cells",

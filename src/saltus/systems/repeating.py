@@ -109,7 +109,7 @@ class Repeating(Signal):
     period: `scale` times its shape, and a mean.
 
     Contract: a subclass gives `shape()`, its `Pieces`, which no number of the system changes;
-    `half_a_period_later()`; and `factors()`, the numbers (factor, mean) by which the value is factor shape + mean. `quantity` is
+    `half_a_period_later()` and `backward()`; and `factors()`, the numbers (factor, mean) by which the value is factor shape + mean. `quantity` is
     that of the signal: a force, or of a ground channel an acceleration or a displacement.
     """
 
@@ -145,6 +145,10 @@ class Repeating(Signal):
 
     def half_a_period_later(self) -> Repeating:
         """The signal as it is half a period later."""
+        raise NotImplementedError
+
+    def backward(self) -> Repeating:
+        """The signal with the time reversed."""
         raise NotImplementedError
 
     def pieces(self, level: int) -> Pieces:
@@ -262,6 +266,14 @@ class Wave(Repeating):
         """The wave as it is half a period later."""
         return dataclasses.replace(self, phase=float(self.phase) + math.pi)
 
+    def backward(self) -> Wave:
+        """w(-u) = -w(u), as of a sine: the wave with the other amplitude and phase."""
+        factor = 1.0 if self.quantity == "velocity" else -1.0
+        mean = -factor * self.mean
+        return dataclasses.replace(
+            self, amplitude=factor * self.amplitude, mean=mean, phase=-float(self.phase)
+        )
+
     def factors(self) -> tuple[Any, Any]:
         """The amplitude and the mean."""
         return self.amplitude, self.mean
@@ -307,6 +319,10 @@ class Square(Wave):
         settle_numbers(self, "duty")
         object.__setattr__(self, "duty", Setting(self.duty))
         Wave.__post_init__(self)
+
+    def backward(self) -> Square:
+        """The wave that is above its middle in the `duty` before a phase."""
+        return dataclasses.replace(self, phase=math.tau * self.duty - float(self.phase))
 
 
 @dataclass(frozen=True)
@@ -501,6 +517,18 @@ class Table(Repeating):
         given = {"times": self.times.tolist(), "values": self.values.tolist()}
         named = {name: getattr(self, name) for name in ("interpolation", "quantity", "scale")}
         return given | named
+
+    def backward(self) -> Table:
+        """The table read from its end, with steps as linear pieces between doubled times."""
+        times, values = self.times, self.values
+        if self.interpolation == "previous":
+            times = np.repeat(times, 2)[1:-1]
+            values = np.repeat(values[:-1], 2)
+        curve = "linear" if self.interpolation == "previous" else self.interpolation
+        sign = -1.0 if self.quantity == "velocity" else 1.0
+        return dataclasses.replace(
+            self, times=-times[::-1], values=sign * values[::-1], interpolation=curve
+        )
 
     def half_a_period_later(self) -> Table:
         """The table as it is half a period later."""

@@ -23,6 +23,7 @@ from saltus.number_ranges import number_range, settle_numbers
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
 from saltus.systems.load import Load
 from saltus.systems.model import Model
+from saltus.systems.repeating import Repeating
 from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
 from saltus.systems.system import System, check_system
 
@@ -110,6 +111,8 @@ def _reversed_signal(signal: Signal) -> Signal:
     if isinstance(signal, Record):
         sign = -1.0 if signal.quantity == "velocity" else 1.0
         return dataclasses.replace(signal, time=-signal.time[::-1], value=sign * signal.value[::-1])
+    if isinstance(signal, Repeating):
+        return signal.backward()
     raise ParameterError(f"a {type(signal).__name__} cannot be run backward")
 
 

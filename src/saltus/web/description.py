@@ -18,6 +18,9 @@ from saltus.errors import SaltusError, shown
 from saltus.flow import PortableMotion, state_names
 from saltus.number_ranges import BESIDE, NumberRange, ranges_of
 from saltus.systems import (
+    Constant,
+    Harmonic,
+    Signal,
     System,
     called_part,
     children,
@@ -100,7 +103,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
         + [
             {
                 "channel": name,
-                "kind": type(signal).__name__,
+                "kind": _kind(signal),
                 "parameters": below(signal, f"load.{name}"),
             }
             for name, signal in system.load.channels.items()
@@ -108,6 +111,13 @@ def description(motion: PortableMotion) -> dict[str, Any]:
         "numbers": list(entries.values()),
         "study": {"system": system.to_dict()},
     }
+
+
+def _kind(signal: Signal) -> str:
+    """The name of a signal's class; of a sum of others than constants and harmonics, "Mixture", as
+    a page cannot add them."""
+    plain = all(isinstance(term, (Constant, Harmonic)) for term in getattr(signal, "terms", ()))
+    return type(signal).__name__ if plain else "Mixture"
 
 
 def _stops(system: System) -> Iterator[dict[str, Any]]:
