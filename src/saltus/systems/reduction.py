@@ -196,7 +196,7 @@ class _Held:
         if not count:
             return np.zeros(0), np.zeros((self.size, 0))
         squares, shapes = self._dense(count) if self.size <= DENSE else self._sparse(count)
-        order = np.argsort(squares)
+        order = np.argsort(squares, kind="stable")
         return squares[order], shapes[:, order]
 
     def _dense(self, count: int) -> tuple[np.ndarray, np.ndarray]:
