@@ -179,14 +179,15 @@ class Load:
         own = [signal.corners for signal in self.channels.values()]
         return np.unique(np.concatenate([np.empty(0), *own]))
 
-    def corners_between(self, start: float, end: float) -> np.ndarray:
-        """The times of these corners between two times."""
-        shares = self.corners
-        if not shares.size or self.period is None:
-            return np.empty(0)
-        periods = np.arange(math.floor(start / self.period), math.ceil(end / self.period) + 1)
-        times = self.period * (periods[:, None] + shares).ravel()
-        return np.asarray(times[(start < times) & (times < end)])
+
+def corners_between(load: Load, start: float, end: float) -> np.ndarray:
+    """The times of a load's corners between two times."""
+    shares = load.corners
+    if not shares.size or load.period is None:
+        return np.empty(0)
+    periods = np.arange(math.floor(start / load.period), math.ceil(end / load.period) + 1)
+    times = load.period * (periods[:, None] + shares).ravel()
+    return np.asarray(times[(start < times) & (times < end)])
 
 
 class DeclaredLoad:

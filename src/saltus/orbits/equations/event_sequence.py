@@ -15,7 +15,7 @@ from saltus.flow import EventCode, EventKind, Motion
 from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
-from saltus.systems import Load, NaturalUnits, System, mass_rows
+from saltus.systems import Load, NaturalUnits, System, corners_between, mass_rows
 
 CHANGES = (
     EventCode.IMPACT,
@@ -222,7 +222,7 @@ def _corners(
 ) -> np.ndarray:
     """The times of the load's corners in a period, without those whose jump is an event itself, as
     it releases what rests."""
-    corners = motion.system.load.corners_between(motion.start, motion.time)
+    corners = corners_between(motion.system.load, motion.start, motion.time)
     corners = np.concatenate([corners + later for later in halves])
     jumps = [
         time
@@ -319,7 +319,7 @@ def _in_order(
 
 def _section_distance(motion: Motion, period: float) -> float:
     times = motion.events.times[np.isin(motion.events.codes[:, 0], CHANGES)]
-    corners = motion.system.load.corners_between(motion.start, motion.start + period)
+    corners = corners_between(motion.system.load, motion.start, motion.start + period)
     times = np.sort(np.concatenate([times, corners])) if times.size else times
     if not times.size:
         return 0.5
@@ -352,7 +352,7 @@ def section_of(
         bounds = np.unique(
             [
                 motion.start,
-                *motion.system.load.corners_between(motion.start, end),
+                *corners_between(motion.system.load, motion.start, end),
                 *(event.time for event in motion.events if motion.start < event.time < end),
                 end,
             ]
