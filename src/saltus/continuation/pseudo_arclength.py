@@ -73,6 +73,12 @@ class Units:
         """The largest of residuals (m,) as a share of their terms, which rounding is, too."""
         return float(np.abs(values / (self.residuals * self.terms)).max(initial=0.0))
 
+    def vanish(self, values: np.ndarray, tolerance: float) -> bool:
+        """Whether residuals (m,) are below a tolerance in their units, or rounding of their
+        terms."""
+        bounds = np.maximum(tolerance, NEWTON.converged * np.asarray(self.terms))
+        return bool((np.abs(values / self.residuals) < bounds).all())
+
     def length(self, step: np.ndarray, place: np.ndarray) -> float:
         """The largest component of a step from a place, in units of what it may be."""
         moved = np.abs(step / self.unknowns)

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from saltus.continuation import End
+from saltus.continuation import NEWTON, End
 from saltus.flow import SegmentEnd, SegmentExtremes, SegmentPlan
 from saltus.orbits.branches.beyond_grazing import admissible_direction, ends_at_another, repeats
 from saltus.orbits.branches.orbit_curve import OrbitPoint
@@ -57,6 +58,11 @@ class Switching:
         return cls(
             point, equations, evaluation, tuple(map(Timed, equations.signature.events, phases))
         )
+
+    @cached_property
+    def no_force(self) -> float:
+        """A reaction that is smaller, in natural units, is 0: the rounding of elastic forces."""
+        return max(TOLERANCES.touch, NEWTON.converged * self.equations.elastic_forces)
 
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
@@ -126,7 +132,7 @@ class Switching:
         seen = self.evaluation.seen
         for s in range(len(events)):
             here = events[s]
-            if abs(seen[s, SegmentExtremes.PULL]) < TOLERANCES.touch:
+            if abs(seen[s, SegmentExtremes.PULL]) < self.no_force:
                 contact = int(seen[s, SegmentExtremes.PULL + 1])
                 changed = here.event.closed ^ (1 << contact)
                 again = ModeChange(
@@ -138,7 +144,7 @@ class Switching:
                     replace(here, event=again),
                     *events[s + 1 :],
                 ]
-            if abs(seen[s, SegmentExtremes.TAIL]) < TOLERANCES.touch:
+            if abs(seen[s, SegmentExtremes.TAIL]) < self.no_force:
                 contact = int(seen[s, SegmentExtremes.TAIL + 1])
                 following = events[(s + 1) % len(events)]
                 phase = following.phase + (self.equations.closing if s + 1 == len(events) else 0.0)
@@ -192,14 +198,15 @@ class Switching:
         frequency = self.equations.frequency(self.point.solution.values)
         for place in (SegmentExtremes.GAP, SegmentExtremes.FORCE):
             s = int(np.argmin(seen[:, place]))
-            if abs(seen[s, place]) > TOLERANCES.touch:
+            is_force = place == SegmentExtremes.FORCE
+            if abs(seen[s, place]) > (self.no_force if is_force else TOLERANCES.touch):
                 continue
             contact = int(seen[s, place + 2])
             closed = int(self.equations.plan[s, SegmentPlan.ALONG])
             phase = float(seen[s, place + 1]) * frequency
             at = s + 1 if events else 0
             new = [Timed(ModeChange(True, contact, closed), phase)]
-            if place == SegmentExtremes.FORCE:
+            if is_force:
                 if bounces(self.equations.system, contact):
                     # the contact would bounce to rest after each closing, for which there are no
                     # equations yet
@@ -368,7 +375,7 @@ def _begun(here: Switching, events: list[Timed], known: tuple[Cycle, ...]) -> Or
     solved = curve.known(found[1], here.point.parameters)
     if solved is None:
         return None
-    if not found[0].units.residual(solved.evaluation.residual) < TOLERANCES.switching:
+    if not found[0].units.vanish(solved.evaluation.residual, TOLERANCES.switching):
         return None
     begun: OrbitPoint = curve.along_kernel(solved)
     return begun

@@ -261,9 +261,15 @@ class ContactsEquations(OrbitEquations):
         unknowns = np.append(state, np.ones(len(guards)))
         # forces, and gaps divided by a power of the time, are differences of elastic forces
         elastic = (rows[:, SegmentPlan.KIND] != EventCode.IMPACT) | (rows[:, SegmentPlan.POWER] > 0)
-        stiffness = max(1.0, (natural.time / natural.free_time) ** 2)
-        terms = np.append(np.where(elastic, stiffness, 1.0), np.ones(len(state)))
+        terms = np.append(np.where(elastic, self.elastic_forces, 1.0), np.ones(len(state)))
         return Units(unknowns, np.append(guards, state), self.is_phase, terms=terms)
+
+    @cached_property
+    def elastic_forces(self) -> float:
+        """The elastic forces of which a reaction is the difference, in natural units of force, at
+        least 1: rounding is a share of them."""
+        natural = self.natural
+        return max(1.0, (natural.time / natural.free_time) ** 2)
 
     @cached_property
     def is_phase(self) -> np.ndarray:
