@@ -355,6 +355,9 @@ def _centres(system: System, places: tuple[int, ...], load: Load) -> Iterator[tu
             yield (float(model.contact),)
         return
     centre, is_known = _middles(model, places)
+    # parts have their middle as centre, whatever that of the others is, which takes long to find
+    if _images_of_parts(system, places, tuple(centre.tolist())) is None:
+        return
     if not is_known.all():
         balanced = _balanced(system, places, load, centre, ~is_known)
         if balanced is None:
