@@ -122,3 +122,36 @@ def test_a_record_in_milliseconds_is_noticed() -> None:
 def test_numbers_without_an_end_are_refused() -> None:
     with pytest.raises(saltus.ParameterError, match="values"):
         as_numbers(itertools.count(), "values")
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Results of several kinds, by their names."""
+    orbit = saltus.find_orbit(SYSTEM, theta=0.3)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.99, 1.01))
+    motion = saltus.simulate(SYSTEM, theta=0.3, periods=2)
+    return {
+        "motion": motion,
+        "periodicorbit": orbit,
+        "branch": branch,
+        "verdict": saltus.classify(SYSTEM, theta=0.3),
+        "motionevents": motion.events,
+    }
+
+
+@pytest.mark.parametrize(
+    ("method", "function"),
+    [("save", "saltus.save("), ("to_netcdf", "saltus.save("), ("plot", "saltus.plot(")],
+)
+def test_a_method_of_other_packages_is_answered_with_the_function(results, method, function):
+    for result in results.values():
+        with pytest.raises(AttributeError) as refused:
+            getattr(result, method)
+        assert function in str(refused.value)
+        assert type(result).__name__ in str(refused.value)
+        assert not hasattr(result, "_repr_png_")  # as IPython asks of everything
+
+
+def test_a_time_that_is_no_number_is_refused_in_a_sentence():
+    with pytest.raises(saltus.ParameterError, match="time must be a finite number, got 'now'"):
+        saltus.lyapunov_spectrum(SYSTEM, theta=0.3, periods=40, time="now")

@@ -504,6 +504,8 @@ R = TypeVar("R", covariant=True)
 Kind = TypeVar("Kind")
 # a number or an array of numbers, which the type checker cannot tell, as arrays have many types
 Numbers: TypeAlias = Any
+# the velocity of a start: a number, or one for each coordinate
+Speeds: TypeAlias = float | Iterable[float] | np.ndarray
 
 
 class Checked(Protocol[P, R]):

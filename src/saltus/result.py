@@ -28,6 +28,20 @@ if TYPE_CHECKING:
 MOST_ENTRIES = 6  # the most entries of an array that is shown in a table
 
 
+# Methods that other packages have, and the function of saltus for them.
+FUNCTIONS = {
+    **dict.fromkeys(("save", "to_netcdf", "write", "dump"), 'saltus.save("result.nc", {})'),
+    **dict.fromkeys(("plot", "draw", "show"), "saltus.plot({})"),
+    "to_mat": 'saltus.to_mat("result.mat", {})',
+    "animate": 'saltus.animate({}, "film.mp4")',
+}
+
+
+def function_for(name: str, result: str) -> str:
+    """The hint to the function that does what a missing method would; empty without one."""
+    return f"; write {FUNCTIONS[name].format(result)}" if name in FUNCTIONS else ""
+
+
 class Result:
     """The result of a public function: `to_xarray` gives its dataset, which `saltus.plot` draws and
     `saltus.to_mat` writes.
@@ -51,6 +65,12 @@ class Result:
             The path of the file.
         """
         return to_csv(path, self)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            own = type(self).__name__
+            raise AttributeError(f"a {own} has no {name!r}{function_for(name, own.lower())}")
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value}' for name, value in self._facts().items())})"
@@ -326,6 +346,12 @@ class RowTable:
         import pandas
 
         return pandas.DataFrame(self._table())
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            own = type(self).__name__
+            raise AttributeError(f"{own} has no {name!r}{function_for(name, own.lower())}")
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the table as comma-separated text; returns the path.

@@ -25,7 +25,7 @@ from saltus.attractors.lyapunov.growth import LYAPUNOV
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
 from saltus.attractors.nonperiodic import FEWEST_ENTRIES, ZeroOne, excludes_tori, zero_one_of_bands
 from saltus.attractors.stroboscopic_section import Certificate, certify, stays_at_rest, with_clock
-from saltus.checks import Numbers, check_count, check_number
+from saltus.checks import Speeds, check_count, check_number
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, Ending, EventKind, Recurrence, find_recurrence, simulate
 from saltus.orbits import PeriodicOrbit
@@ -211,7 +211,7 @@ class _Case:
 def classify(
     system: System,
     *,
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     periods: int = 4000,
     transient: int = 500,
     max_period: int = RECURRENCE.compiled_max_period,

@@ -18,7 +18,7 @@ from saltus.flow import Motion, SegmentColumn, Validity, simulate
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
-from saltus.result import Result
+from saltus.result import Result, function_for
 from saltus.systems import System, arguments_of, middle_of, natural_units, state_of
 
 if TYPE_CHECKING:
@@ -548,7 +548,7 @@ class PeriodicOrbit(Result):
                 if name == "velocity"
                 else float(values[self.system.model.coordinates.index(name)])
             )
-        raise AttributeError(f"a PeriodicOrbit has no {name!r}")
+        raise AttributeError(f"a PeriodicOrbit has no {name!r}{function_for(name, 'orbit')}")
 
     @cached_property
     def validity(self) -> Validity:

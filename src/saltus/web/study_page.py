@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_number, with_answers
+from saltus.checks import Speeds, check_number, with_answers
 from saltus.errors import ParameterError, SaltusError, shown
 from saltus.files import check_writable, write_text
 from saltus.orbits import Branch, OrbitEnd
@@ -40,7 +40,7 @@ def page(
     path: Path | str | None = None,
     title: str = "",
     presets: Mapping[str, Mapping[str, float]] | None = None,
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,
@@ -117,7 +117,7 @@ def explore(
     system: System,
     *results: Any,
     title: str = "",
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,

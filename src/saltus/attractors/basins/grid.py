@@ -48,11 +48,12 @@ from saltus.checks import (
     check_work,
     checked_by,
 )
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, near
 from saltus.flow import check_device, on_device, state_names
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import (
+    Box,
     System,
     Window,
     check_reached,
@@ -231,10 +232,16 @@ class BasinSettings:
 
 
 SETTINGS = BasinSettings()
+# A misspelt one of these arrives among the coordinates.
+ARGUMENTS: tuple[str, ...]
+ARGUMENTS = ("window", "points", "velocity", "found", "periods", "within", "curves", "tol", "rows")
+ARGUMENTS += ("store", "workers", "scheduler", "device", "progress")
 
 
 def _check(
     system: System,
+    window: Any,
+    points: int,
     velocity: Any,
     found: Attractors | None,
     periods: int,
@@ -250,7 +257,8 @@ def _check(
     **coordinates: Any,
 ) -> None:
     check_device(device, system, workers, scheduler)
-    grid = _grid(with_clock(system), velocity, coordinates, found)
+    check_count("points", points, 2)
+    grid = _grid(with_clock(system), velocity, coordinates, found, window, points)
     axes = dict(zip(grid.plane, (grid.horizontal, grid.vertical), strict=True))
     for name in system.model.coordinates:
         check_reached(system.model, name, axes.get(name, grid.fixed[name]), name)
@@ -282,6 +290,8 @@ def _check(
 def basins_of_attraction(
     system: System,
     *,
+    window: Box | None = None,
+    points: int = SETTINGS.cells,
     velocity: Iterable[float] | None = None,
     found: Attractors | None = None,
     periods: int = SETTINGS.periods,
@@ -311,9 +321,14 @@ def basins_of_attraction(
     ----------
     system
         What moves, as for `find_attractors`.
+    window
+        The bounds of each coordinate, then of each velocity, as for `find_attractors`; by default
+        its window, or that of `found`. With several coordinates two state variables have two
+        different bounds, and the others keep their value.
+    points
+        The number of values along each of the two.
     velocity
-        The velocities of the grid, increasing; by default 201 over the window of `found`, or of
-        `find_attractors`.
+        The velocities of the grid themselves, increasing, in place of those of the window.
     found
         The attractors and their labels; by default those that `find_attractors` finds, over the
         grid.
@@ -338,9 +353,10 @@ def basins_of_attraction(
     progress
         Called with the fraction done and what is being done.
     coordinates
-        The coordinates of the grid, by the model's name: theta=np.linspace(-2, 2, 201). With
-        several coordinates two state variables are lists, such as theta_1 and theta_1_velocity; the
-        others are held fixed, by default at rest at their contacts, or at 0 without one.
+        The coordinates of the grid themselves, by the model's name: theta=np.linspace(-2, 2, 201).
+        With several coordinates two state variables are lists, such as theta_1 and
+        theta_1_velocity; the others are fixed, by default at rest at their contacts, or at 0
+        without one.
 
     Returns
     -------
@@ -356,13 +372,12 @@ def basins_of_attraction(
 
     Examples
     --------
-    >>> grid = np.linspace(-1.0, 1.0, 5)
-    >>> basins = saltus.basins_of_attraction(system, theta=grid, velocity=grid)
+    >>> basins = saltus.basins_of_attraction(system, window=((-1, 1), (-1, 1)), points=5)
     >>> np.unique(basins.label)
     array([1], dtype=int16)
     """
     clock = with_clock(system)
-    grid = _grid(clock, velocity, coordinates, found)
+    grid = _grid(clock, velocity, coordinates, found, window, points)
     progress(0.0, "attractors")
     if found is None:
         found = find_attractors(
@@ -484,11 +499,17 @@ def _around(system: System, grid: Grid) -> Window:
 
 
 def _grid(
-    system: System, velocity: Any, coordinates: Mapping[str, Any], found: Attractors | None
+    system: System,
+    velocity: Any,
+    coordinates: Mapping[str, Any],
+    found: Attractors | None,
+    window: Any,
+    points: int,
 ) -> Grid:
     """The plane of the initial states."""
     names = state_names(system.model.coordinates)
-    given = {n: v for n, v in coordinates.items() if v is not None}
+    known_names = {*names, *system.model.coordinates}
+    given = {n: v for n, v in coordinates.items() if v is not None or n not in known_names}
     if velocity is not None:
         given["velocity"] = velocity
     # the velocities of the last ones follow from the state
@@ -503,9 +524,13 @@ def _grid(
         if name not in chosen:
             known = ", ".join(f"{each}=..." for each in chosen)
             kind = "coordinate" if len(names) == 2 else "state variable"
+            like = near(name, [*chosen, *ARGUMENTS])
+            hint = like if like.startswith("did you mean") else f"give {known}"
             raise ParameterError(
-                f"{type(system.model).__name__} has no {kind} {name!r}; give {known}", name
+                f"{type(system.model).__name__} has no {kind} {name!r}; {hint}", name
             )
+    if window is not None:
+        return _grid_of_window(system, window, points, names, chosen, given)
     fixed = dict(zip(names, map(float, rest_state(system)), strict=True))
     varied = (
         [name for name in names if name in given and np.ndim(given[name]) > 0]
@@ -522,17 +547,50 @@ def _grid(
     for name in set(given) - {x, y}:
         check_number(name, given[name])
         fixed[name] = float(given[name])
-    window = check_window(None if found is None else found.window, system)
+    box = check_window(None if found is None else found.window, system)
     along, up = (
-        check_axis(n, given[n] if n in given else _over(system, window, names.index(n)))
+        check_axis(n, given[n] if n in given else _over(system, box, names.index(n), points))
         for n in (x, y)
     )
     return Grid((x, y), along, up, fixed)
 
 
-def _over(system: System, window: Window, place: int) -> np.ndarray:
+def _grid_of_window(
+    system: System,
+    window: Any,
+    points: int,
+    names: tuple[str, ...],
+    chosen: tuple[str, ...],
+    given: Mapping[str, Any],
+) -> Grid:
+    """The plane of a window: two state variables go over their bounds."""
+    if given:
+        name = next(iter(given))
+        raise ParameterError(
+            f"give window=... with points=..., or the values of the grid themselves ({name}=...),"
+            " not both",
+            "window",
+        )
+    bounds = dict(zip(names, check_window(window, system), strict=True))
+    varied = [name for name in chosen if bounds[name][0] < bounds[name][1]]
+    if len(varied) != 2:
+        raise ParameterError(
+            f"window must have two different bounds for two of {', '.join(chosen)}, and equal ones"
+            f" for the others, got different ones for {', '.join(varied) or 'none'}",
+            "window",
+        )
+    axes = []
+    for name in varied:
+        values = np.linspace(*bounds[name], points)
+        reached = name not in system.model.coordinates or system.model.reaches(name, values)
+        axes.append(values[reached] if np.ndim(reached) else values)
+    fixed = {name: float(low) for name, (low, _) in bounds.items()}
+    return Grid((varied[0], varied[1]), axes[0], axes[1], fixed)
+
+
+def _over(system: System, window: Window, place: int, points: int) -> np.ndarray:
     """Evenly spaced values of a state variable over a window, without those beyond a contact."""
-    values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, SETTINGS.cells)
+    values = window.centre[place] + window.half[place] * np.linspace(-1.0, 1.0, points)
     names = system.model.coordinates
     return np.asarray(
         values[system.model.reaches(names[place], values)] if place < len(names) else values

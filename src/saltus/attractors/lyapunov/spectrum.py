@@ -23,7 +23,7 @@ from saltus.attractors.lyapunov.growth import (
     uncertainty,
 )
 from saltus.bounds import Interval, Leaves, enclose, reads
-from saltus.checks import Numbers
+from saltus.checks import Speeds, check_number
 from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
 from saltus.progress import Progress, part_of, silent
 from saltus.result import Result, result_dataset
@@ -356,7 +356,7 @@ NAMES = ("periods", "transient", "tol", "two_trajectories", "progress")
 def lyapunov_spectrum(
     system: System,
     *,
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     periods: int = 1000,
     transient: int = 200,
     tol: float = 1e-12,
@@ -413,7 +413,8 @@ def lyapunov_spectrum(
     """
     check_run("lyapunov_spectrum", system, periods, transient, tol)
     run = _Run(system, periods)
-    begin = float(coordinates.pop("time", 0.0))  # as `PeriodicOrbit.start` gives it
+    begin = coordinates.pop("time", 0.0)  # as `PeriodicOrbit.start` gives it
+    check_number("time", begin)
     start = arguments_of(system, read_start(system, velocity, coordinates, NAMES))
     span = transient * run.length + (-begin) % run.length  # up to phase 0
     motion = simulate(system, **start, time=begin, duration=span, tol=tol, dense=False)

@@ -24,7 +24,7 @@ from saltus.flow.motion.events import (
 )
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.progress import html_table
-from saltus.result import Result, provenance, table_of
+from saltus.result import Result, function_for, provenance, table_of
 from saltus.systems import System
 
 if TYPE_CHECKING:
@@ -131,9 +131,10 @@ class Motion(Result):
     def __getattr__(self, name: str) -> Any:
         known = () if name.startswith("_") or name == "system" else self.system.model.coordinates
         if name not in known:
-            raise AttributeError(
-                f"a Motion has no {name!r}" + (f"; {near(name, known)}; {HAS}" if known else "")
+            hint = function_for(name, "motion") or (
+                f"; {near(name, known)}; {HAS}" if known else ""
             )
+            raise AttributeError(f"a Motion has no {name!r}{hint}")
         return self.position[known.index(name)] if len(known) > 1 else self.position
 
     def __repr__(self) -> str:

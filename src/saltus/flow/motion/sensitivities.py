@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_names, instants
+from saltus.checks import Numbers, Speeds, check_names, instants
 from saltus.errors import MotionError
 from saltus.flow.contacts.layout import ImpactDetail
 from saltus.flow.kernel.compiled import Program
@@ -233,7 +233,7 @@ def sensitivities(
     system: System,
     *,
     parameters: Iterable[str] = (),
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     periods: float | None = None,
     duration: float | None = None,
     tol: float = 1e-12,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import Numbers, check_count, check_names, check_number
+from saltus.checks import Speeds, check_count, check_names, check_number
 from saltus.errors import MotionError
 from saltus.flow import (
     RECURRENCE,
@@ -66,7 +66,7 @@ SETTINGS = FindOrbitSettings()
 def find_orbit(
     system: System,
     *,
-    velocity: Numbers = 0.0,
+    velocity: Speeds = 0.0,
     period: int | None = None,
     settle: int | None = None,
     max_period: int = SETTINGS.max_period,
