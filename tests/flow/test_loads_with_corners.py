@@ -314,3 +314,22 @@ def test_meissners_equation_has_the_multipliers_of_its_two_halves():
     tangent = sensitivities(system, x=0.1, velocity=0.2, periods=1)
     halves = [expm(0.5 * T * np.array([[0.0, 1.0], [-k, -0.1]])) for k in (2.3, 0.7)]
     assert tangent.state == pytest.approx(halves[1] @ halves[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("periods", [3, 2.5])
+def test_derivatives_at_the_end_of_a_period_that_is_a_corner(periods):
+    """The end moves with the corner, so that the rates before the jump count."""
+    system = System(
+        model=WallOscillator(wall=0.3, damping=0.1),
+        load=Load(frequency=W, force=Square(0.8)),
+        impact=VelocityReduction(0.8),
+    )
+    start = {"x": -0.5, "velocity": 0.1, "periods": periods}
+    tangent = sensitivities(system, parameters=["load.frequency"], **start)
+    h = 1e-6
+    ends = []
+    for step in (h, -h, 2 * h, -2 * h):
+        motion = simulate(system.with_({"load.frequency": W + step}), **start)
+        ends.append(np.array([motion.x, motion.velocity]))
+    slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+    assert tangent.parameters[:, 0] == pytest.approx(slope, abs=2e-7)

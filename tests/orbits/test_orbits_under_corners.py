@@ -121,3 +121,24 @@ def test_attractors_exponents_and_energies_of_an_impact_oscillator_under_pulses(
     energy = saltus.energies(orbit)["energy"].to_series()
     lost = energy.drop(["load.force", "kinetic", "potential"]).sum()
     assert energy["load.force"] == pytest.approx(lost, abs=1e-12)
+
+
+def test_curves_of_folds_and_symmetry_breakings_pass_those_of_other_branches():
+    """At another amplitude the curve has the values that a branch there has.
+
+    Perturbations of a BPC come back with the other sign: their derivative to the frequency needs
+    the rates at the start of the motion, not those at its end."""
+    system = System(model=Duffing(), load=Load(frequency=1.1, force=Square(26.0)))
+    orbit = saltus.find_orbit(system, x=0.0)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.5))
+    other = system.with_({"load.force.amplitude": 25.0})
+    there = saltus.continue_orbit(saltus.find_orbit(other, x=0.0), "load.frequency", (0.8, 1.5))
+    for kind in ("LP", "BPC"):
+        special = max(
+            (point for point in branch.special if point.kind == kind),
+            key=lambda point: point.parameter,
+        )
+        expected = max(point.parameter for point in there.special if point.kind == kind)
+        curve = saltus.continue_special(special, "load.force.amplitude", (24.9, 26.1))
+        (found,) = curve.at("load.force.amplitude", 25.0)
+        assert found.frequency == pytest.approx(expected, abs=1e-8)

@@ -564,8 +564,25 @@ def _end_shift(
     return shift
 
 
+# A motion that ends at a corner of its load, up to this share of the forcing period, ends before it:
+# the rates there are extrapolated from two instants so far before.
+AT_CORNER, BEFORE_CORNER = 1e-10, 1e-7
+
+
 def state_rates(motion: Motion) -> np.ndarray:
     """The time derivative of the state at the end of a motion, (2 degrees of freedom,)."""
+    load = motion.system.load
+    if load.period is not None and load.corners.size:
+        share = motion.time / load.period
+        if (np.abs((share - load.corners + 0.5) % 1.0 - 0.5) < AT_CORNER).any():
+            step = BEFORE_CORNER * load.period
+            near, far = (_rates_at(motion, motion.time - k * step) for k in (1, 2))
+            return 2.0 * near - far
+    return _rates_at(motion, motion.time)
+
+
+def _rates_at(motion: Motion, time: float) -> np.ndarray:
+    """The same with the load of a time."""
     system = motion.system
     side = motion.side
     velocity = np.atleast_1d(motion.velocity)
@@ -589,11 +606,11 @@ def state_rates(motion: Motion) -> np.ndarray:
         free = [float(name not in held) for name in system.model.coordinates]
         q = motion.position
         acceleration = solved_motion(
-            system.model, motion.time, q, motion.velocity, system.load, free, slides
+            system.model, time, q, motion.velocity, system.load, free, slides
         ).acceleration
     else:
         acceleration = system.model.acceleration(
-            motion.time, motion.position, motion.velocity, float(side), system.load
+            time, motion.position, motion.velocity, float(side), system.load
         )
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
 

@@ -365,7 +365,10 @@ class WholeMotionEquations(OrbitEquations):
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
-            before = self.turned(rates) if self.signature.symmetric else rates
+            assert motion.dense is not None
+            # not those at the end, which differ where perturbations return with the other sign
+            first = motion.dense.series[0]
+            before = np.concatenate([first[:, 1], 2.0 * first[:, 2]])
             parameters[:, self.paths.index(FREQUENCY)] -= (
                 (rates - found.state @ before) * phase / frequency**2
             )
