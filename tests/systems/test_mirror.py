@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import saltus
+import saltus.systems.mirror as mirror_module
 from saltus.orbits import is_symmetric
 from saltus.systems import image_of, mirror_of
 from saltus.systems.load import reversed_load
@@ -227,3 +228,20 @@ def test_a_declared_mirror_that_is_none_is_refused_and_one_that_is_not_given_is_
             return None
 
     assert mirror_of(under(Without())) is None
+
+
+def test_no_centre_is_looked_for_where_a_contact_has_no_image(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It takes long for many coordinates, and none is the centre of a stop on one side."""
+    looked_for = []
+    monkeypatch.setattr(mirror_module, "_balanced", lambda *_: looked_for.append(1))
+    stop = saltus.Contact(name="stop", coordinate=0, position=0.3, sign=-1)
+    for stops in ([stop], [stop, saltus.Contact(name="other", coordinate=0, position=-0.1)]):
+        chain = saltus.Structure(
+            mass=np.eye(3), stiffness=np.diag([2.0, 2.0, 1.0]), contacts=stops, forces={"push": 2}
+        )
+        load = saltus.Load(frequency=1.0, push=saltus.Harmonic(0.1))
+        system = saltus.System(model=chain, load=load, impact=saltus.NewtonImpact(0.5))
+        assert mirror_module.mirror_of(system) is None
+        assert len(looked_for) > 0 if len(stops) > 1 else not looked_for
