@@ -351,6 +351,7 @@ LONGEST = {
     "soft_stop.py",
     "beam_on_stop.py",
     "beam_on_hard_stop.py",
+    "large_beam_with_stop.py",
     "identification.py",
     "overturning_spectrum.py",
     "rubbing_absorber.py",

@@ -12,7 +12,7 @@ GROUPS = {  # by subject, as the first paragraph of the gallery lists them
         "rocking_block housner overturning overturning_spectrum at2_record record falling_block"
     ),
     "Friction, backlash, soft stops": "belt stribeck rubbing_absorber backlash bilinear soft_stop",
-    "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop",
+    "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop large_beam_with_stop",
     "Harvesters and coordinates of first order": "harvester piezo_harvester",
     "Orbits, branches, spectra": (
         "orbits period_doubling resting_orbit proved_orbit proved_fold response_spectrum duffing square_wave smoothing"
