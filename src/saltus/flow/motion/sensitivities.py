@@ -577,7 +577,7 @@ def state_rates(motion: Motion) -> np.ndarray:
         if (np.abs((share - load.corners + 0.5) % 1.0 - 0.5) < AT_CORNER).any():
             step = BEFORE_CORNER * load.period
             near, far = (_rates_at(motion, motion.time - k * step) for k in (1, 2))
-            return 2.0 * near - far
+            return np.asarray(2.0 * near - far)
     return _rates_at(motion, motion.time)
 
 

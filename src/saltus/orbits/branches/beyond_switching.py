@@ -62,7 +62,7 @@ class Switching:
     @cached_property
     def no_force(self) -> float:
         """A reaction that is smaller, in natural units, is 0: the rounding of elastic forces."""
-        return max(TOLERANCES.touch, NEWTON.converged * self.equations.elastic_forces)
+        return max(TOLERANCES.touch, NEWTON.converged * float(self.equations.elastic_forces))
 
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
