@@ -2,7 +2,7 @@
 motion with which it begins.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -87,9 +87,9 @@ def block():
 class Bilinear(saltus.OneContactModel):
     """An oscillator with one stiffness on each side of x = 0, the model of the page on pages."""
 
-    stiffness: float = 1.0
-    stop_stiffness: float = 9.0
-    damping: float = 0.05
+    stiffness: float = field(default=1.0, metadata=saltus.number_range(above=0.0))
+    stop_stiffness: float = field(default=9.0, metadata=saltus.number_range(above=0.0))
+    damping: float = field(default=0.05, metadata=saltus.number_range(at_least=0.0))
 
     coordinates = ("x",)
     channels = ("force",)

@@ -154,6 +154,7 @@ WITHOUT = {
             "saltus.capture_speed",
             "saltus.excludes_tori",
             "saltus.mean_dissipated_power",
+            "saltus.number_range",
             "saltus.energy_gain",
         ),
         NUMBER,

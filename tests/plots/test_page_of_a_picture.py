@@ -1,5 +1,7 @@
 """What a picture is asked for: its legend, title, size, density and style."""
 
+import warnings
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -50,6 +52,26 @@ def test_a_legend_stands_where_it_is_asked_for(branch, place, count, inside):
         assert box.y1 <= panel.y0 if place != "right" else box.x0 >= panel.x1
         assert box.x0 >= 0.0
         assert box.x1 <= ax.figure.bbox.width
+
+
+def test_a_legend_that_needs_half_of_the_width_stands_below(branch):
+    narrow = saltus.plot(branch, legend="right", size=(60, 100))
+    wide = saltus.plot(branch, legend="right", size=(150, 62))
+    for ax, below in ((narrow, True), (wide, False)):
+        ax.figure.draw_without_rendering()
+        (legend,) = ax.figure.legends
+        box = legend.get_window_extent()
+        assert (box.y1 <= ax.get_window_extent().y0) == below
+        assert ax.get_position().width > 0.5
+
+
+def test_a_size_without_room_for_the_panels_is_noticed(branch):
+    with pytest.warns(UserWarning, match="leaves a panel"):
+        saltus.plot(branch, size=(60, 30))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        saltus.plot(branch, size=(90, 65))
+        saltus.plot(branch, size=(60, 30), legend=False)
 
 
 def test_given_axes_keep_the_legends_of_their_figure(branch):

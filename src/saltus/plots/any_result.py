@@ -7,7 +7,9 @@ loads overturn a block.
 from __future__ import annotations
 
 import json
+import math
 import textwrap
+import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
 from inspect import signature
@@ -320,7 +322,8 @@ def plot(
         or a branch. A tuple of such results, as `switch_branch` and `separatrices` return it, is
         drawn into the same axes.
     legend
-        Where the legend is: "inside" the axes, "below" or to the "right" of them, or False for
+        Where the legend is: "inside" the axes, "below" or to the "right" of them (below where that
+        would take nearly half of the width), or False for
         none. A new figure has it below, where it covers nothing; given axes have it inside.
     title
         A title above the picture.
@@ -358,6 +361,7 @@ def plot(
     figure = figure_of(axes)
     if isinstance(size, tuple):
         figure.set_size_inches(size[0] / 25.4, size[1] / 25.4)
+        _notice_narrow_panels(figure, size)
     if dpi is not None:
         figure.set_dpi(dpi)
     if not into_given:
@@ -388,6 +392,31 @@ def _place_of_legend(legend: Any) -> str | None:
             f'legend must be "inside", "below", "right" or False, got {shown(legend)}', "legend"
         )
     return named[legend]
+
+
+LEAST_PANEL = 12.0  # mm: labels of an axis overlap on a lower or narrower panel
+
+
+def _notice_narrow_panels(figure: Any, size: tuple[float, float]) -> None:
+    """Warn where a size leaves the panels no room, as legends and labels keep theirs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # Matplotlib's, of what is said below
+        figure.draw_without_rendering()
+    bars = "<colorbar>"
+    panels = [
+        ax.get_position()
+        for ax in figure.axes
+        if ax.get_visible() and ax.axison and ax.get_label() != bars
+    ]
+    widths = [panel.width * size[0] for panel in panels]
+    heights = [panel.height * size[1] for panel in panels]
+    least = min(*widths, *heights, math.inf)
+    if least < LEAST_PANEL:
+        text = (
+            f"size={size} leaves a panel {least:.0f} mm for its shorter side, so that labels"
+            " overlap; give a larger size, or legend=False"
+        )
+        warnings.warn(text, UserWarning, stacklevel=4)
 
 
 def _check_size(size: Any, dpi: Any, into_given: bool, has_width: bool) -> None:

@@ -218,6 +218,12 @@ def outside_legend(figure: Any, **options: Any) -> None:
     if figure.get_layout_engine() is None:
         figure.set_layout_engine("constrained")
     if place == "right":
+        texts = [*map(str, options.get("labels", ())), *(options.get("title") or "").split("\n")]
+        room = 25.4 * figure.get_figwidth()
+        if _entry_width(texts) > MOST_LEGEND * room:  # the axes would have too little of the rest
+            place = "below"
+            rows = len(options.get("labels", ())) + (options.get("title") or "").count("\n")
+            figure.set_figheight(figure.get_figheight() + rows * LEGEND_ROW / 25.4)
         options["ncols"] = 1
     figure.legend(
         loc="outside right upper" if place == "right" else "outside lower center", **options
@@ -261,12 +267,18 @@ def legend_of(
 
 
 LEGEND_ROW = 3.6  # mm, the height of a line of a legend
+MOST_LEGEND = 0.45  # the largest share of a figure's width that a legend beside the axes may take
 
 
 def _columns(texts: list[str], width: float) -> int:
     """How many columns of these labels fit side by side into a figure, whose width is in inches."""
+    return max(1, int(25.4 * width / _entry_width(texts)))
+
+
+def _entry_width(texts: list[str]) -> float:
+    """About how wide the longest entry of a legend is, in mm."""
     letters = max(len(re.sub(r"\\\w+|[${}^_\\]", "", text)) for text in texts)
-    return max(1, int(25.4 * width / (1.35 * letters + 12.0)))
+    return 1.35 * letters + 12.0
 
 
 def marks_of(ax: Axes) -> dict[str, Any]:

@@ -68,14 +68,19 @@ export function pythonRepr(value) {
   return text.replace(/e([+-])(\d)$/, "e$10$2");
 }
 
+/** A distance of few digits, so that the end of a slider fits into its box. @param {number} distance */
+function short(distance) {
+  return Number(distance.toPrecision(1));
+}
+
 /** The range of a slider within what Python takes. @param {NumberEntry} entry @returns {NumberEntry} */
 export function withinBounds(entry) {
   const { least, most } = entry.range ?? {};
   const least_ = Math.max(entry.low, least?.end ?? -Infinity);
   const most_ = Math.min(entry.high, most?.end ?? Infinity);
   const aside = (most_ - least_) / ASIDE;
-  const low = least && !least.taken && least_ === least.end ? least_ + aside : least_;
-  const high = most && !most.taken && most_ === most.end ? most_ - aside : most_;
+  const low = least && !least.taken && least_ === least.end ? least_ + short(aside) : least_;
+  const high = most && !most.taken && most_ === most.end ? most_ - short(aside) : most_;
   return low < high ? { ...entry, low, high } : entry;
 }
 
