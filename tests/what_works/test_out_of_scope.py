@@ -106,6 +106,18 @@ def test_what_is_out_of_scope_is_refused_in_one_sentence(made, words):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: saltus.Step(amplitude=-5.0, start=20.0, quantity="displacement"),
+        lambda: saltus.Record([0.0, 1.0, 1.0, 2.0], [0.0, 0.0, -5.0, -5.0], quantity="velocity"),
+    ],
+)
+def test_a_ground_that_jumps_is_two_motions(made):
+    with pytest.raises(saltus.ParameterError, match="is two motions: end the first one there"):
+        made()
+
+
 def test_a_force_without_a_series_ends_the_motion_in_one_sentence():
     """The mass falls back to x = 0, where x^1.5 has none."""
     with pytest.raises(saltus.SaltusError) as refusal:

@@ -78,9 +78,10 @@ class Load:
     """The loads on a system: `Load(frequency=Omega, horizontal=Harmonic(amplitude=H),
     vertical=-0.5)`.
 
-    Each channel is a number, a `Harmonic`, a `Record`, a pulse such as `HalfSine` or `Step`, a wave
-    with corners such as `Square`, a `Table`, or a sum of them, which may be written as a list; a channel that is not named is 0. Channels that begin with
-    `ground` are displacements of the ground (zeta, nu), all others forces. Frozen.
+    A channel is a number, a `Harmonic`, a `Record`, a `Table`, a pulse such as `HalfSine` or
+    `Step`, or a wave with corners such as `Square`. It may be a sum of these, written as one or as
+    a list; a channel that is not named is 0. Channels that begin with `ground` are displacements of
+    the ground (zeta, nu), all others forces. Frozen.
 
     The paper's loads: (i) `loadpatha`, `Load(frequency=W, horizontal=Harmonic(amplitude=H),
     vertical=-0.5)`; (ii) `loadpathaa`, `Load(frequency=W, ground_horizontal=Harmonic(amplitude=z),

@@ -380,8 +380,8 @@ TABLE_CURVES = ("linear", "previous", "cubic")
 class Table(Repeating):
     """A load that repeats itself, by its values at times over one forcing period.
 
-    The time from the first to the last sample is one forcing period, so that the table may be in
-    shares of it, from 0 to 1, or in any other unit of time. A time that is given twice is a jump,
+    The time from the first to the last sample is one forcing period. The times may so be in any
+    unit, such as shares of the period from 0 to 1. A time that is given twice is a jump,
     from the first of its two values to the second. A load that happens once is a `Record`, which
     takes doubled times too.
 

@@ -206,6 +206,10 @@ CURVES = {
     "velocity": ("spline", "linear", "monotone"),
     "displacement": ("spline", "monotone"),
 }
+JUMPING_GROUND = (
+    "; a ground that jumps is two motions: end the first one there, and begin the next one from its"
+    " state over the ground in its new place"
+)
 # the share of the range of its samples by which a spline may leave it: those of sampled motions do
 # so by some per cent, those through corners by more
 SWING = 0.2
@@ -341,9 +345,11 @@ class Record(Signal):
             follows[[0, -1]] &= steps[[0, -1]] > 0.0
         if not follows.all():
             bad = int(np.argmin(follows)) + 1
+            moves = time[bad] == time[bad - 1] and self.quantity in ("displacement", "velocity")
+            hint = JUMPING_GROUND if moves else "; sort the file"
             raise ParameterError(
                 f"{where}: times must increase, but sample {bad} has {time[bad]:g} after "
-                f"{time[bad - 1]:g}; sort the file",
+                f"{time[bad - 1]:g}{hint}",
                 "time",
             )
         with np.errstate(over="ignore"):
@@ -613,9 +619,10 @@ class Transient(Signal):
 
     def __post_init__(self) -> None:
         if self.quantity not in self.quantities:
+            moves = self.quantity in ("displacement", "velocity")
             raise ParameterError(
                 f"quantity of a {type(self).__name__} must be one of "
-                f"{', '.join(self.quantities)}, got {self.quantity!r}",
+                f"{', '.join(self.quantities)}, got {self.quantity!r}{JUMPING_GROUND * moves}",
                 "quantity",
             )
         settle_numbers(self)
