@@ -26,6 +26,10 @@ from saltus.kinds import check_kinds, check_switches, check_together, switches_o
 from saltus.progress import silent, watched
 
 
+class ManyNumbers(np.ndarray):
+    """A number of a system for each of many motions. Each motion's own system checks it."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """The most that may be asked for, on any machine; the memory that a request needs is estimated

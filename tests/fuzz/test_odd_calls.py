@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
+import sympy
 
 import saltus
 from saltus.errors import MotionError, ParameterError
@@ -22,6 +24,8 @@ CELL = saltus.System(
     load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.3), vertical=-0.5),
 )
 FREE = saltus.System(model=saltus.Metainterface(beta0=1.4), load=saltus.Load(vertical=-0.5))
+PLACE, RATE = sympy.symbols("x v")
+
 LOADS = ("load.horizontal.amplitude", "load.vertical")
 THEORY = saltus.theory
 ODD: dict[str, Any] = {"list": [1], "dict": {"a": 1}, "nan": math.nan, "inf": math.inf}
@@ -36,6 +40,19 @@ CALLS: dict[str, Callable[[], Any]] = {
     "special list": lambda: saltus.chaotic_bands(
         WALL, "load.frequency", BOUNDS, special=ODD["list"]
     ),
+    "theta rows": lambda: saltus.simulate(CELL, theta=[[1, 2], [3]]),
+    "theta load": lambda: saltus.classify(CELL, theta=CELL.load),
+    "time rows": lambda: saltus.Measurement(
+        start={"theta": 0.3}, time=[[1, 2], [3]], values={"theta": [0.3, 0.2]}
+    ),
+    "time text": lambda: saltus.lyapunov_spectrum(CELL, theta=0.3, time="x"),
+    "fps": lambda: saltus.animate(saltus.simulate(CELL, theta=0.3, periods=1), "a.gif", fps=1e-9),
+    "tau": lambda: THEORY.energy_factor(CELL, velocity=0.3, side=1, e=0.9, tau=ODD["nan"]),
+    "theta0 nan": lambda: THEORY.short_period(ODD["nan"], beta0=1.4, vertical=-0.5),
+    "side nan": lambda: THEORY.total_energy(FREE, theta=0.1, velocity=0.1, side=ODD["nan"]),
+    "force nan": lambda: saltus.from_sympy(
+        coordinates=[PLACE], velocities=[RATE], force=[sympy.nan], parameters={}
+    ),
     "coordinates": lambda: saltus.frequency_sweep(CELL, values=[1.0, 1.1], coordinates=[]),
     "model.beta0 list": lambda: THEORY.amplitude_limits(CELL, {"model.beta0": ["a"]}),
     "model.damping nan": lambda: THEORY.amplitude_limits(CELL, {"model.damping": math.nan}),
@@ -45,7 +62,6 @@ CALLS: dict[str, Callable[[], Any]] = {
     "physical list": lambda: saltus.UnitCell(alpha0=0.3, beta0=1.4, physical=ODD["list"]),
     "physical nan": lambda: saltus.UnitCell(alpha0=0.3, beta0=1.4, physical=ODD["nan"]),
     "velocity fast": lambda: saltus.simulate(CELL, theta=0.1, velocity=1e9, duration=10.0),
-    "velocity many": lambda: saltus.simulate_many(CELL, theta=0.1, velocity=[1e9], duration=10.0),
     "special dict": lambda: saltus.chaotic_bands(
         WALL, "load.frequency", BOUNDS, special=ODD["dict"]
     ),
@@ -98,3 +114,9 @@ def test_a_free_orbit_too_near_its_contact_is_refused() -> None:
 def test_a_motion_that_would_take_far_too_many_steps_is_refused_early() -> None:
     with pytest.raises(MotionError, match=r"would take some \de\+\d\d steps"):
         saltus.simulate(CELL, theta=0.1, velocity=5e5, duration=1e4)
+
+
+def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
+    (tmp_path / "motion.mat").mkdir()
+    with pytest.raises(ParameterError, match="cannot be written"):
+        saltus.to_mat(tmp_path / "motion.mat", saltus.simulate(CELL, theta=0.3, periods=1))

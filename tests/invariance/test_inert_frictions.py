@@ -165,3 +165,15 @@ def test_lanes_that_vary_a_coefficient_from_0_on() -> None:
         motion = saltus.simulate(one, x=0.3, velocity=0.1, periods=3)
         assert float(ends["x"][i]) == pytest.approx(motion.position, abs=1e-9)
         assert bool(len(motion.events)) == (value > 0.0)
+
+
+def test_coefficients_of_an_ensemble_beside_sums() -> None:
+    _, inert, start = drawn(3)
+    path = "model.coefficient"
+    coefficients = np.array([0.0, 0.05, 0.1])
+    asked: dict[str, Any] = {"velocity": (0.0, 0.0, 0.0), "duration": 2.0, **start}
+    many = saltus.simulate_many(inert, parameters={path: coefficients}, **asked)
+    for i, coefficient in enumerate(coefficients):
+        one = saltus.simulate(inert.with_({path: float(coefficient)}), **asked)
+        found = [float(many[name][i]) for name in ("a", "b", "s")]
+        assert found == pytest.approx(one.final_state[:3], abs=1e-12)

@@ -261,7 +261,13 @@ def to_mat(path: str | Path, result: xarray.Dataset | xarray.DataTree | Result) 
         raise ParameterError("path must name a file, such as motion.mat", "path")
     buffer = io.BytesIO()
     savemat(buffer, _struct(data), long_field_names=True, do_compression=True, oned_as="column")
-    return write_bytes(path if path.suffix else path.with_suffix(".mat"), buffer.getvalue())
+    path = path if path.suffix else path.with_suffix(".mat")
+    try:
+        return write_bytes(path, buffer.getvalue())
+    except OSError as error:
+        raise ParameterError(
+            f"{path} cannot be written ({(error.strerror or str(error)).lower()})", "path"
+        ) from error
 
 
 def _struct(node: Any) -> dict[str, Any]:

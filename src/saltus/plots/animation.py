@@ -87,9 +87,10 @@ def animate(
     ('cell.gif', True)
     """
     file = None if path is None else Path(path)
-    writer = None if file is None else _writer(file, fps)
+    # GIF counts the hundredths of a second of a picture in two bytes
+    check_number("fps", fps, at_least=0.01, at_most=240.0)
     check_number("seconds", seconds, above=0.0, at_most=3600.0)
-    check_number("fps", fps, above=0.0, at_most=240.0)
+    writer = None if file is None else _writer(file, fps)
     check_number("width", width, at_least=NARROWEST, at_most=WIDEST, unit="mm")
     # of the class, as a load takes any name for a channel
     motion = result.motion() if callable(getattr(type(result), "motion", None)) else result

@@ -66,7 +66,7 @@ class Measurement:
     def __post_init__(self) -> None:
         for name in ("time", "impacts"):
             given = getattr(self, name)
-            empty = isinstance(given, (list, tuple, np.ndarray)) and not np.size(given)
+            empty = isinstance(given, (list, tuple, np.ndarray)) and len(given) == 0
             times = np.empty(0) if empty else np.ravel(as_numbers(given, name))
             if not empty and not times.size:
                 raise ParameterError(f"{name} must be increasing numbers, got {shown(given)}", name)

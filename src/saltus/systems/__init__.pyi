@@ -67,7 +67,6 @@ from .states import Window as Window
 from .states import arguments_of as arguments_of
 from .states import before_impacts as before_impacts
 from .states import check_reached as check_reached
-from .states import check_turns as check_turns
 from .states import check_window as check_window
 from .states import even_steps as even_steps
 from .states import held_by_contacts as held_by_contacts

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from saltus.checks import LIMITS, number_problem
+from saltus.checks import LIMITS, ManyNumbers, number_problem
 from saltus.errors import ParameterError, shown
 from saltus.number_ranges import number_range, ranges_of
 from saltus.systems.load import LoadOnSides, Sides
@@ -274,8 +274,10 @@ COMPLEX_STEP = 1e-100
 
 def _is_number(value: Any) -> bool:
     """Whether a value is given, and is not a parameter of a model whose equations are traced: such
-    a symbol can be computed with, and is no array.
+    a symbol can be computed with, and is no array but that of many motions.
     """
+    if isinstance(value, ManyNumbers):
+        return False
     symbol = hasattr(value, "__radd__") and not hasattr(value, "__array__")
     return not symbol or isinstance(value, (Complex, Decimal, timedelta))
 

@@ -117,6 +117,8 @@ def from_sympy(
             raise ParameterError(
                 f"{what} must be an expression of SymPy, got {shown(expression)}", what
             ) from None
+        if given.has(sympy.nan, sympy.oo, -sympy.oo, sympy.zoo):
+            raise ParameterError(f"{what} must be finite, got {shown(expression)}", what)
         for symbol in sorted(given.free_symbols, key=str):
             if symbol not in names.values() or str(symbol)[0] not in allowed:
                 known = ", ".join(map(str, [*coordinates, *parameters]))

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -79,16 +79,17 @@ def read_start(
     for i, value in enumerate(values):
         if not (type(value) is float and abs(value) <= most):
             name = in_order[i] if i < len(in_order) else "velocity"
-            if _is_sequence(value) and np.size(value) != 1:
+            if _is_sequence(value) and not _is_one(value):
                 raise ParameterError(
                     f"{name} must be a finite number, got {shown(value, 40)}; for many starts at "
                     "once use simulate_many",
                     name,
                 )
             check_number(name, _plain(value))
-    for i, most in _fastest_turns(system):
-        if abs(values[len(in_order) + i]) > most:
-            _refuse_turns(values[len(in_order) + i], most)
+    # the natural time, which takes longer to find than a short motion, is no longer than the load's
+    usual = TURNS * (system.load.frequency or TURNS**-0.5)
+    if any(abs(speed) > usual for speed in values[len(in_order) :]):
+        _check_turns(system, values[len(in_order) :])
     return system._with_rates(time, np.array(values, dtype=float))
 
 
@@ -118,40 +119,18 @@ def read_starts(
     return list(positions), list(speeds)
 
 
-def check_turns(system: System, speeds: Iterable[Any]) -> None:
-    """Refuse speeds of angles, a number or an array for each coordinate, with which a motion takes
-    for ever.
-
-    Raises
-    ------
-    ParameterError
-        The error has the largest speed.
-    """
-    given = list(speeds)
-    for i, most in _fastest_turns(system):
-        if (fastest := np.max(np.abs(np.asarray(given[i])), initial=0.0)) > most:
-            _refuse_turns(float(fastest), most)
-
-
-def _fastest_turns(system: System) -> tuple[tuple[int, float], ...]:
-    """The places of the coordinates that are angles, with their largest speeds."""
-
-    def made() -> tuple[tuple[int, float], ...]:
-        model = system.model
-        places = [i for i, name in enumerate(model.coordinates) if model.unit_of(name) in ANGLES]
-        most = TURNS / natural_units(system).time if places else 0.0
-        return tuple((i, most) for i in places if i < len(model.moving))
-
-    found: tuple[tuple[int, float], ...] = system._remembered(_fastest_turns, made)
-    return found
-
-
-def _refuse_turns(speed: float, most: float) -> None:
-    raise ParameterError(
-        f"velocity must be at most {most:.3g} in size for an angle, got {speed:.6g}: the motion"
-        " would turn by a million radians in a natural time, and take for ever",
-        "velocity",
-    )
+def _check_turns(system: System, speeds: Sequence[float]) -> None:
+    """Refuse speeds of angles with which a motion takes for ever."""
+    model = system.model
+    most = TURNS / natural_units(system).time
+    for name, speed in zip(model.coordinates, speeds, strict=True):
+        if model.unit_of(name) in ANGLES and abs(speed) > most:
+            raise ParameterError(
+                f"velocity must be at most {most:.3g} in size for {name}, an angle, got"
+                f" {speed:.7g}: the motion would turn by a million radians in a natural time, and"
+                " take for ever",
+                "velocity",
+            )
 
 
 def _positions(
@@ -201,8 +180,14 @@ def _is_sequence(value: Any) -> bool:
     sequence.
     """
     return isinstance(value, (tuple, list)) or (
-        not hasattr(value, "dims") and getattr(value, "ndim", 0) > 0
+        not hasattr(value, "dims") and isinstance(value, np.ndarray) and value.ndim > 0
     )
+
+
+def _is_one(value: Any) -> bool:
+    """Whether a sequence holds one number."""
+    numbers = as_numbers(value)
+    return numbers.size == 1
 
 
 def _plain(value: Any) -> Any:

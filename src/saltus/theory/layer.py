@@ -311,7 +311,8 @@ def total_energy(
     0.02
     """
     theta, velocity = numbers("theta", theta), numbers("velocity", velocity)
-    check_shapes(theta=theta, velocity=velocity, **({} if side is None else {"side": side}))
+    sides = {} if side is None else {"side": numbers("side", side, at_least=-1.0, at_most=1.0)}
+    check_shapes(theta=theta, velocity=velocity, **sides)
     lower, upper = layers(system)
     if side is None:
         if lower.mass != upper.mass and np.any((theta == 0) & (velocity != 0)):

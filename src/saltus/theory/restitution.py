@@ -127,6 +127,7 @@ def energy_factor(system: System, velocity: float, side: int, e: float, tau: flo
     check_side(side)
     check_number("velocity", velocity)
     check_number("e", e, at_least=0.0)
+    check_number("tau", tau)
     before = float(
         system.model.kinetic_energy(tau, system.model.contact, velocity, side, system.load)
     )
@@ -174,6 +175,7 @@ def velocity_factor(
     """
     check_side(side)
     check_number("velocity", velocity)
+    check_number("tau", tau)
     if velocity == 0:
         raise ParameterError("e = theta'+ / theta'- has no meaning at velocity 0", "velocity")
     after = float(

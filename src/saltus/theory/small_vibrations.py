@@ -15,7 +15,7 @@ import numpy as np
 from saltus.checks import Numbers, check_number
 from saltus.errors import ParameterError
 from saltus.systems import System
-from saltus.theory.arguments import numbers
+from saltus.theory.arguments import check_shapes, numbers
 from saltus.theory.layer import Layer, layers, metainterface
 from saltus.theory.loaded_equilibria import MOMENT_ROUNDING
 
@@ -177,7 +177,7 @@ def short_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
         raise ParameterError(
             f"this expansion needs V cos(beta0) below 0, got {-closing:.6g}", "vertical"
         )
-    return 4 * np.sqrt(2 * np.abs(theta0)) / math.sqrt(closing)
+    return 4 * np.sqrt(2 * np.abs(numbers("theta0", theta0))) / math.sqrt(closing)
 
 
 def upright_period(theta0: Numbers, *, beta0: float, vertical: float) -> Any:
@@ -378,6 +378,11 @@ def pendulum_acceleration(system: System, tau: Numbers, theta: Numbers, velocity
             "load.lower_vertical",
             "load",
         )
+    tau, theta, velocity = (
+        numbers(name, value)
+        for name, value in (("tau", tau), ("theta", theta), ("velocity", velocity))
+    )
+    check_shapes(tau=tau, theta=theta, velocity=velocity)
     across = load.horizontal(tau) - load.ground_horizontal.acceleration(tau)
     along = load.vertical(tau) - load.ground_vertical.acceleration(tau)
     return (

@@ -275,9 +275,8 @@ def lyapunov_many(
     ends = stretched.states
     if run.system is not system:
         twin = inputs.with_numbers(run.system)
-        ends = np.concatenate(
-            twin.model.own_states(0.0, ends[None, :, 0], ends[None, :, 1], twin.load)
-        ).T
+        given = twin.model.own_states(0.0, ends[None, :, 0], ends[None, :, 1], twin.load)
+        ends = np.asarray(np.concatenate(given)).T
     return _dataset(system, run, measures, ends, {"periods": periods, "transient": transient})
 
 

@@ -116,13 +116,22 @@ def state_size(motion, first, last):
     a = motion.acceleration_series
     size = 0.0
     largest = 0.0
-    rates = 0.0
+    second = 0.0
+    third = 0.0
     for i in range(first, last):
         pull = abs(a[i, 0])
         size = max(size, abs(v[i, 0]), math.sqrt(abs(q[i, 0])) * math.sqrt(pull))
         largest = max(largest, pull)
-        rates = max(rates, pull, abs(v[i, 2]), abs(v[i, 3]))
+        second = max(second, abs(v[i, 2]))
+        third = max(third, abs(v[i, 3]))
+    rates = max(largest, second, third)
     if size > STANDS * rates:
+        return size
+    # of a motion that a huge rate changes, the derivatives are as large in any units: the rate from
+    # each to the next is then one
+    pushed = size * second < STANDS * largest * largest
+    jerked = size * third * third < STANDS * second * second * second
+    if size > 0.0 and not (pushed or jerked):
         return size
     return largest if largest > STANDS * rates else SMALLEST
 

@@ -68,9 +68,8 @@ class EnsembleResult:
             return states
         twin = self.inputs.with_numbers(inner)
         own = len(inner.model.coordinates)
-        return np.concatenate(
-            twin.model.own_states(times, states[:, :own].T, states[:, own:].T, twin.load)
-        ).T
+        given = twin.model.own_states(times, states[:, :own].T, states[:, own:].T, twin.load)
+        return np.asarray(np.concatenate(given)).T
 
     @property
     def held(self) -> np.ndarray:

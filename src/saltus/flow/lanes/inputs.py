@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_memory
+from saltus.checks import LIMITS, ManyNumbers, check_memory
 from saltus.errors import ParameterError
 from saltus.flow.lanes.ensemble_dataset import result_names
 from saltus.flow.motion.motion import rate_name, state_names
@@ -19,7 +19,6 @@ from saltus.systems import (
     System,
     broadcast_arrays,
     check_parameters,
-    check_turns,
     finite_array,
     numbers,
     parameter_table,
@@ -74,7 +73,8 @@ class Inputs:
         """A copy of a system in which the numbers of the parameters are arrays, for what is no
         simulation.
         """
-        return substitute(system, lambda path, value: self.parameters.get(path, value))
+        many = {path: array.view(ManyNumbers) for path, array in self.parameters.items()}
+        return substitute(system, lambda path, value: many.get(path, value))
 
     def in_gaps(self, system: System) -> Inputs:
         """Those for `system.in_gap_coordinates`; the same object where that is the system
@@ -90,6 +90,7 @@ class Inputs:
         sums = twin.model.gap_states(
             self.values["time"], starts[:own], starts[own:], twin.load, units
         )
+        sums = tuple([np.asarray(sum_) for sum_ in part] for part in sums)
         called = state_names(twin.model.coordinates)
         return replace(
             self, values=dict(zip(called, [*sums[0], *sums[1]], strict=True)) | dict(rest)
@@ -112,8 +113,6 @@ def read_inputs(
         name: finite_array(name, value)
         for name, value in (_starts(system, velocity, time, coordinates) | given).items()
     }
-    names = system.model.coordinates
-    check_turns(system, [arrays[rate_name(name, names)] for name in names])
     dims, shape, coords, together = broadcast_arrays(arrays)
     check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
     _check_names(system, dims, coords, arrays, given)
