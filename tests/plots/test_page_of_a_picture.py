@@ -65,6 +65,37 @@ def test_a_legend_that_needs_half_of_the_width_stands_below(branch):
         assert ax.get_position().width > 0.5
 
 
+@pytest.mark.parametrize("given", [False, True])
+def test_angles_are_drawn_in_degrees_where_they_are(given):
+    cell = saltus.System(
+        model=saltus.Metainterface(beta0=1.4, damping=0.1),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
+    )
+    motion = saltus.simulate(cell, theta=0.3, periods=2)
+    options = {"ax": plt.figure().subplots()} if given else {}
+    plain, ours = (
+        np.ravel(axes)[0]
+        for axes in (saltus.plot(motion), saltus.plot(motion, degrees=True, **options))
+    )
+    assert plain.get_ylabel().endswith("(rad)")
+    assert ours.get_ylabel() == plain.get_ylabel().replace("(rad)", "(deg)")
+    assert ours.get_xlabel() == plain.get_xlabel()  # a time, of which nothing changes
+    ours.figure.draw_without_rendering()
+    low, high = ours.get_ylim()
+    ticks = [tick for tick in ours.yaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+    assert len(ticks) >= 3
+    for tick in ticks:
+        shown = float(tick.label1.get_text().replace("\N{MINUS SIGN}", "-"))
+        assert shown == pytest.approx(tick.get_loc() * 180 / np.pi, abs=1e-9)
+    plt.close("all")
+
+
+def test_a_branch_is_drawn_by_the_extreme_of_a_coordinate(branch):
+    ax = saltus.plot(branch, quantity="highest")
+    ax.figure.draw_without_rendering()  # which reads the mathematical text
+    assert ax.get_ylabel() == r"$\max_\tau x$"
+
+
 def test_a_size_without_room_for_the_panels_is_noticed(branch):
     with pytest.warns(UserWarning, match="leaves a panel"):
         saltus.plot(branch, size=(60, 30))

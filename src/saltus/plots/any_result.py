@@ -21,6 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, shown
@@ -310,6 +311,7 @@ def plot(
     size: str | tuple[float, float] | None = None,
     dpi: float | None = None,
     style: Any = None,
+    degrees: bool = False,
     **options: Any,
 ) -> Any:
     """Draw any result; returns the axes, or an array of them for several panels. In a notebook the
@@ -334,6 +336,8 @@ def plot(
         The dots in an inch of a new figure; `saltus.save` writes at least 300.
     style
         A style of Matplotlib on top of the conventions: a name, a file or a dictionary.
+    degrees
+        Whether axes of angles have degrees in place of radians.
     options
         Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and
         `width=`, in mm.
@@ -359,6 +363,8 @@ def plot(
         if title is not None:
             _entitle(axes, str(title), into_given)
     figure = figure_of(axes)
+    if degrees:
+        in_degrees(axes)
     if isinstance(size, tuple):
         figure.set_size_inches(size[0] / 25.4, size[1] / 25.4)
         _notice_narrow_panels(figure, size)
@@ -381,6 +387,27 @@ def _entitle(axes: Any, title: str, into_given: bool) -> None:
 
 
 TITLE_SIZE = 10.0  # points
+
+
+class DegreeTicks(MaxNLocator):
+    """Round numbers of degrees on an axis whose data are in radians."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        """Their places, in radians."""
+        return np.radians(super().tick_values(math.degrees(vmin), math.degrees(vmax)))
+
+
+def in_degrees(axes: Any) -> None:
+    """Write the numbers of axes in rad as degrees; what is drawn stays where it is."""
+    for ax in np.ravel(axes):
+        for axis in (ax.xaxis, ax.yaxis):
+            text = axis.label.get_text()
+            if text.endswith(" (rad)"):
+                axis.label.set_text(text.removesuffix("(rad)") + "(deg)")
+                axis.set_major_locator(DegreeTicks(nbins=6, steps=[1, 1.5, 2, 3, 4.5, 5, 9, 10]))
+                axis.set_major_formatter(lambda value, place: f"{math.degrees(value):.10g}")
+
+
 LETTER = 1.75  # mm, the mean width of a letter of that size
 
 

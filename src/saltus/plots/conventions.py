@@ -383,7 +383,7 @@ def peak(names: str, quantity: str = "amplitude") -> str:
     bar = "|" if quantity == "amplitude" else ""
     each = [rf"{bar}{symbol(name)}{bar}" for name in names.split()]
     if len(each) == 1:
-        return rf"{found}_\tau{each[0]}"
+        return rf"{found}_\tau {each[0]}"
     return (
         rf"{found}_\tau({', '.join(each)})"
         if len(each) < 4
@@ -416,8 +416,8 @@ def parameter_name(path: str) -> str:
 
 def quantity_name(dataset: Any, quantity: str) -> str:
     """The symbol of an amplitude, or a quantity's name in words."""
-    if quantity == "amplitude" and "coordinate" in dataset.attrs:
-        return f"${peak(dataset.attrs['coordinate'])}$"
+    if quantity in ("amplitude", "highest", "lowest") and "coordinate" in dataset.attrs:
+        return f"${peak(dataset.attrs['coordinate'], quantity)}$"
     kind, _, coordinate = quantity.partition("_")
     if coordinate and coordinate in str(dataset.attrs.get("coordinate", "")).split():
         return {
