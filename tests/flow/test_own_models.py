@@ -120,16 +120,18 @@ def test_driven_pair_reaches_over_its_first_period_what_the_modes_say():
     assert motion.y == pytest.approx((expected[0] - expected[1]) / 2, abs=1e-12)
 
 
-def test_numbers_that_change_neither_trace_nor_compile():
+def test_numbers_that_change_neither_trace_nor_compile(tmp_path, monkeypatch):
     simulate(FREE, x=0.1, duration=0.1)
-    known, files = set(_structures), set(cache_directory().iterdir())
+    known = set(_structures)
+    # a folder of its own, as other workers write into the common one
+    monkeypatch.setenv("SALTUS_CACHE_DIR", str(tmp_path))
     for i in range(5):
         changed = FREE.with_(
             {"model.left": 1 + i, "model.right": 0.5 + i, "load.wind": -i, "impact.e": 1 / (i + 1)}
         )
         simulate(changed, x=0.1, duration=0.1, tol=10.0 ** -(6 + 2 * i), time=float(i))
     assert set(_structures) == known
-    assert set(cache_directory().iterdir()) == files
+    assert not [path for path in cache_directory().rglob("*") if path.is_file()]
 
 
 def test_whole_numbers_move_as_their_floats_do():
