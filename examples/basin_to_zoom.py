@@ -38,4 +38,9 @@ assert (coarse.label.values == labels[::10, ::10]).all()
 
 # One pixel a motion, to zoom: plt.imsave("basins.png", labels, cmap="viridis", origin="lower")
 plt.imshow(labels, cmap="viridis", origin="lower", extent=(-2.0, 2.0, -2.0, 2.0))
+for attractor in found:
+    place = (attractor.label - labels.min()) / max(np.ptp(labels), 1)
+    amplitude = f"amplitude {attractor.amplitude:.3f}"
+    plt.plot([], [], "s", color=plt.colormaps["viridis"](place), label=amplitude)
+plt.legend(loc="lower left", fontsize="small")
 plt.gca().set(xlabel=r"$\theta$", ylabel=r"$\theta'$", title=f"{SIDE} x {SIDE} exact motions")
