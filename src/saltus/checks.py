@@ -608,7 +608,7 @@ def with_answers(kind: type[Kind]) -> type[Kind]:
 # what Python and NumPy raise where an argument is of another kind than was meant
 OF_OTHER_KINDS = (
     *(TypeError, ValueError, AttributeError, LookupError, ArithmeticError, AssertionError),
-    struct.error,
+    *(struct.error, IsADirectoryError, NotADirectoryError),
 )
 
 
@@ -617,6 +617,9 @@ def _refuse_kinds(
 ) -> None:
     """Refuse a call that failed by an error of Python's own because its arguments are unknown, or
     of other kinds than the function's annotations."""
+    if isinstance(error, (IsADirectoryError, NotADirectoryError)):
+        name = str(error.filename)
+        raise ParameterError(f"{name} cannot be written ({error.strerror})", "path") from error
     if not isinstance(error, SaltusError):
         if isinstance(error, TypeError):
             bound_arguments(function, given, named)

@@ -116,7 +116,10 @@ def test_a_motion_that_would_take_far_too_many_steps_is_refused_early() -> None:
         saltus.simulate(CELL, theta=0.1, velocity=5e5, duration=1e4)
 
 
-def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
-    (tmp_path / "motion.mat").mkdir()
+@pytest.mark.parametrize("write", [saltus.to_mat, saltus.to_csv, saltus.save])
+def test_a_folder_is_no_file_to_write(write: Callable[..., Any], tmp_path: Path) -> None:
+    suffix = {"to_mat": ".mat", "to_csv": ".csv", "save": ".nc"}[write.__name__]
+    path = tmp_path / f"motion{suffix}"
+    path.mkdir()
     with pytest.raises(ParameterError, match="cannot be written"):
-        saltus.to_mat(tmp_path / "motion.mat", saltus.simulate(CELL, theta=0.3, periods=1))
+        write(path, saltus.simulate(CELL, theta=0.3, periods=1))
