@@ -155,3 +155,9 @@ def test_a_method_of_other_packages_is_answered_with_the_function(results, metho
 def test_a_time_that_is_no_number_is_refused_in_a_sentence():
     with pytest.raises(saltus.ParameterError, match="time must be a finite number, got 'now'"):
         saltus.lyapunov_spectrum(SYSTEM, theta=0.3, periods=40, time="now")
+
+
+def test_a_reason_alone_is_printed_without_places_for_numbers():
+    for reason in (*saltus.orbits.OrbitEnd, *saltus.continuation.CurveEnd):
+        assert "{" not in str(reason)
+        assert "}" not in str(reason)

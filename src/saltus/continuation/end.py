@@ -4,11 +4,15 @@ could not be located.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.enumerations import Sentence
+
+# What stands in the places of numbers where a reason is printed without its `End`.
+PLACES = {"parameter": "...", "kind": "special point", "detail": "..."}
 
 
 class EndReason(Sentence):
@@ -16,6 +20,10 @@ class EndReason(Sentence):
 
     Its value is the sentence, in which the numbers of an `End` are filled in.
     """
+
+    def __str__(self) -> str:
+        text = re.sub(r"\{(\w+)[^}]*\}", lambda place: PLACES[place[1]], str(self.value))
+        return text.replace("......", "...")
 
 
 class CurveEnd(EndReason):
