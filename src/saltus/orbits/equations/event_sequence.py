@@ -281,7 +281,9 @@ def _repeated(codes: np.ndarray, times: np.ndarray, together: float) -> np.ndarr
     by rounding and without speed.
     """
     again = np.zeros(len(codes), dtype=bool)
-    for i in np.flatnonzero(codes[:, 0] == EventCode.IMPACT):
+    # few events are so close, of many impacts of accumulations too
+    later = 1 + np.flatnonzero(np.diff(times) <= together)
+    for i in later[codes[later, 0] == EventCode.IMPACT]:
         same = codes[:i, 1] & codes[i, 1] == codes[i, 1]
         again[i] = (same & (times[i] - times[:i] <= together)).any()
     return again
