@@ -143,7 +143,7 @@ def test_a_chart_of_lengths_has_no_radians(saltus, study, tmp_path):
     bar = figure_of(
         draw_stability_chart(open_store(tmp_path / "out" / "stability_chart.zarr"))
     ).axes[-1]
-    assert bar.get_ylabel() == r"largest amplitude $\max_\tau|x|$"
+    assert bar.get_ylabel() == r"largest amplitude $\max_\tau |x|$"
 
 
 def test_what_is_kept_is_not_computed_again(saltus, study, tmp_path, monkeypatch):

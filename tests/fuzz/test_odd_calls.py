@@ -57,7 +57,6 @@ CALLS: dict[str, Callable[[], Any]] = {
     "model.beta0 list": lambda: THEORY.amplitude_limits(CELL, {"model.beta0": ["a"]}),
     "model.damping nan": lambda: THEORY.amplitude_limits(CELL, {"model.damping": math.nan}),
     "theta shapes": lambda: THEORY.total_energy(FREE, theta=[0.1, 0.2], velocity=[0.1, 0.2, 0.3]),
-    "theta nan": lambda: THEORY.potential_energy(FREE, theta=ODD["nan"]),
     "lowest nan": lambda: THEORY.quasi_static_border(CELL, LOADS, lowest=ODD["nan"]),
     "physical list": lambda: saltus.UnitCell(alpha0=0.3, beta0=1.4, physical=ODD["list"]),
     "physical nan": lambda: saltus.UnitCell(alpha0=0.3, beta0=1.4, physical=ODD["nan"]),

@@ -130,7 +130,7 @@ def test_a_diagram_between_two_stops_follows_the_closed_form():
             compared += 1
     assert compared > 5
     assert draw_diagram(tree)[0].get_ylabel() == "least speed of an impact"  # all amplitudes are 1
-    assert draw_diagram(tree, "amplitude")[0].get_ylabel() == r"$\max_\tau|x|$"
+    assert draw_diagram(tree, "amplitude")[0].get_ylabel() == r"$\max_\tau |x|$"
     # motions of three periods, beside these from 0.62 on
     assert set(tree["unplaced"]["reason"].values.tolist()) <= {"longer"}
 

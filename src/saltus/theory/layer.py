@@ -296,7 +296,8 @@ def total_energy(
     system
         A metainterface under constant loads.
     theta, velocity
-        Numbers or arrays that broadcast, rad and rad per unit of tau.
+        Numbers or arrays that broadcast, rad and rad per unit of tau. The energy is nan where they
+        are, as between the curves of a portrait.
     side
         +1 or -1 of the same shape; the sign of theta if not given.
 
@@ -310,7 +311,8 @@ def total_energy(
     >>> round(float(saltus.theory.total_energy(tristable, 0.0, 0.2)), 12)  # 0.2^2 / 2, at the contact
     0.02
     """
-    theta, velocity = numbers("theta", theta), numbers("velocity", velocity)
+    theta = np.asarray(theta, dtype=float)
+    velocity = np.asarray(velocity, dtype=float)
     sides = {} if side is None else {"side": numbers("side", side, at_least=-1.0, at_most=1.0)}
     check_shapes(theta=theta, velocity=velocity, **sides)
     lower, upper = layers(system)
@@ -328,7 +330,7 @@ def total_energy(
 
 
 def _by_side(system: System, theta: Any, function: Any, odd: bool) -> Any:
-    theta = numbers("theta", theta)
+    theta = np.asarray(theta, dtype=float)
     size = np.abs(theta)
     lower, upper = (function(layer, size) for layer in layers(system))
     value = np.where(theta > 0, lower, -upper if odd else upper)
