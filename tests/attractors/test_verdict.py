@@ -381,3 +381,19 @@ def test_it_refuses_what_has_no_meaning(changes, match):
     arguments = {"system": forced(0.5, 1.0), "theta": 0.3} | changes
     with pytest.raises(ParameterError, match=match):
         classify(arguments.pop("system"), **arguments)
+
+
+def test_a_window_beyond_a_wall_is_refused() -> None:
+    """Starts beyond it would be reflected, out of the window."""
+    system = saltus.System(
+        model=saltus.WallOscillator(stiffness=1.0, damping=0.1, wall=1.0),
+        load=saltus.Load(frequency=1.1, force=saltus.Harmonic(0.5)),
+        impact=saltus.VelocityReduction(0.8),
+    )
+    beyond = ((1.5, 3.0), (-1.0, 1.0))
+    for search in (
+        lambda: saltus.find_attractors(system, window=beyond, starts=8),
+        lambda: saltus.basins_of_attraction(system, window=beyond, points=5),
+    ):
+        with pytest.raises(saltus.ParameterError, match="beyond the contact at 1"):
+            search()

@@ -54,4 +54,4 @@ def test_doctor_says_how_to_install_what_clusters_need(saltus, monkeypatch):
 
     monkeypatch.setattr(metadata, "version", without_distributed)
     found = saltus("doctor")
-    assert 'pip install "saltus[cluster]"' in " ".join(found.stdout.split())
+    assert 'pip install ".[cluster]"' in " ".join(found.stdout.split())

@@ -271,7 +271,7 @@ def test_what_the_driver_answers_is_told(monkeypatch):
     with pytest.raises(SaltusError, match="no card was found: CUDA_ERROR_NO_DEVICE"):
         Card()
     monkeypatch.setitem(sys.modules, "cuda.bindings", None)
-    with pytest.raises(SaltusError, match="pip install cuda-bindings"):
+    with pytest.raises(SaltusError, match="pip install"):
         Card()
 
 

@@ -191,4 +191,4 @@ def test_without_jax_the_function_says_what_to_install():
     told = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     ).stdout
-    assert told.strip() == 'to_jax needs JAX: pip install "saltus[jax]"'
+    assert told.strip() == 'to_jax needs JAX: pip install ".[jax]"'

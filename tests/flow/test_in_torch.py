@@ -155,4 +155,4 @@ def test_without_pytorch_the_function_says_what_to_install():
     told = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     ).stdout
-    assert told.strip() == 'to_torch needs PyTorch: pip install "saltus[torch]"'
+    assert told.strip() == 'to_torch needs PyTorch: pip install ".[torch]"'

@@ -28,6 +28,7 @@ from saltus import (
     Triangle,
     VelocityReduction,
     WallOscillator,
+    frequency_sweep,
     sensitivities,
     simulate,
     simulate_many,
@@ -233,6 +234,7 @@ def test_derivatives_are_differences():
         (lambda: Square(1.0, quantity="displacement"), "jumps at its corners"),
         (lambda: Triangle(1.0, quantity="displacement"), "velocity of a ground .* jumps"),
         (lambda: Square(1.0, mean=0.1, quantity="acceleration"), "drifts away"),
+        (lambda: Square(1.0, duty=0.3, quantity="acceleration"), "a Table whose values have the mean 0"),
         (lambda: Square(1.0, duty=1.5), "duty must"),
         (lambda: Table([0.0, 1.0, 0.5], [0.0, 1.0, 0.0]), "must not decrease"),
         (lambda: Table([0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 2.0, 0.0]), "too near"),
@@ -372,3 +374,11 @@ def test_random_loads_are_those_of_dop853(seeds):
             continue  # DOP853 follows no accumulation, and steps over touches
         expected = reference(entry, end, [wall - 0.5, 0.1], wall=wall, e=e)
         assert (motion.x, motion.velocity) == pytest.approx(expected, abs=1e-9), seed
+
+
+def test_nothing_is_computed_along_a_setting():
+    model = WallOscillator(stiffness=1.0, damping=0.1, wall=1.0)
+    load = Load(frequency=1.1, force=Square(0.5))
+    system = System(model=model, load=load, impact=VelocityReduction(0.8))
+    with pytest.raises(ParameterError, match=r"is a setting, along which nothing .* with_"):
+        frequency_sweep(system, [0.3, 0.5], path="load.force.duty", x=0.0)

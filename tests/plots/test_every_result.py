@@ -118,8 +118,17 @@ def test_a_diagram_is_drawn_into_one_panel_or_into_a_plain_figure_whose_legend_c
 
 
 def test_an_option_that_a_picture_does_not_take_is_refused_with_those_that_it_does(results):
-    with pytest.raises(ParameterError, match="no argument 'figur'; did you mean 'figure'"):
-        saltus.plot(results("saltus.simulate"), figur=None)
+    motion = results("saltus.simulate")
+    with pytest.raises(ParameterError, match="takes no 'figur'; did you mean 'figure'"):
+        saltus.plot(motion, figur=None)
+    with pytest.raises(ParameterError, match=r"takes no 'quantity'; known here: ax.* title"):
+        saltus.plot(motion, quantity="largest_x")
+
+
+def test_a_motion_and_a_branch_have_no_axes_in_common(results):
+    both = (results("saltus.simulate"), results("saltus.continue_orbit"))
+    with pytest.raises(ParameterError, match="a picture over time"):
+        saltus.plot(both)
 
 
 def numbers_on(axis):

@@ -55,7 +55,7 @@ def test_without_the_extra_the_reason_names_it(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(krawczyk, "has_flint", lambda: False)
     proof = saltus.prove(beside_the_fold(1e-14)[0], step=1.0, order=24)
     assert proof.proved is None
-    assert proof.reason.endswith('more digits may prove it: pip install "saltus[prove]"')
+    assert proof.reason.endswith('more digits may prove it: pip install ".[prove]"')
 
 
 def test_the_residual_of_many_digits_lies_in_that_of_doubles() -> None:

@@ -16,7 +16,7 @@ from saltus.bounds.balls import EPS, UP, Ball, powers_of_two, product, solve
 from saltus.bounds.precise import has_flint, precise_residual
 from saltus.bounds.shooting import Enclosure, Shooting
 
-EXTRA = 'pip install "saltus[prove]"'
+EXTRA = 'pip install ".[prove]"'
 
 
 @dataclass(frozen=True)

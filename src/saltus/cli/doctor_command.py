@@ -131,7 +131,7 @@ def _requirements(wrong: list[str]) -> Iterator[tuple[str, str, str, str]]:
                 f"saltus needs {need}"
             )
         remark = (
-            'for clusters: pip install "saltus[cluster]"'
+            'for clusters: pip install ".[cluster]"'
             if extra and not there
             else ""
             if fits

@@ -24,7 +24,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from saltus.checks import check_number
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, near, shown
 from saltus.plots.basins import (
     draw_attractors,
     draw_basins,
@@ -480,12 +480,24 @@ def _checked_style(own: Any) -> Any:
         ) from error
 
 
+# the arguments of `plot` for all results
+COMMON = ("legend", "title", "size", "dpi", "style", "degrees")
+
+
 def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
     """Draw a result, or several into the same axes, in a new figure of this size."""
     width = SIZES[size] if isinstance(size, str) else size[0] if size else None
     if isinstance(result, (tuple, list)) and result:
         given = options.pop("ax", None)
         place = asked_legend() or ("below" if given is None else None)
+        kinds = [
+            str(getattr(part, "attrs", {}).get("kind", type(part).__name__)) for part in result
+        ]
+        over_time = ["motion" in kind.lower() for kind in kinds]
+        if any(over_time) and not all(over_time):
+            raise ParameterError(
+                "a motion has a picture over time, and others none: draw them apart", "result"
+            )
         with look() if given is None else nullcontext(), legend_at(place):
             wide = options.pop("width", width or LOOK.single_column)
             ax = axes_or_new(given, wide, 0.85 * LOOK.single_column)
@@ -503,6 +515,15 @@ def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
     if draw is None:
         raise ParameterError(
             f"nothing draws a result of the kind {shown(data.attrs.get('kind', ''))}", "result"
+        )
+    taken = signature(draw).parameters
+    unknown = [name for name in options if name not in taken]
+    if unknown and not any(one.kind is one.VAR_KEYWORD for one in taken.values()):
+        own = [name for name in taken if name not in ("dataset", "data", "tree")]
+        raise ParameterError(
+            f"a picture of this result, of kind {shown(data.attrs.get('kind', ''))}, takes no "
+            f"{unknown[0]!r:.40}; {near(unknown[0], [*own, *COMMON])}",
+            unknown[0],
         )
     if width is None:
         return draw(data, **options)

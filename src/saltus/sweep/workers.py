@@ -213,7 +213,7 @@ def _connect(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise SweepError(
-            'a Dask cluster needs the package distributed: pip install "saltus[cluster]"'
+            'a Dask cluster needs the package distributed: pip install ".[cluster]"'
         ) from None
     try:
         client = Client(address, timeout=CLUSTER.patience, set_as_default=False)

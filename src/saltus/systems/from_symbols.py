@@ -170,7 +170,7 @@ def _sympy() -> Any:
         import sympy.printing.numpy
     except ImportError:
         raise ParameterError(
-            'from_sympy needs SymPy: pip install "saltus[sympy]"', "equations"
+            'from_sympy needs SymPy: pip install ".[sympy]"', "equations"
         ) from None
     return sympy
 

@@ -220,9 +220,15 @@ def check_path(system: System, path: Any, name: str = "path") -> None:
     if isinstance(path, str) and path in system.parameters:
         return
     try:
-        system.get(path)
+        value = system.get(path)
     except ParameterError as error:
         raise ParameterError(str(error), name) from None
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        raise ParameterError(
+            f"{path} is a setting, along which nothing can be computed: take a system for each of "
+            f"its values, with_({{{path!r}: ...}})",
+            name,
+        )
     raise ParameterError(f"{path} is not a number, so nothing can be computed along it", name)
 
 

@@ -201,10 +201,14 @@ class Repeating(Signal):
                         "quantity",
                     )
                 smooth = smooth.derivative()
-        if order > 0 and (moves or abs(shape.mean) > NO_DRIFT * np.abs(shape.coefficients).max()):
+        lopsided = bool(abs(shape.mean) > NO_DRIFT * np.abs(shape.coefficients).max())
+        if order > 0 and (moves or lopsided):
+            advice = "give it the mean 0"
+            if lopsided:
+                advice = "give a Table whose values have the mean 0 over a period"
             raise ParameterError(
-                f"a ground with this {self.quantity} drifts away, as the mean of the {name} is not"
-                " 0: give it the mean 0",
+                f"a ground with this {self.quantity} drifts away, as the mean of the {name} over a "
+                f"period is not 0: {advice}",
                 "mean" if hasattr(self, "mean") else "values",
             )
 

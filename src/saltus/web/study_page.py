@@ -391,7 +391,7 @@ def _widget(**values: Any) -> Any:
         from anywidget import AnyWidget
     except ImportError:
         raise SaltusError(
-            'notebooks show pages through the package anywidget: pip install "saltus[explore]"'
+            'notebooks show pages through the package anywidget: pip install ".[explore]"'
         ) from None
     kinds: dict[type, Any] = {
         str: traitlets.Unicode,

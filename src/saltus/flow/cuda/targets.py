@@ -99,7 +99,7 @@ class Card:
             from cuda.bindings import driver
         except ImportError:
             raise SaltusError(
-                "motions on a card need the package cuda-bindings: pip install cuda-bindings"
+                'motions on a card need the package cuda-bindings: pip install ".[cuda]"'
             ) from None
         self._driver: Any = driver
         self._arrays: list[Any] = []

@@ -454,7 +454,7 @@ def _jax() -> Any:
     try:
         import jax
     except ImportError:
-        raise ParameterError('to_jax needs JAX: pip install "saltus[jax]"') from None
+        raise ParameterError('to_jax needs JAX: pip install ".[jax]"') from None
     return jax
 
 
@@ -462,5 +462,5 @@ def _torch() -> Any:
     try:
         import torch
     except ImportError:
-        raise ParameterError('to_torch needs PyTorch: pip install "saltus[torch]"') from None
+        raise ParameterError('to_torch needs PyTorch: pip install ".[torch]"') from None
     return torch

@@ -174,9 +174,9 @@ def continue_special(
     changes = special.kind in (SpecialKind.GR, SpecialKind.SW)
     if changes and special.orbit.equations.touched(special) is None:
         raise ParameterError(
-            "of orbits with friction, surfaces, dependent gaps or impacts that die away curves are"
-            f" followed of LP, PD, BPC and NS, not of {special.kind} so far; continue an orbit at"
-            " several values of the second parameter instead",
+            "of orbits with friction, surfaces, dependent gaps, loads with corners or impacts that"
+            f" die away curves are followed of LP, PD, BPC and NS, not of {special.kind}; continue"
+            " an orbit at several values of the second parameter instead",
             "special",
         )
     if special.kind == SpecialKind.GR and special.orbit.equations.passes_contact:
