@@ -301,13 +301,14 @@ def check_window(window: Any, system: System, half_width: float = HALF_WIDTH) ->
                 f" {high:g}) is beyond the contact {contact.name} at {contact.position:g}",
                 "window",
             )
-    if len(system.model.sides) == 1:
-        side = system.model.sides[0]
+    model: Any = system.model
+    if len(model.sides) == 1:
+        side = model.sides[0]
         low, high = bounds[0]
-        if max(float(system.model.gap(x, side)) for x in (low, high)) < 0.0:
+        if max(float(model.gap(x, side)) for x in (low, high)) < 0.0:
             raise ParameterError(
                 f"window must reach to where {names[0]} can be, and all of ({low:g}, {high:g}) is "
-                f"beyond the contact at {float(system.model.contact):g}",
+                f"beyond the contact at {float(model.contact):g}",
                 "window",
             )
     return Window(map(tuple, bounds.tolist()))
