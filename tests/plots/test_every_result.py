@@ -366,3 +366,15 @@ def test_a_diagram_made_in_python_says_of_what_kind_it_is_and_a_curve_shows_no_r
     first = results("saltus.separatrices")[0]
     assert "array(" not in repr(first)
     assert f"saddle={first.saddle}" in repr(first)
+
+
+def test_a_legend_of_two_results_names_what_both_show(results):
+    together = (results("saltus.continue_orbit"), results("saltus.frequency_sweep"))
+    texts = []
+    for parts in (together, together[::-1]):
+        figure = saltus.plot(parts).figure
+        legends = [*figure.legends, *filter(None, [figure.axes[0].get_legend()])]
+        texts.append({text.get_text() for legend in legends for text in legend.get_texts()})
+    assert texts[0] == texts[1]
+    assert {"up", "down"} <= texts[0]
+    assert any("stable" in text for text in texts[0])

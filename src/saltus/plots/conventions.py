@@ -250,6 +250,10 @@ def legend_of(
     texts = list(labels) if labels is not None else [str(h.get_label()) for h in shown_handles]
     if not texts:
         return
+    for text, handle in _entries_before(ax):
+        if text not in texts:
+            texts.insert(0, text)
+            shown_handles.insert(0, handle)
     if asked_legend() == "inside" or (asked_legend() is None and not own):
         options.pop("ncols", None)
         ax.legend(handles=shown_handles, labels=texts, loc="best", **options)
@@ -264,6 +268,19 @@ def legend_of(
     outside_legend(figure, handles=shown_handles, labels=texts, **options)
     if figure.legends:
         figure.legends[-1].set_gid(f"of {id(ax)}")
+
+
+def _entries_before(ax: Any) -> list[tuple[str, Any]]:
+    """What an earlier result has in the legend of these axes, the last entry first."""
+    legends = [legend for legend in figure_of(ax).legends if legend.get_gid() == f"of {id(ax)}"]
+    if ax.get_legend() is not None:
+        legends.append(ax.get_legend())
+    found = [
+        (text.get_text(), handle)
+        for legend in legends
+        for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True)
+    ]
+    return found[::-1]
 
 
 LEGEND_ROW = 3.6  # mm, the height of a line of a legend
