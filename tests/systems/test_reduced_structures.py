@@ -179,6 +179,7 @@ def test_a_result_keeps_what_it_was_reduced_from(tmp_path: Path) -> None:
         ({"keep": [99]}, "there is no row 99"),
         ({"keep": [9]}, None),
         ({"keep": "x1"}, "keep must be a list"),
+        ({"frictions": []}, "no argument 'frictions'; did you mean 'friction'"),
         ({"stiffness": None}, "stiffness"),
         ({"mass": [["a"]]}, "matrix of numbers"),
     ],

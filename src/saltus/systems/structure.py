@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.checks import LIMITS, check_count, check_number
+from saltus.checks import LIMITS, answered, check_count, check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface
 from saltus.systems.eigenmodes import eigenmodes_of
@@ -356,6 +356,7 @@ class Structure(ContactModel):
         vars(self).update(made, _modes=modes)
 
     @classmethod
+    @answered
     def reduced(
         cls,
         mass: Any,
