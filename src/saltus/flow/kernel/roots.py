@@ -254,6 +254,9 @@ def contact_root(g, skip, order, h, poly):
     # leaving from rest: lower coefficients are zero up to rounding
     while skip < order - 2 and g[skip] <= 0.0:
         skip += 1
+    # a series of a lower order has none of the others
+    if skip > order:
+        return NONE, NEVER, NEVER
     scale_gap(g, skip, order, h, poly)
     return first_root(poly, order - skip)
 
