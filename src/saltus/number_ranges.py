@@ -202,7 +202,13 @@ def _check_beside(owner: Any, ranges: dict[str, NumberRange]) -> None:
     for name, declared in ranges.items():
         for side, other in declared.beside:
             value = getattr(owner, name)
-            bound = getattr(owner, other)
+            bound = getattr(owner, other, None)
+            if bound is None or callable(bound) or isinstance(bound, (str, tuple, list)):
+                raise ParameterError(
+                    f"the range of {name} reads {other!r}, which is no number of "
+                    f"{type(owner).__name__}",
+                    name,
+                )
             if not declared._within(value, **{side: bound}):
                 raise ParameterError(
                     f"{name} must {BESIDE[side]} {other} = {bound:g}, got {value:g}", name

@@ -4,6 +4,7 @@ made of one.
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -469,3 +470,19 @@ def test_a_parameter_of_a_model_may_be_a_number_of_its_contact():
     for path, value in (("model.bounce", 1.5), ("model.bounce", -0.1)):
         with pytest.raises(saltus.ParameterError, match="restitution of the contact 'stop'"):
             system.with_({path: value})
+
+
+@pytest.mark.parametrize("name", ["nope", "coordinates", "acceleration"])
+def test_a_range_that_reads_no_number_is_refused(name):
+    @dataclass(frozen=True, kw_only=True)
+    class Spring(saltus.Model):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        k: float = field(default=1.0, metadata=saltus.number_range(above=name))
+
+        def acceleration(self, t, x, velocity, side, load):
+            return -self.k * x
+
+    with pytest.raises(
+        saltus.ParameterError, match=f"reads '{name}', which is no number of Spring"
+    ):
+        saltus.System(model=Spring())

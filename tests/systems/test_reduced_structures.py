@@ -203,3 +203,33 @@ def test_a_motion_of_many_coordinates_is_printed_in_short() -> None:
     assert "23 more" in printed
     assert "mode_8=" not in printed
     assert printed.count(",") < 25
+
+
+@pytest.mark.parametrize("rows", [4, 5, 9, 600])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_gap_between_two_rows_of_a_free_body_is_reduced(rows: int, place: int) -> None:
+    """Rounding often leaves a solution of the static equations, though nothing holds the body."""
+    mass, stiffness = bar(rows, held=False)
+    gap = saltus.Contact(name="gap", coordinate={place: 1.0, rows - 1: -1.0}, position=-0.2)
+    reduced = saltus.Structure.reduced(
+        0.7 * mass, 0.7 * stiffness, modes=min(rows - 1, 6), contacts=[gap]
+    )
+    found = frequencies(reduced)
+    assert found[0] < 1e-3 * found[1]
+    first = 2.0 * rows * np.sin(np.pi / (2.0 * (rows - 1)))
+    assert found[1] == pytest.approx(first, rel=2.0 / rows)
+
+
+def test_a_damping_of_one_triangle_is_no_symmetric_one() -> None:
+    mass = np.eye(2)
+    stiffness = np.diag([1.0, 2.0])
+    damping = np.array([[0.1, 0.8], [0.0, 0.1]])
+    ends = []
+    for model in (
+        saltus.Structure(mass=mass, stiffness=stiffness, damping=damping, contacts=[wall(0, 0.5)]),
+        saltus.Structure.reduced(mass, stiffness, damping, modes=1, contacts=[wall(0, 0.5)]),
+    ):
+        system = saltus.System(model=model, impact=saltus.NewtonImpact(0.5))
+        motion = saltus.simulate(system, **model.start([0.1, 0.2], velocity=0.3), duration=2.0)
+        ends.append(model.displacements(motion.position))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-12)

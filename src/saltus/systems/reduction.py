@@ -23,8 +23,10 @@ from saltus.errors import ParameterError, shown
 DENSE = 400
 # The shift s of what nothing holds, as a share of the largest stiffness by the largest mass.
 SHIFT = 1e-10
-# Static shapes that are larger than this are those of a motion that nothing holds.
-FLOATING = 1e5
+# The square of a frequency, in units of rounding of the largest, below which a mode is a motion of
+# what nothing holds.
+FLOATING = 10.0
+ITERATIONS = 4  # of the search for such a mode
 # A mass along a mode that is a smaller share of the largest is that of a mode without mass.
 MASSLESS = 1e-13
 SYMMETRIC = 1e-9  # the largest difference of two entries across the diagonal, as a share
@@ -39,8 +41,8 @@ class Shapes(NamedTuple):
 
 
 def sparse_matrix(given: Any, name: str) -> Any:
-    """A square matrix (rows, rows) of numbers in SciPy's compressed columns. A symmetric matrix of
-    which one triangle was given is completed.
+    """A square matrix (rows, rows) of numbers in SciPy's compressed columns. A mass or a stiffness of
+    which one triangle was given is completed; a damping need not be symmetric.
 
     Raises
     ------
@@ -79,7 +81,7 @@ def sparse_matrix(given: Any, name: str) -> Any:
     lower = sp.tril(found, k=-1)
     # SciPy counts stored zeros too
     counts = [int(np.count_nonzero(half.data)) for half in (upper, lower)]
-    if min(counts) == 0 < max(counts):
+    if name != "damping" and min(counts) == 0 < max(counts):
         found = sp.csc_array(found + (upper + lower).T)
     return found
 
@@ -136,11 +138,11 @@ def shapes_of(mass: Any, stiffness: Any, rows: np.ndarray, modes: int) -> Shapes
     """
     shift = 0.0
     solver = _Held(mass, stiffness, rows, shift)
-    static = solver.static()
-    if not np.abs(static).max() * np.abs(rows).max() < FLOATING:
-        shift = SHIFT * abs(stiffness).max() / abs(mass).max()
+    largest = abs(stiffness).max() / abs(mass).max()
+    if not abs(solver.slowest()) > FLOATING * np.finfo(float).eps * largest:
+        shift = SHIFT * largest
         solver = _Held(mass, stiffness, rows, shift)
-        static = solver.static()
+    static = solver.static()
     if not np.isfinite(static).all():
         raise ParameterError(
             "stiffness has rows without any number, or parts that nothing holds and that have no "
@@ -178,6 +180,24 @@ class _Held:
             self._factors = splu(sp.block_array(blocks, format="csc"))
         except RuntimeError:  # it is exactly singular
             self._factors = None
+
+    def slowest(self) -> float:
+        """About the square of the lowest frequency, by inverse iterations; 0 where there is none."""
+        if self._factors is None:
+            return 0.0
+        pad = np.zeros(len(self.rows))
+        shape = np.cos(np.arange(self.size) ** 2.0)
+        square = 0.0
+        for _ in range(ITERATIONS):
+            pushed = self.mass @ shape
+            size = np.sqrt(abs(float(shape @ pushed)))
+            solved = self._factors.solve(np.append(pushed, pad))[: self.size]
+            grown = np.sqrt(abs(float(solved @ (self.mass @ solved))))
+            if not (np.isfinite(grown) and grown > 0.0):
+                return 0.0
+            square = size / grown
+            shape = solved / grown
+        return square
 
     def static(self) -> np.ndarray:
         """The shapes with 1 along one row and 0 along the others, (n, kept); nan where there are

@@ -384,8 +384,8 @@ class Structure(ContactModel):
         ----------
         mass, stiffness, damping
             M, K and C, (rows, rows): arrays, sparse matrices of SciPy, or the paths of files of
-            Matrix Market (`.mtx`) or of `scipy.sparse.save_npz` (`.npz`). One triangle of a
-            symmetric matrix is enough.
+            Matrix Market (`.mtx`) or of `scipy.sparse.save_npz` (`.npz`). One triangle of the mass
+            and of the stiffness is enough.
         modes
             How many modes.
         keep
@@ -755,14 +755,14 @@ def _names_of(given: Any, size: int) -> tuple[str, ...]:
     if isinstance(given, str) or not np.iterable(given):
         raise ParameterError(f"names must be a list of names, got {shown(given)}", "names")
     names = tuple(given) or tuple(f"x{i}" for i in range(size))
+    for name in names:
+        _check_name(name, "names")
     if len(names) != size or len(set(names)) < size:
         raise ParameterError(
             f"names must be {size} different names, one for each row of the mass, got "
             f"{shown(given)}",
             "names",
         )
-    for name in names:
-        _check_name(name, "names")
     return names
 
 
