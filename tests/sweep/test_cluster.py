@@ -146,5 +146,5 @@ def test_a_cluster_without_workers_is_told(waves_plan, monkeypatch):
 
 def test_without_distributed_the_extra_is_named(waves_plan, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SweepError, match=r"pip install \"saltus\[cluster\]\""):
+    with pytest.raises(SweepError, match=r"pip install \"\.\[cluster\]\""):
         run(waves_plan(), scheduler="tcp://127.0.0.1:1")

@@ -130,7 +130,7 @@ def test_what_python_cannot_show_is_refused_and_changes_nothing(explorer):
 def test_without_anywidget_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(
-        saltus.SaltusError, match=r'through the package anywidget: pip install "saltus\[explore\]"'
+        saltus.SaltusError, match=r'through the package anywidget: pip install "\.\[explore\]"'
     ):
         saltus.explore(SYSTEM, theta=0.3)
 

@@ -566,7 +566,8 @@ def _end_shift(
 
 # A motion that ends at a corner of its load, up to this share of the forcing period, ends before it:
 # the rates there are extrapolated from two instants so far before.
-AT_CORNER, BEFORE_CORNER = 1e-10, 1e-7
+AT_CORNER = 1e-10
+BEFORE_CORNER = 1e-7
 
 
 def state_rates(motion: Motion) -> np.ndarray:
