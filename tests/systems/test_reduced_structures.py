@@ -233,3 +233,12 @@ def test_a_damping_of_one_triangle_is_no_symmetric_one() -> None:
         motion = saltus.simulate(system, **model.start([0.1, 0.2], velocity=0.3), duration=2.0)
         ends.append(model.displacements(motion.position))
     assert ends[0] == pytest.approx(ends[1], abs=1e-12)
+
+
+def test_masses_that_nothing_holds_or_joins_move_freely() -> None:
+    reduced = saltus.Structure.reduced(
+        np.eye(4), np.zeros((4, 4)), modes=3, contacts=[wall(3, 0.5)]
+    )
+    assert frequencies(reduced) == pytest.approx(np.zeros(4), abs=1e-6)
+    with pytest.raises(saltus.ParameterError, match="all of them are 0"):
+        saltus.Structure.reduced(np.zeros((4, 4)), np.eye(4), modes=3, contacts=[wall(3)])

@@ -136,11 +136,15 @@ def shapes_of(mass: Any, stiffness: Any, rows: np.ndarray, modes: int) -> Shapes
     ParameterError
         There are not as many modes; the stiffness is not positive where the rows are held.
     """
+    heaviest = abs(mass).max()
+    if not heaviest > 0.0:
+        raise ParameterError("mass must have numbers above 0, and all of them are 0", "mass")
     shift = 0.0
     solver = _Held(mass, stiffness, rows, shift)
-    largest = abs(stiffness).max() / abs(mass).max()
+    # without any stiffness the shift is all that holds the masses
+    largest = abs(stiffness).max() / heaviest or 1.0
     if not abs(solver.slowest()) > FLOATING * np.finfo(float).eps * largest:
-        shift = SHIFT * largest
+        shift = SHIFT * largest if stiffness.nnz else 1.0
         solver = _Held(mass, stiffness, rows, shift)
     static = solver.static()
     if not np.isfinite(static).all():

@@ -109,8 +109,9 @@ class Repeating(Signal):
     period: `scale` times its shape, and a mean.
 
     Contract: a subclass gives `shape()`, its `Pieces`, which no number of the system changes;
-    `half_a_period_later()` and `backward()`; and `factors()`, the numbers (factor, mean) by which the value is factor shape + mean. `quantity` is
-    that of the signal: a force, or of a ground channel an acceleration or a displacement.
+    `half_a_period_later()` and `backward()`; and `factors()`, the numbers (factor, mean) by which
+    the value is factor shape + mean. `quantity` is that of the signal: a force, or of a ground
+    channel an acceleration or a displacement.
     """
 
     __slots__ = ()
@@ -524,7 +525,8 @@ class Table(Repeating):
 
     def backward(self) -> Table:
         """The table read from its end, with steps as linear pieces between doubled times."""
-        times, values = self.times, self.values
+        times = self.times
+        values = self.values
         if self.interpolation == "previous":
             times = np.repeat(times, 2)[1:-1]
             values = np.repeat(values[:-1], 2)

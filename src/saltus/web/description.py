@@ -173,7 +173,8 @@ def _declared(system: System, path: str) -> tuple[str, str, NumberRange]:
     holder: Any = system
     for number, name in enumerate(names := path.split(".")):
         if dataclasses.is_dataclass(node):
-            holder, field = node, name
+            holder = node
+            field = name
             where = ".".join(names[:number])
         node = children(node).get(name)
     kind: Any = type(holder)

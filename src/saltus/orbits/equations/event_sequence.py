@@ -54,8 +54,8 @@ TIME_TO_CORNER = "time between an event and a corner of the load"
 
 
 class OrbitEvent(NamedTuple):
-    """An event: its kind as in `EventCode`, or CORNER; the contacts and frictions as bits, and the number of
-    the mode after it.
+    """An event: its kind as in `EventCode`, or CORNER; the contacts and frictions as bits, and the
+    number of the mode after it.
     """
 
     kind: int
@@ -342,8 +342,8 @@ def section_of(
     motion: Motion, frequency: float, phase: float | None = None, duration: float | None = None
 ) -> tuple[float, np.ndarray]:
     """The phase and the state of a motion at a section: the middle of its longest smooth stretch
-    within the first `duration`, also between corners of its load, in which not all coordinates are held; or the state at a phase that
-    is given.
+    within the first `duration`, also between corners of its load, in which not all coordinates are
+    held; or the state at a phase that is given.
 
     The longer that stretch, the longer a branch can be followed before an event comes to the
     section.
