@@ -210,7 +210,7 @@ def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
     if isinstance(orbit, FreeOrbit):
         motion = orbit.motion()
         return motion, motion.start, motion.time
-    motion = orbit.motion(2 * orbit.period)
+    motion = orbit.motion(2 * orbit.signature.period)
     edges = [
         time for time in motion.impacts.time.tolist() if time > motion.start + 1e-9 * orbit.duration
     ]

@@ -116,9 +116,11 @@ class PeriodicOrbit(Result):
         return self.equations.signature
 
     @property
-    def period(self) -> int:
-        """q, the number of forcing periods after which the orbit repeats itself."""
-        return self.signature.period
+    def period(self) -> Any:
+        """q, the number of forcing periods after which the orbit repeats itself; of a cycle of a
+        system without a load that varies, the time after which it does.
+        """
+        return self.equations.period_of(self.solution)
 
     @property
     def symmetric(self) -> bool:
@@ -127,13 +129,13 @@ class PeriodicOrbit(Result):
 
     @property
     def frequency(self) -> float:
-        """Omega of the load."""
-        return self.equations.frequency(self.solution.values)
+        """Omega of the load; of a cycle without one, 2 pi by the time of one of its rounds."""
+        return self.equations.frequency_of(self.solution)
 
     @property
     def duration(self) -> float:
-        """q 2 pi / Omega."""
-        return 2.0 * math.pi * self.period / self.frequency
+        """The time of its period, q 2 pi / Omega."""
+        return 2.0 * math.pi * self.signature.period / self.frequency
 
     @cached_property
     def _impacts(self) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +151,7 @@ class PeriodicOrbit(Result):
         if not self.releases.size:
             return phases, speeds
         first = self.releases[0] * self.frequency
-        phases = first + (phases - first) % (2.0 * math.pi * self.period)
+        phases = first + (phases - first) % (2.0 * math.pi * self.signature.period)
         order = np.argsort(phases, kind="stable")
         return phases[order], speeds[order]
 
@@ -201,7 +203,7 @@ class PeriodicOrbit(Result):
         the forcing period.
         """
         found = self.equations.rests(self.solution)
-        period = self.duration / self.period
+        period = self.duration / self.signature.period
         if not found.size:
             return found
         within = found[:, 0] % period
@@ -345,7 +347,8 @@ class PeriodicOrbit(Result):
         """
         phases = self._phases
         in_order = (
-            np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.period)) > -TOLERANCES.touch
+            np.diff(np.append(phases, phases[:1] + 2.0 * math.pi * self.signature.period))
+            > -TOLERANCES.touch
         )
         return self.room > -TOLERANCES.touch and bool(in_order.all())
 
@@ -366,15 +369,12 @@ class PeriodicOrbit(Result):
         Of equal ones, up to rounding, the larger real part comes first, and of a complex pair the
         one above the real axis.
         A contact that is closed for a part of the period makes some 0.
+        A cycle without a load has one fewer: that of its own direction is always 1 and left out.
         They are inf where the orbit has an impact without speed: motions beside it without this
         impact have other ones.
         """
-        model = self.equations.given.model
-        count = 2 * len(model.coordinates) - len(model.first_order)
-        chain = self.solution.evaluation.monodromy()
-        following = self.equations.following
-        if following.size:
-            chain = np.delete(np.delete(chain, following, axis=0), following, axis=1)
+        count = self.equations.multiplier_count
+        chain = self.equations.return_map(self.solution.evaluation)
         if self._has_touch or not np.isfinite(chain).all():
             return np.full(count, complex(np.inf))
         values = np.zeros(count, dtype=complex)  # 0 for what contacts hold where the state is given
@@ -452,7 +452,8 @@ class PeriodicOrbit(Result):
     def followed(self) -> Motion:
         """One period of its motion in the coordinates of its equations."""
         start = self.equations.start(self.solution)
-        return simulate(self.system.in_gap_coordinates, **start, periods=self.period, tol=1e-13)
+        lasting = self.equations.lasting(self.solution, self.signature.period)
+        return simulate(self.system.in_gap_coordinates, **start, **lasting, tol=1e-13)
 
     def motion(self, periods: float | None = None, tol: float = 1e-13) -> Motion:
         """The exact motion on the orbit, from `start`.
@@ -460,16 +461,14 @@ class PeriodicOrbit(Result):
         Parameters
         ----------
         periods
-            How many forcing periods; by default one period of the orbit.
+            How many forcing periods, of a cycle without a load how many rounds; by default one
+            period of the orbit.
         tol
             The error that one step may make.
         """
-        return simulate(
-            self.system,
-            **self.start(),
-            periods=self.period if periods is None else periods,
-            tol=tol,
-        )
+        rounds = self.signature.period if periods is None else periods
+        lasting = self.equations.lasting(self.solution, rounds)
+        return simulate(self.system, **self.start(), **lasting, tol=tol)
 
     @cached_property
     def defect(self) -> float:
@@ -507,16 +506,17 @@ class PeriodicOrbit(Result):
         rounds
             The number of its periods.
         """
-        check_count("rounds", rounds, 1, LIMITS.periods // self.period)
+        check_count("rounds", rounds, 1, LIMITS.periods // self.signature.period)
         start = self.start()
-        motion = self.motion(rounds * self.period)
+        motion = self.motion(rounds * self.signature.period)
         apart = np.subtract(motion.final_state, state_of(self.system, start))
         apart /= natural_units(self.system).state
         return float(np.abs(apart[: len(apart) - len(self.system.model.first_order)]).max())
 
     @cached_property
     def state(self) -> tuple[Any, Any]:
-        """Coordinate and velocity at phase 0 of the load, the stroboscopic section."""
+        """Coordinate and velocity at phase 0 of the load, the stroboscopic section; of a cycle
+        without a load, at its start."""
         start = self.start()
         if not start.get("time", 0.0):
             position, velocity = np.split(
@@ -592,7 +592,7 @@ class PeriodicOrbit(Result):
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
         return (
-            f"PeriodicOrbit({kind}period {self.period}, {self.impact_count} impacts,"
+            f"PeriodicOrbit({kind}period {self.period:.9g}, {self.impact_count} impacts,"
             f" amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'}, largest"
             f" multiplier {self.multipliers[0]:.6g}, residual={self.residual:.1g})"
         )

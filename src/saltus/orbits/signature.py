@@ -53,6 +53,10 @@ class Signature:
     section
         For an orbit that is followed through its events: the phase at which its state is the
         unknown. None for all others.
+    through
+        For a cycle of a system on which nothing acts that varies with time: the state through which
+        its section passes, and the direction of its flow there, to which the section is orthogonal
+        in natural units. Empty for all others.
 
     Examples
     --------
@@ -67,6 +71,7 @@ class Signature:
     events: tuple[ModeChange, ...] = ()
     closed: int = 0
     section: float | None = None
+    through: tuple[float, ...] = ()
 
     def _repr_html_(self) -> str:
         events = self.sides or " ".join(map(str, self.events)) or "none"

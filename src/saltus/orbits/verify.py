@@ -81,7 +81,7 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
     """One row for each orbit, (n, m), as `closing_distances` takes them: the parameter along the
     common path, if there is one, coordinates and velocities at the start, its time, the speed
-    before the first impact (-1 without), and the forcing periods."""
+    before the first impact (-1 without), and the forcing periods, or the time of a cycle."""
     rows = []
     for orbit in orbits:
         start = orbit.start()
@@ -111,6 +111,9 @@ def closing_distances(
         *columns, times, speeds, _ = rows[places].T
         varied, states = ({path: columns[0]}, columns[1:]) if path is not None else ({}, columns)
         begin = dict(zip(names, states, strict=False))
+        # that of a cycle without a load is a time
+        forced = system.load.period is not None
+        lasting = {"periods": int(periods)} if forced else {"duration": float(periods)}
         velocities = states[count:]
         velocity: Any = (
             velocities[0] if len(moving) == 1 else tuple(velocities[: len(moving)]) or 0.0
@@ -121,7 +124,7 @@ def closing_distances(
             velocity=velocity,
             time=times,
             parameters=varied,
-            periods=int(periods),
+            **lasting,
             sample=(),
             tol=tol,
         )

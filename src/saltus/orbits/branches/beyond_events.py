@@ -38,7 +38,6 @@ from saltus.orbits.equations.event_sequence import (
     TIME_BETWEEN,
     EventSequence,
     OrbitEvent,
-    section_of,
 )
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.sampled_motion import REACTION
@@ -378,7 +377,7 @@ def parent_at(cut: Cut, points: Sequence[OrbitPoint]) -> SpecialPoint | None:
     if parent is None:
         return None
     return SpecialPoint(
-        SpecialKind.BPC if cut.point.orbit.period % 2 else SpecialKind.PD,
+        SpecialKind.BPC if cut.point.orbit.signature.period % 2 else SpecialKind.PD,
         parent,
         cut.special.evidence,
     )
@@ -554,20 +553,18 @@ def _clear_of_section(ahead: OrbitPoint) -> OrbitPoint:
 
 
 def _from_another_section(point: OrbitPoint) -> OrbitPoint | None:
-    """The same orbit with its section at a phase farther from all events, and with its tangent
-    there.
-    """
+    """The same orbit with its section farther from all events, and with its tangent there."""
     equations: Any = point.orbit.equations
-    phase, state = section_of(point.orbit.followed, point.orbit.frequency)
-    moved = equations.with_signature(replace(equations.signature, section=phase))
+    signature, unknowns = equations.section_along(point.orbit.followed, point.solution)
+    moved = equations.with_signature(signature)
     near = point.beside(SETTINGS.along)
-    first = PeriodicOrbit.near(moved, state, point.parameters)
+    first = PeriodicOrbit.near(moved, unknowns, point.parameters)
     if near is None or first is None:
         return None
     # both states in the same forcing period: otherwise the tangent would lead from one state of the
     # orbit to another state of it
-    guess = equations.state_at(
-        phase, near.solution.unknowns, near.parameters, first.solution.unknowns
+    guess = equations.unknowns_at(
+        signature, near.solution.unknowns, near.parameters, first.solution.unknowns
     )
     second = None if guess is None else PeriodicOrbit.near(moved, guess, near.parameters)
     if second is None:

@@ -259,7 +259,7 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
         "period": (
             "point",
             np.array([orbit.period for orbit in orbits]),
-            {"long_name": "forcing periods in one period of the orbit"},
+            {"long_name": "forcing periods in one period of the orbit, or the time of a cycle"},
         ),
         "side": (
             "point",
@@ -277,6 +277,11 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     sections = np.array(
         [np.nan if orbit.signature.section is None else orbit.signature.section for orbit in orbits]
     )
+    # of cycles, whose period is a time: how often they go round, and their section
+    through = [orbit.signature.through for orbit in orbits]
+    if any(through):
+        data["rounds"] = ("point", np.array([orbit.signature.period for orbit in orbits]))
+        data["through"] = (("point", "section_number"), np.array(through))
     return data | {
         "section": ("point", sections),
         "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),
@@ -312,17 +317,20 @@ def _special(special: tuple[SpecialPoint, ...], coordinates: tuple[str, ...]) ->
         rows["special_enclosure"] = [np.nan if p is None else p.parameter[0] for p in proofs]
         rows["special_radius"] = [np.inf if p is None else p.parameter[1] for p in proofs]
     return {
-        name: ("special", np.array(values, dtype=_dtype(name))) for name, values in rows.items()
+        name: ("special", np.array(values, dtype=_dtype(name, values)))
+        for name, values in rows.items()
     }
 
 
-def _dtype(name: str) -> type:
+def _dtype(name: str, values: list[Any]) -> type:
     """The type of a column of special points, which NumPy cannot tell if the column has no rows."""
+    if name == "special_period":
+        return float if any(isinstance(value, float) for value in values) else int
     return (
         str
         if name == "kind"
         else int
-        if name in ("special_impact_count", "special_period", "special_proved")
+        if name in ("special_impact_count", "special_proved")
         else float
     )
 
@@ -379,7 +387,8 @@ def orbits_of(dataset: xarray.Dataset) -> list[PeriodicOrbit]:
 
 def _signatures(dataset: xarray.Dataset) -> list[Signature]:
     """The signature of each orbit."""
-    columns = (dataset[name].values for name in ("sides", "period", "symmetric", "side"))
+    rounds = "rounds" if "rounds" in dataset else "period"
+    columns = (dataset[name].values for name in ("sides", rounds, "symmetric", "side"))
     signatures = [_signature(*row) for row in zip(*columns, strict=True)]
     changes = [
         tuple(ModeChange(bool(k), int(i), int(c)) for k, i, c in table.reshape(-1, 3) if k >= 0)
@@ -390,6 +399,7 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
         changes,
         dataset["closed_contacts"].values,
         dataset["section"].values,
+        dataset["through"].values if "through" in dataset else [()] * len(signatures),
         strict=True,
     )
     return [
@@ -398,8 +408,9 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
             events=events,
             closed=int(closed),
             section=None if np.isnan(section) else float(section),
+            through=tuple(map(float, through)),
         )
-        for signature, events, closed, section in more
+        for signature, events, closed, section, through in more
     ]
 
 

@@ -229,7 +229,9 @@ def _in_other_equations(orbit: PeriodicOrbit, path: str) -> PeriodicOrbit | None
     """
     position, velocity = orbit.state
     state = {orbit.system.model.coordinates[0]: position, "velocity": velocity}
-    return orbit_near(equations_of(orbit.system, Signature((), 1), (path,)), state, orbit.period)
+    return orbit_near(
+        equations_of(orbit.system, Signature((), 1), (path,)), state, orbit.signature.period
+    )
 
 
 MOST_DOUBLED = 64  # forcing periods of an orbit: periods double six times
@@ -388,7 +390,7 @@ class Cascade(Result):
     @property
     def periods(self) -> np.ndarray:
         """The periods of the orbits that double."""
-        return np.array([point.orbit.period for point in self.points])
+        return np.array([point.orbit.signature.period for point in self.points])
 
     @property
     def ratios(self) -> np.ndarray:
@@ -460,7 +462,7 @@ def doubling_cascade(
     if first.kind != SpecialKind.PD:
         raise ParameterError(f"a cascade begins at a PD, not at a {first.kind}", "first")
     bounds, points = check_bounds(bounds), [first]
-    while 2 * points[-1].orbit.period <= max_period:
+    while 2 * points[-1].orbit.signature.period <= max_period:
         start = _doubled(points[-1].point)
         if start is None:
             break

@@ -187,7 +187,7 @@ class BranchEvents(OrbitEvents):
         the parent's branch at which the family is born."""
         if not passes_image(point, ahead):
             return None
-        kind = SpecialKind.BPC if point.orbit.period % 2 else SpecialKind.PD
+        kind = SpecialKind.BPC if point.orbit.signature.period % 2 else SpecialKind.PD
         parent = parent_point(point, ahead)
         if parent is not None:
             last = on_family(point, parent.point)
@@ -316,7 +316,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
     there; None if it settles on no orbit.
     """
     equations = point.orbit.equations
-    period = point.orbit.period
+    period = point.orbit.signature.period
     for values in restart.values:
         try:
             system = equations.given_at(values)
@@ -331,7 +331,9 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
             orbit = (
                 None
                 if orbit is None
-                else orbit_from(base, arguments_of(system, orbit.section_state), orbit.period)
+                else orbit_from(
+                    base, arguments_of(system, orbit.section_state), orbit.signature.period
+                )
             )
         except SaltusError:
             continue

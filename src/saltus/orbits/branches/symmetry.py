@@ -246,7 +246,7 @@ def repetition(point: OrbitPoint) -> str | None:
     """
     difference = asymmetry(point)
     if (
-        point.orbit.period % 2
+        point.orbit.signature.period % 2
         and difference is not None
         and np.abs(difference).max() < TOLERANCES.grazing_orbits
     ):
@@ -271,7 +271,7 @@ def half(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     """
     equations = orbit.equations
     solution = orbit.solution
-    both = equations.halves(solution, mirrored=True) if orbit.period % 2 else None
+    both = equations.halves(solution, mirrored=True) if orbit.signature.period % 2 else None
     units = equations.halved.units.unknowns
     if both is None or np.abs((both[1] - both[0]) / units).max() > TOLERANCES.halves:
         return None
@@ -288,7 +288,7 @@ def divide(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
     for other orbits.
     """
     unknowns = orbit.solution.unknowns
-    for q in range(1, orbit.period):
+    for q in range(1, orbit.signature.period):
         short = orbit.signature.part(q)
         if short is None:
             continue

@@ -160,31 +160,37 @@ class MotionToRead:
     periods are read.
     """
 
-    def __init__(self, system: System, state: dict[str, Any], periods: int) -> None:
+    def __init__(
+        self, system: System, state: dict[str, Any], periods: int, length: float | None = None
+    ) -> None:
         self.system = system
         self.state = state
         self.periods = periods
+        self.length = length  # of a round of a cycle, which has no forcing period
 
     @property
     def duration(self) -> float:
         """How long these periods last."""
-        period = self.system.load.period
+        period = self.system.load.period if self.length is None else self.length
         assert period is not None
         return self.periods * period
 
     @cached_property
     def once(self) -> Motion:
         """The motion over these periods."""
-        return simulate(self.system, **self.state, periods=self.periods)
+        return simulate(self.system, **self.state, **self._lasting(1))
 
     @cached_property
     def twice(self) -> Motion:
         """The motion over twice as many, so that its events can be counted from any of them on, at
         the tolerance of orbits.
         """
-        return simulate(
-            self.system, **self.state, periods=2 * self.periods, tol=10.0 * ORBIT_TOLERANCE
-        )
+        return simulate(self.system, **self.state, **self._lasting(2), tol=10.0 * ORBIT_TOLERANCE)
+
+    def _lasting(self, times: int) -> dict[str, Any]:
+        if self.length is None:
+            return {"periods": times * self.periods}
+        return {"duration": times * self.duration}
 
 
 class OrbitEquations(ABC):
@@ -242,6 +248,8 @@ class OrbitEquations(ABC):
     corrector_radius: float = math.inf  # see `EquationCurve`
     # the largest residual that rounding may leave; above 0 where multipliers are very large
     residual_floor: float = 0.0
+    # whether the period is that of a load; it is an unknown of a cycle
+    has_forcing: bool = True
 
     def __init__(
         self,
@@ -250,7 +258,7 @@ class OrbitEquations(ABC):
         paths: tuple[str, ...] = (),
         tol: float = ORBIT_TOLERANCE,
     ) -> None:
-        if system.load.frequency is None:
+        if system.load.frequency is None and self.has_forcing:
             raise ParameterError(
                 "a load without a frequency has no forcing period, and so no periodic orbits; "
                 "give it a frequency",
@@ -272,7 +280,7 @@ class OrbitEquations(ABC):
         names = [path for path, _ in numbers(system)]
         self._values = np.array([value for _, value in numbers(system)])
         self._places = [names.index(path) for path in paths]
-        self._frequency = names.index(FREQUENCY)
+        self._frequency = names.index(FREQUENCY) if self.has_forcing else -1
         self._follower = SegmentFollower(self._run, tol)
         self._records = record_table(system, [])
 
@@ -497,7 +505,11 @@ class OrbitEquations(ABC):
         """Whether a branch point is a period doubling in a system whose equations repeat themselves
         after half a forcing period, in words."""
         orbit = point.orbit
-        if orbit.symmetric or not orbit.period % 2 or not has_half_the_period(orbit.system):
+        if (
+            orbit.symmetric
+            or not self.signature.period % 2
+            or not has_half_the_period(orbit.system)
+        ):
             return ""
         motion = orbit.motion()
         middle = np.concatenate(
@@ -617,6 +629,32 @@ class OrbitEquations(ABC):
             if FREQUENCY in self.paths
             else self._values[self._frequency]
         )
+
+    def frequency_of(self, solution: Solution) -> float:
+        """The frequency of an orbit's rounds, of which its signature counts the period: that of the
+        load.
+        """
+        return self.frequency(solution.values)
+
+    def period_of(self, solution: Solution) -> float:
+        """The period of an orbit as it is shown: in forcing periods, or the time of a cycle."""
+        return self.signature.period
+
+    def lasting(self, solution: Solution, rounds: float) -> dict[str, Any]:
+        """The arguments of `simulate` for a motion of so many rounds, the forcing periods."""
+        return {"periods": rounds}
+
+    @property
+    def multiplier_count(self) -> int:
+        """The number of an orbit's multipliers."""
+        model = self.given.model
+        return 2 * len(model.coordinates) - len(model.first_order)
+
+    def return_map(self, evaluation: OrbitEvaluation) -> np.ndarray:
+        """The map whose eigenvalues are the multipliers, but for those that contacts make 0."""
+        chain = evaluation.monodromy()
+        following = self.following
+        return np.delete(np.delete(chain, following, axis=0), following, axis=1)
 
     def system_at(self, values: np.ndarray) -> System:
         """The system with the given parameters.

@@ -348,25 +348,33 @@ def section_of(
     The longer that stretch, the longer a branch can be followed before an event comes to the
     section.
     """
-    assert motion.dense is not None
-    end = motion.time if duration is None else motion.start + duration
-    if phase is None:
-        bounds = np.unique(
-            [
-                motion.start,
-                *corners_between(motion.system.load, motion.start, end),
-                *(event.time for event in motion.events if motion.start < event.time < end),
-                end,
-            ]
-        )
-        spans = np.diff(bounds)
-        middles = 0.5 * (bounds[1:] + bounds[:-1])
-        moves = _moves(motion.system, motion.dense.states(middles)[2])
-        time = float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
-    else:
-        time = motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
+    time = (
+        section_time(motion, duration)
+        if phase is None
+        else motion.start + (phase / frequency - motion.start) % (2.0 * np.pi / frequency)
+    )
     state = np.concatenate([np.atleast_1d(x) for x in motion.at(time)])
     return time * frequency % (2.0 * np.pi), state
+
+
+def section_time(motion: Motion, duration: float | None = None) -> float:
+    """The middle of a motion's longest smooth stretch within the first `duration`, also between
+    corners of its load, in which not all coordinates are held.
+    """
+    assert motion.dense is not None
+    end = motion.time if duration is None else motion.start + duration
+    bounds = np.unique(
+        [
+            motion.start,
+            *corners_between(motion.system.load, motion.start, end),
+            *(event.time for event in motion.events if motion.start < event.time < end),
+            end,
+        ]
+    )
+    spans = np.diff(bounds)
+    middles = 0.5 * (bounds[1:] + bounds[:-1])
+    moves = _moves(motion.system, motion.dense.states(middles)[2])
+    return float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
 
 
 def _moves(system: System, side: np.ndarray) -> np.ndarray:

@@ -122,20 +122,72 @@ class WholeMotionEquations(OrbitEquations):
         phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
         return cls(base.given, Signature((), periods, section=phase), base.paths, base.tol), state
 
+    def section_along(self, motion: Motion, solution: Solution) -> tuple[Signature, np.ndarray]:
+        """The signature with its section far from the events of an orbit's motion, and the unknowns
+        there.
+        """
+        phase, state = section_of(motion, self.frequency(solution.values))
+        return replace(self.signature, section=phase), state
+
     @property
     def size(self) -> int:
         return 2 * self.own
 
+    def section_time(self, values: np.ndarray) -> float:
+        """The time at the section, at which the motion begins."""
+        return float(self.signature.section or 0.0) / self.frequency(values)
+
+    def _lasting(self, unknowns: np.ndarray) -> dict[str, float | None]:
+        """How long the motion lasts that the equations cover."""
+        return {"periods": self.signature.span, "duration": None}
+
+    def _may_solve(self, unknowns: np.ndarray, values: np.ndarray) -> bool:
+        """Whether a motion can be asked for at a place."""
+        return bool(
+            self.frequency(values) > 0.0
+            and np.isfinite(unknowns).all()
+            and np.isfinite(values).all()
+        )
+
+    def _apart(self, after: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        """The residual, from the state at the end of the motion."""
+        return np.asarray(after - unknowns)
+
+    def _evaluation(
+        self, motion: Motion, after: np.ndarray, unknowns: np.ndarray, slopes: np.ndarray
+    ) -> WholeMotionEvaluation:
+        """The equations, from the state at the end of a motion and its derivatives to the state at
+        the start and to the parameters.
+        """
+        n = len(after)
+        here = slopes[None, :, :n].copy()
+        parameters = slopes[:, n:].copy()
+        here[:, self.following] = parameters[self.following] = 0.0
+        return WholeMotionEvaluation(
+            self._apart(after, unknowns),
+            here,
+            -np.eye(n)[None],
+            parameters,
+            modes_in(self.system).listed(motion),
+            self._extremes(None),
+            None,
+            None,
+        )
+
+    def _middle(self, state: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        """The state after half of the time as unknowns of the halved equations."""
+        return state
+
     def start(self, solution: Solution) -> dict[str, Any]:
         """At the section."""
         system = self.system_at(solution.values)
-        time = float(self.signature.section or 0.0) / self.frequency(solution.values)
-        return {**arguments_of(system, self.start_state(solution.unknowns, system)), "time": time}
+        state = self.start_state(solution.unknowns, system)
+        return {**arguments_of(system, state), "time": self.section_time(solution.values)}
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         times = solution.evaluation.ends[:, 0]
         speeds = solution.evaluation.ends[:, 1]
-        return times * self.frequency(solution.values), speeds
+        return times * self.frequency_of(solution), speeds
 
     def rests(self, solution: Solution) -> np.ndarray:
         found = events_of(solution.evaluation)
@@ -179,7 +231,7 @@ class WholeMotionEquations(OrbitEquations):
             self.signature.symmetric,
         ):
             return None
-        return self.state_at(target.section, unknowns, values, other.solution.unknowns)
+        return self.unknowns_at(target, unknowns, values, other.solution.unknowns)
 
     def has_events_of(self, solution: Solution, other: Solution) -> bool:
         return events_of(solution.evaluation).sequence == events_of(other.evaluation).sequence
@@ -194,9 +246,8 @@ class WholeMotionEquations(OrbitEquations):
         return point if found is None else other.curve.with_tangent(found, other.tangent) or point
 
     def at_another_section(self, orbit: PeriodicOrbit) -> PeriodicOrbit | None:
-        phase, state = section_of(orbit.followed, orbit.frequency)
-        moved = self.with_signature(replace(self.signature, section=phase))
-        return PeriodicOrbit.near(moved, state, orbit.solution.values)
+        signature, unknowns = self.section_along(orbit.followed, orbit.solution)
+        return PeriodicOrbit.near(self.with_signature(signature), unknowns, orbit.solution.values)
 
     def barrier(self, point: OrbitPoint) -> TestFunction:
         return same_events(point)
@@ -264,7 +315,7 @@ class WholeMotionEquations(OrbitEquations):
         twin = cast("Any", system)
         if not self.system.dependent:
             return state
-        time = float(self.signature.section or 0.0) / twin.load.frequency
+        time = float(self.signature.section or 0.0) / (twin.load.frequency or 1.0)
         return np.asarray(
             twin.model.completed(
                 time, twin.load, state, [place for place in held if place < self.own]
@@ -318,20 +369,17 @@ class WholeMotionEquations(OrbitEquations):
             middle = np.concatenate([np.atleast_1d(part) for part in half])
             extremes = self._extremes(sampled)
             middle[self.following] = 0.0
+            middle = self._middle(middle, unknowns)
             evaluation = replace(evaluation, extremes=extremes, events=events, middle=middle)
             self._latest = place, (motion, evaluation)
         return evaluation
 
     def residual(self, unknowns: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-        frequency = self.frequency(values)
-        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+        if not self._may_solve(unknowns, values):
             return None
         try:
             system = self.system_at(values)
-            state = self.start_state(unknowns, system)
-            request, run = self._request(
-                system, state, float(self.signature.section or 0.0) / frequency, values, None
-            )
+            request, run = self._request(system, unknowns, values, None)
             motion = follow(request, silent, run).motion
         except SaltusError:
             return None
@@ -340,23 +388,18 @@ class WholeMotionEquations(OrbitEquations):
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
         after = self.image_of(after) if self.signature.symmetric else after
         after[self.following] = 0.0
-        return np.asarray(after - unknowns)
+        return self._apart(after, unknowns)
 
     def _evaluated(
         self, unknowns: np.ndarray, values: np.ndarray
     ) -> tuple[Motion, WholeMotionEvaluation] | None:
         """The motion over the time that the equations cover, and the equations without extremes;
         None where the motion cannot be followed."""
-        frequency = self.frequency(values)
-        if not (frequency > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()):
+        if not self._may_solve(unknowns, values):
             return None
-        phase = float(self.signature.section or 0.0)
         try:
             system = self.system_at(values)
-            state = self.start_state(unknowns, system)
-            found = derivatives_of(
-                *self._request(system, state, phase / frequency, values, self.paths)
-            )
+            found = derivatives_of(*self._request(system, unknowns, values, self.paths))
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion = found.motion
@@ -370,30 +413,26 @@ class WholeMotionEquations(OrbitEquations):
             first = motion.dense.series[0]
             before = np.concatenate([first[:, 1], 2.0 * first[:, 2]])
             parameters[:, self.paths.index(FREQUENCY)] -= (
-                (rates - found.state @ before) * phase / frequency**2
+                (rates - found.state @ before) * self.section_time(values) / self.frequency(values)
             )
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
         state = found.state
         if self.system.dependent:
-            by_unknowns, by_parameters = self._start_slopes(unknowns, system)
+            by_unknowns, by_parameters = self._start_slopes(unknowns[: len(after)], system)
             state, parameters = state @ by_unknowns, parameters + state @ by_parameters
         if self.signature.symmetric:
             after = self.image_of(after)
             state, parameters = (self.turned(numbers.T).T for numbers in (state, parameters))
-        here = state[None].copy()
-        there = -np.eye(len(after))[None]
-        here[:, self.following] = parameters[self.following] = after[self.following] = 0.0
-        residual = after - unknowns
-        impacts = modes_in(self.system).listed(motion)
-        return motion, WholeMotionEvaluation(
-            residual, here, there, parameters, impacts, self._extremes(None), None, None
-        )
+        after[self.following] = 0.0
+        return motion, self._evaluation(motion, after, unknowns, np.hstack([state, parameters]))
 
-    def state_at(
-        self, phase: float, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray
+    def unknowns_at(
+        self, target: Signature, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray
     ) -> np.ndarray | None:
-        """The state of the orbit at a phase of the load: of one such state in each forcing period,
-        the nearest to the state `near`. None where the motion cannot be followed."""
+        """The unknowns of the orbit at the section of another signature: of one such state in each
+        forcing period, the nearest to the state `near`. None where the motion cannot be
+        followed."""
+        phase = float(target.section or 0.0)
         if (
             self.evaluate(unknowns, values) is None
             or self._latest is None
@@ -444,8 +483,7 @@ class WholeMotionEquations(OrbitEquations):
     def _request(
         self,
         system: System,
-        state: np.ndarray,
-        time: float,
+        unknowns: np.ndarray,
         values: np.ndarray,
         paths: tuple[str, ...] | None,
     ) -> tuple[MotionRequest, Any]:
@@ -454,16 +492,16 @@ class WholeMotionEquations(OrbitEquations):
         """
         names = system.model.coordinates
         own = self.own
+        state = self.start_state(unknowns, system)
         parameters = self._values.copy()
         parameters[self._places] = values
         request = MotionRequest(
             system=system,
             coordinates=dict(zip(names, state[:own].tolist(), strict=True)),
             velocity=float(state[own]) if own == 1 else tuple(state[own:].tolist()),
-            periods=self.signature.span,
-            duration=None,
+            **self._lasting(unknowns),
             tol=self.tol,
-            time=time,
+            time=self.section_time(values),
             side=None,
             stop_at=(),
             dense=paths is not None,

@@ -28,7 +28,8 @@ from saltus.flow import (
 from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_symmetry
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.event_sequence import STAYS
-from saltus.orbits.equations.kinds import KINDS, equations_of
+from saltus.orbits.equations.kinds import equations_of, kinds_of
+from saltus.orbits.finding.cycles import Return, after, next_return, settled_return
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
@@ -67,8 +68,8 @@ def find_orbit(
     system: System,
     *,
     velocity: Speeds = 0.0,
-    period: int | None = None,
-    settle: int | None = None,
+    period: float | None = None,
+    settle: float | None = None,
     max_period: int = SETTINGS.max_period,
     parameters: tuple[str, ...] = (),
     time: float = 0.0,
@@ -79,23 +80,27 @@ def find_orbit(
     """The periodic orbit on which a motion settles, or, with settle=0, the one that lies near it,
     stable or not.
 
+    Under a load without a frequency, on which nothing acts that varies with time, it is a cycle,
+    whose period is an unknown: `orbit.period` is then a time. The motion is followed until it comes
+    back to where it was. `period` may give a guess of this time, and `settle` is a time as well.
+
     Where impacts have a loss and the load pulls the system off its contact in every period, the
     orbit may rest in between.
 
     Parameters
     ----------
     system
-        What moves, under a load with a frequency.
+        What moves, under a load with a frequency or a constant one.
     velocity, coordinates
         The state at `time`, by the model's names: theta=0.3.
     period
-        The period of the orbit in forcing periods; by default the shortest one, up to `max_period`,
+        The period of the orbit in forcing periods, of a cycle a guess of its time; by default the shortest one, up to `max_period`,
         after which the motion returns.
     settle
-        How many forcing periods the motion is followed first; by default until it has settled, up
-        to 4960.
+        How many forcing periods, or for what time, the motion is followed first; by default until
+        it has settled, up to 4960 forcing periods.
     max_period
-        The longest period that is looked for.
+        The longest period that is looked for, in forcing periods; without meaning for cycles.
     parameters
         Dotted paths along which the orbit will be continued; not needed for `continue_orbit`, which
         adds its own.
@@ -118,11 +123,15 @@ def find_orbit(
     >>> saltus.find_orbit(system, theta=0.3).signature.impact_count
     2
     """
-    counts = {"period": period, "max_period": max_period, "settle": settle}
-    _check(system, parameters, counts)
+    given = {"period": period, "max_period": max_period, "settle": settle}
+    _check(system, parameters, given)
     check_number("time", time)
-    others = ("parameters", "time", "side", "progress", *counts)
+    others = ("parameters", "time", "side", "progress", *given)
     state = arguments_of(system, read_start(system, velocity, coordinates, others, time))
+    if system.load.frequency is None:
+        base = equations_of(system, Signature((), 1), tuple(parameters))
+        return _cycle(base, state, side, period, settle, progress)
+    period, settle = (None if count is None else int(count) for count in (period, settle))
     if side is not None or time:
         state = _at_phase_0(system, state, time, side)
     progress(0.0, "following the motion")
@@ -150,14 +159,52 @@ def find_orbit(
     )
 
 
-def _check(system: System, parameters: Iterable[str], counts: dict[str, int | None]) -> None:
+def _check(system: System, parameters: Iterable[str], given: dict[str, Any]) -> None:
     """Refuse arguments without meaning."""
     check_system(system, "find_orbit", several_contacts=True)
-    for name, count in counts.items():
-        if count is not None or name == "max_period":
-            check_count(name, count, 0 if name == "settle" else 1)
+    for name, value in given.items():
+        if value is None and name != "max_period":
+            continue
+        if system.load.frequency is not None or name == "max_period":
+            check_count(name, value, 0 if name == "settle" else 1)
+        elif name == "settle":
+            check_number(name, value, at_least=0.0)
+        else:
+            check_number(name, value, above=0.0)
     for path in check_names("parameters", parameters, "parameters, such as ('load.frequency',)"):
         check_path(system, path, "parameters")
+
+
+def _cycle(
+    base: OrbitEquations,
+    state: dict[str, Any],
+    side: int | None,
+    period: float | None,
+    settle: float | None,
+    progress: Progress,
+) -> PeriodicOrbit:
+    """The cycle on which a motion settles or, after `settle`, near which it is."""
+    if side is not None:  # the state after a natural time is a start without a side
+        state = after(base.system, state, natural_units(base.system).time, side)
+    if settle is None:
+        found: Return | None = settled_return(base, state, period, progress)
+    else:
+        found = next_return(base, after(base.system, state, settle), period)
+    if found is None:
+        raise MotionError(
+            "the motion does not come back to where it was; give a guess of its period, "
+            "period=..., or let it settle first"
+        )
+    progress(0.99, "solving for the orbit")
+    start = arguments_of(base.system, on_this_side(base.system, found.state))
+    orbit = orbit_from(base, start, 1, found.time)
+    if orbit is not None and orbit.admissible:
+        progress(1.0, "done")
+        return orbit
+    raise MotionError(
+        f"Newton's method finds no cycle near the motion, which comes back after {found.time:.9g};"
+        " try another start, another period=..., or let it settle first (settle=...)"
+    )
 
 
 def _at_phase_0(
@@ -272,19 +319,23 @@ def _polish(
     )
 
 
-def orbit_from(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+def orbit_from(
+    base: OrbitEquations, state: dict[str, Any], periods: int, length: float | None = None
+) -> PeriodicOrbit | None:
     """The orbit near a motion over `periods` forcing periods from a state at phase 0; it may be one
-    that rests for a part of them.
+    that rests for a part of them. Of a cycle without a load, `length` is a guess of its period.
 
     Raises
     ------
     MotionError
         The motion leads to no orbit.
     """
-    return orbit_near(base, state, periods)
+    return orbit_near(base, state, periods, length)
 
 
-def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> PeriodicOrbit | None:
+def orbit_near(
+    base: OrbitEquations, state: dict[str, Any], periods: int, length: float | None = None
+) -> PeriodicOrbit | None:
     """The orbit with the signature of a motion over `periods` forcing periods from a state at phase
     0, by Newton's method: the first that is admissible of those of all kinds of equations.
 
@@ -293,9 +344,9 @@ def orbit_near(base: OrbitEquations, state: dict[str, Any], periods: int) -> Per
     MotionError
         It rests for good.
     """
-    motion = MotionToRead(base.system, state, periods)
+    motion = MotionToRead(base.system, state, periods, length)
     orbit = None
-    for kind in KINDS:
+    for kind in kinds_of(base.given):
         read = kind.read(base, motion)
         found = (
             None

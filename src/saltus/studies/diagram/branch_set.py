@@ -568,7 +568,7 @@ class BranchSet:
 
 def _period_born(special: SpecialPoint) -> int:
     """The period of the orbits that are born at a special point."""
-    return special.orbit.period * (2 if special.kind == SpecialKind.PD else 1)
+    return special.orbit.signature.period * (2 if special.kind == SpecialKind.PD else 1)
 
 
 def _meet(end: PeriodicOrbit, special: SpecialPoint, bounds: tuple[float, float]) -> bool:

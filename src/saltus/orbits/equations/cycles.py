@@ -1,0 +1,253 @@
+"""Cycles of systems on which nothing acts that varies with time, x = Phi(x, T): their period is an
+unknown.
+
+The unknowns are the state at a section and the time of a round, of which the signature counts the
+period. The section is the plane through a state of the orbit, far from its events, to which the
+flow there is orthogonal in natural units: the last equation says that the state lies in it. The
+motion Phi may have any events. The multiplier 1 of the flow's own direction is left out: the
+multipliers are those of the return map of the section.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.continuation import Units
+from saltus.errors import MotionError
+from saltus.flow import Motion, state_rates
+from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, Solution
+from saltus.orbits.equations.event_sequence import section_time
+from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
+from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.signature import Signature
+from saltus.systems import System
+
+# The parts of a step at whose ends the distance from a section is compared; a part at which it
+# rises through 0 is halved so many times.
+PARTS = 8
+HALVINGS = 60
+# How near to the ends of a step it is looked at, as a share of the step: the motion jumps there at
+# some of them.
+WITHIN = 1e-12
+
+
+class CycleEquations(WholeMotionEquations):
+    """The equations x = Phi(x, T) of a cycle, with its period as an unknown."""
+
+    has_forcing = False
+
+    @classmethod
+    def solves(cls, system: System, signature: Signature) -> bool:
+        return system.load.frequency is None
+
+    @classmethod
+    def read(
+        cls, base: OrbitEquations, motion: MotionToRead
+    ) -> tuple[OrbitEquations, np.ndarray] | None:
+        """With a section chosen along the motion, which lasts twice a guess of the period."""
+        twice = motion.twice
+        if twice.limit is not None or not twice.phase_known:
+            return None
+        signature, state = _section_along(base, twice, motion.periods, motion.duration)
+        return base.with_signature(signature), np.append(state, motion.duration / motion.periods)
+
+    def section_along(self, motion: Motion, solution: Solution) -> tuple[Signature, np.ndarray]:
+        signature, state = _section_along(self, motion, self.signature.period)
+        return signature, np.append(state, solution.unknowns[-1])
+
+    @property
+    def size(self) -> int:
+        return 2 * self.own + 1
+
+    @cached_property
+    def units(self) -> Units:
+        natural = self.natural
+        return Units(
+            np.append(natural.state, natural.time), np.append(natural.state, 1.0), self.is_phase
+        )
+
+    @cached_property
+    def is_velocity(self) -> np.ndarray:
+        places = np.arange(self.size)
+        return np.asarray((places >= self.own) & (places < 2 * self.own))
+
+    @property
+    def multiplier_count(self) -> int:
+        return super().multiplier_count - 1
+
+    @cached_property
+    def _plane(self) -> tuple[np.ndarray, np.ndarray]:
+        """The state in the section and the derivatives of the distance from it, in natural
+        units."""
+        return tuple(np.split(np.array(self.signature.through), 2))  # type: ignore[return-value]
+
+    def section_time(self, values: np.ndarray) -> float:
+        return 0.0
+
+    def frequency(self, values: np.ndarray) -> float:
+        """There is none that the parameters tell."""
+        return math.nan
+
+    def frequency_of(self, solution: Solution) -> float:
+        return 2.0 * math.pi / float(solution.unknowns[-1])
+
+    def period_of(self, solution: Solution) -> float:
+        return self.signature.period * float(solution.unknowns[-1])
+
+    def lasting(self, solution: Solution, rounds: float) -> dict[str, Any]:
+        return {"duration": rounds * float(solution.unknowns[-1])}
+
+    def _lasting(self, unknowns: np.ndarray) -> dict[str, float | None]:
+        return {"periods": None, "duration": self.signature.span * float(unknowns[-1])}
+
+    def _may_solve(self, unknowns: np.ndarray, values: np.ndarray) -> bool:
+        return bool(
+            unknowns[-1] > 0.0 and np.isfinite(unknowns).all() and np.isfinite(values).all()
+        )
+
+    def held(self, unknowns: np.ndarray, system: System) -> dict[int, float]:
+        return super().held(unknowns[: 2 * self.own], system)
+
+    def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
+        return super().start_state(unknowns[: 2 * self.own], system)
+
+    def _apart(self, after: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        state, normal = self._plane
+        distance = normal @ (unknowns[:-1] - state)
+        return np.append(after - unknowns[:-1], distance)
+
+    def _evaluation(
+        self, motion: Motion, after: np.ndarray, unknowns: np.ndarray, slopes: np.ndarray
+    ) -> WholeMotionEvaluation:
+        state = super()._evaluation(motion, after, unknowns, slopes)
+        n = len(after)
+        rates = state_rates(motion)
+        rates[self.following] = 0.0
+        here = np.zeros((1, n + 1, n + 1))
+        there = np.zeros((1, n + 1, n + 1))
+        here[0, :n, :n] = state.here[0]
+        here[0, :n, n] = self.signature.span * rates
+        here[0, n, :n] = self._plane[1]
+        there[0, :n, :n] = state.there[0]
+        parameters = np.vstack([state.parameters, np.zeros((1, state.parameters.shape[1]))])
+        return replace(state, here=here, there=there, parameters=parameters)
+
+    def _middle(self, state: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        return np.append(state, unknowns[-1])
+
+    def return_map(self, evaluation: Any) -> np.ndarray:
+        n = 2 * self.own
+        normal = self._plane[1]
+        matrix = evaluation.here[0]
+        flow = matrix[:n, n] / (normal @ matrix[:n, n])
+        back = matrix[:n, :n] - np.outer(flow, normal @ matrix[:n, :n])
+        kept = np.delete(np.arange(n), self.following)
+        units = self.natural.state[kept]
+        # an orthonormal basis of the section, in natural units
+        basis = np.linalg.svd((normal[kept] * units)[None])[2][1:].T
+        return np.asarray(basis.T @ (back[np.ix_(kept, kept)] * units / units[:, None]) @ basis)
+
+    def alternating(self, direction: np.ndarray) -> np.ndarray:
+        """The mean time of the two rounds stays."""
+        return np.append(direction[:-1], 0.0)
+
+    def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
+        return None if self.signature.period % 2 else super().halves(solution, False)
+
+    def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
+        return CannotProve("cycles without a load, whose period is an unknown, are not proved yet")
+
+    def unknowns_at(
+        self, target: Signature, unknowns: np.ndarray, values: np.ndarray, near: np.ndarray
+    ) -> np.ndarray | None:
+        """Where the orbit crosses the section of another signature in its direction, nearest to
+        `near`."""
+        if self.evaluate(unknowns, values) is None or self._latest is None:
+            return None
+        found = self._latest[1]
+        if found is None:
+            return None
+        motion = found[0]
+        state, normal = np.split(np.array(target.through), 2)
+        crossings = passages(motion, state, normal)
+        if not crossings.size:
+            return None
+        states = states_of(motion, crossings)
+        states[:, self.following] = 0.0
+        apart = np.abs((states - near[:-1]) / self.natural.state).max(axis=1)
+        return np.append(states[apart.argmin()], unknowns[-1])
+
+
+def _section_along(
+    equations: OrbitEquations, motion: Motion, rounds: int, duration: float | None = None
+) -> tuple[Signature, np.ndarray]:
+    """The signature of a cycle with a section far from the events of a motion, and the state
+    there.
+
+    Raises
+    ------
+    MotionError
+        The motion does not move there.
+    """
+    time = section_time(motion, duration)
+    state = states_of(motion, np.array([time]))[0]
+    normal = direction_at(motion, time, equations)
+    state[equations.following] = 0.0
+    return Signature((), rounds, section=0.0, through=(*state.tolist(), *normal.tolist())), state
+
+
+def direction_at(motion: Motion, time: float, equations: OrbitEquations) -> np.ndarray:
+    """The derivatives, (2 n,), of the distance in natural units from the plane that the flow of a
+    motion crosses orthogonally at a time.
+
+    Raises
+    ------
+    MotionError
+        The motion stands still there.
+    """
+    assert motion.dense is not None
+    at = np.array([time])
+    velocity = motion.dense.states(at)[1][:, 0]
+    rates = np.append(velocity, motion.dense.accelerations(at)[:, 0])
+    rates[equations.following] = 0.0
+    scaled = rates / equations.natural.state
+    size = float(np.linalg.norm(scaled))
+    if not size > 0.0:
+        raise MotionError(
+            "the motion comes to an equilibrium, which is no cycle; start farther from it"
+        )
+    return np.asarray(scaled / size / equations.natural.state)
+
+
+def states_of(motion: Motion, times: np.ndarray) -> np.ndarray:
+    """The states of a motion at times (n,), (n, d)."""
+    position, velocity = motion.at(times)
+    return np.concatenate([np.atleast_2d(position), np.atleast_2d(velocity)]).T.copy()
+
+
+def passages(motion: Motion, state: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """The times at which a motion crosses the plane through a state in the direction of its normal
+    (derivatives of the distance), between its events.
+    """
+    dense = motion.dense
+    assert dense is not None
+    share = np.linspace(0.0, 1.0, PARTS + 1).clip(WITHIN, 1.0 - WITHIN)
+    times = dense.start[:, None] + dense.length[:, None] * share
+    distances = (states_of(motion, times.ravel()) - state) @ normal
+    distances = distances.reshape(times.shape)
+    rises = (distances[:, :-1] < 0.0) & (distances[:, 1:] >= 0.0)
+    low = times[:, :-1][rises]
+    high = times[:, 1:][rises]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if not middle.size:
+            break
+        below = (states_of(motion, middle) - state) @ normal < 0.0
+        low = np.where(below, middle, low)
+        high = np.where(below, high, middle)
+    return np.asarray(high)

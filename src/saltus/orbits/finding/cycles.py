@@ -1,0 +1,176 @@
+"""Finding cycles of systems on which nothing acts that varies with time: a motion is followed until
+it comes back to where it was.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from saltus.errors import MotionError
+from saltus.flow import Motion, Stop, simulate
+from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.equations.cycles import direction_at, passages, states_of
+from saltus.orbits.equations.event_sequence import section_time
+from saltus.progress import Progress
+from saltus.systems import System, arguments_of, natural_units
+
+
+@dataclass(frozen=True)
+class FindCycleSettings:
+    """How long a motion is followed until it settles on a cycle, and which return is its period.
+
+    Times are in natural periods, 2 pi natural times.
+    """
+
+    # How long a motion is followed in the first round to settle; each further round doubles it.
+    settling: float = 50.0
+    rounds: int = 6
+    # How long a return is looked for first; this is doubled up to `longest`.
+    window: float = 4.0
+    longest: float = 4096.0
+    # A settled motion comes back nearer to where it was than this share of its size.
+    returned: float = 1e-6
+    # Of a motion that has not settled, the first return counts that is no farther than the nearest
+    # one by this factor.
+    as_near: float = 3.0
+    # A motion smaller than this, in natural units, stands still.
+    still: float = 1e-6
+
+
+SETTINGS = FindCycleSettings()
+
+
+class Return(NamedTuple):
+    """A state to which a motion comes back."""
+
+    state: np.ndarray
+    time: float  # how long it is away
+    apart: float  # how far it is away then, as a share of the motion's size
+
+
+def natural_period(system: System) -> float:
+    """2 pi natural times."""
+    return 2.0 * math.pi * natural_units(system).time
+
+
+def settled_return(
+    base: OrbitEquations, state: dict[str, Any], period: float | None, progress: Progress
+) -> Return:
+    """Where a motion from a state comes back to itself once it has settled.
+
+    Raises
+    ------
+    MotionError
+        It comes to rest or to an equilibrium, ends, or does not settle.
+    """
+    unit = natural_period(base.system)
+    passed = 0.0
+    nearest = None
+    total = SETTINGS.settling * (2**SETTINGS.rounds - 1)
+    for attempt in range(SETTINGS.rounds):
+        progress(passed / total, "following the motion until it settles")
+        wait = SETTINGS.settling * 2**attempt
+        state = after(base.system, state, wait * unit)
+        passed += wait
+        nearest = next_return(base, state, period)
+        if nearest is not None and nearest.apart < SETTINGS.returned:
+            return nearest
+    if nearest is None:
+        raise MotionError(
+            f"the motion does not come back to where it was within {SETTINGS.longest:g} natural"
+            " periods: it is on no cycle"
+        )
+    raise MotionError(
+        f"the motion has not settled on a cycle after {passed * unit:.6g}: it is chaotic or settles"
+        " slowly; try another start, or settle=0 with period=... for a cycle near the start"
+    )
+
+
+def next_return(base: OrbitEquations, state: dict[str, Any], period: float | None) -> Return | None:
+    """Where a motion from a state comes back to where it was: after about `period` or, if that is
+    not given, for the first time; None if it does not.
+
+    Raises
+    ------
+    MotionError
+        It comes to rest or to an equilibrium, or ends.
+    """
+    unit = natural_period(base.system)
+    duration = SETTINGS.window * unit if period is None else 2.5 * period
+    while True:
+        motion = simulate(base.system, **state, duration=duration)
+        check_moving(motion, state)
+        found = _returned(base, motion, period)
+        if found is not None:
+            return found
+        duration *= 2.0
+        if not duration <= SETTINGS.longest * unit:
+            return None
+
+
+def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Return | None:
+    """The return of a motion, None if it has none."""
+    units = base.natural.state
+    swing = motion.extrema
+    size = float(((swing[:, 1] - swing[:, 0]) / base.natural.lengths).max())
+    if not size > SETTINGS.still:
+        raise MotionError(
+            "the motion comes to an equilibrium, which is no cycle; start farther from it"
+        )
+    begin = section_time(motion, 0.5 * (motion.time - motion.start))
+    there = states_of(motion, np.array([begin]))[0]
+    normal = direction_at(motion, begin, base)
+    times = passages(motion, there, normal)
+    times = times[times > begin + 1e-9 * (motion.time - motion.start)]
+    if not times.size:
+        return None
+    apart = np.abs((states_of(motion, times) - there) / units)
+    apart[:, base.following] = 0.0
+    distance = apart.max(axis=1)
+    if period is not None:
+        chosen = int(np.argmin(np.abs(times - begin - period)))
+    else:
+        near = max(SETTINGS.as_near * float(distance.min()), 0.01 * SETTINGS.returned * size)
+        chosen = int(np.argmax(distance <= near))
+    return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size)
+
+
+def after(
+    system: System, state: dict[str, Any], duration: float, side: int | None = None
+) -> dict[str, Any]:
+    """The state of a motion later.
+
+    Raises
+    ------
+    MotionError
+        It comes to rest, or ends.
+    """
+    if duration == 0.0:
+        return state
+    motion = simulate(system, **state, side=side, duration=duration, dense=False)
+    check_moving(motion, state)
+    return arguments_of(system, motion.final_state)
+
+
+def check_moving(motion: Motion, state: dict[str, Any]) -> None:
+    """Refuse a motion that rests for good, that has lost its phase, or that ends at a margin."""
+    start = ", ".join(f"{name}={value!r}" for name, value in state.items())
+    if motion.limit is not None:
+        raise MotionError(
+            f"the motion from {start} ends at time {motion.time:.6g}, where its margin"
+            f" {motion.limit} reaches 0: there is no cycle"
+        )
+    if motion.stop is Stop.REST:
+        raise MotionError(
+            f"the motion from {start} comes to rest for good, which is no cycle; start farther from"
+            " rest"
+        )
+    if not motion.phase_known:
+        raise MotionError(
+            f"the impacts of the motion from {start} lose no energy and become too small to be"
+            " followed, so that its phase is lost; start with more energy"
+        )
