@@ -136,7 +136,7 @@ def test_what_is_no_cycle_is_refused_in_a_sentence():
         saltus.find_orbit(System(model=BeltOscillator(belt_speed=0.0)), x=0.5)
     with pytest.raises(saltus.ParameterError, match="period must lie in"):
         saltus.find_orbit(System(model=VanDerPol()), x=0.5, period=0)
-    with pytest.raises(saltus.ParameterError, match="load.frequency is not a number"):
+    with pytest.raises(saltus.ParameterError, match=r"load\.frequency is not a number"):
         saltus.continue_orbit(
             saltus.find_orbit(System(model=VanDerPol()), x=0.5), "load.frequency", (0.1, 1.0)
         )
