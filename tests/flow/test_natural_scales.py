@@ -13,6 +13,8 @@ import pytest
 import saltus
 from saltus import Contact, Friction, NewtonImpact, Surface
 from saltus.errors import MotionError
+from saltus.flow.kernel.compiled import program
+from saltus.flow.motion.kernel_state import SLOW_LOAD, natural_time, natural_times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,3 +248,37 @@ def test_a_load_whose_period_is_no_size_of_a_time_is_refused():
     )
     with pytest.raises(saltus.ParameterError, match="the period of the load must be at most 1e"):
         saltus.simulate(system, theta=(0.2, 0.0), duration=1.0)
+
+
+def between_stops(frequency, time=1.0):
+    """An oscillator between two stops, in units in which times are `time`."""
+    model = saltus.TwoStops(stiffness=1.0 / time**2, damping=0.05 / time, left=-0.8, right=1.0)
+    force = saltus.Harmonic(0.8 / time**2, phase=0.4)
+    load = saltus.Load(frequency=frequency / time, force=force)
+    return saltus.System(model=model, load=load, impact=NewtonImpact(0.7))
+
+
+@pytest.mark.parametrize("time", [1e-9, 1e-6, 1e6, 1e9])
+@pytest.mark.parametrize("frequency", [1.0, 1e-3, 1e-6, 1e-12])
+def test_which_load_is_slow_does_not_depend_on_the_unit_of_time(frequency, time):
+    """Under a frequency of 1e-12 steps shrank to nothing where times were 1e-9: the period was then
+    compared with a number of the usual units.
+    """
+    found = []
+    for unit in (1.0, time):
+        system = between_stops(frequency, unit)
+        motion = saltus.simulate(system, x=0.3, velocity=2.0 / unit, duration=30.0 * unit)
+        lane = saltus.simulate_many(system, x=0.3, velocity=2.0 / unit, duration=30.0 * unit)
+        run = program(system)
+        natural = natural_time(system, system.load.period, run) / unit
+        found.append([len(motion.impacts), motion.position, natural, float(lane["x"])])
+        # a page finds it from these numbers, whatever frequency is chosen there
+        numbers = natural_times(system)
+        assert numbers["without_period"] is None
+        assert min(system.load.period / (2.0 * math.pi), numbers["slow_time"]) == pytest.approx(
+            natural * unit
+        )
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[0][3] == pytest.approx(found[0][1], abs=1e-12)
+    # the oscillator's own time is 1
+    assert found[0][2] == pytest.approx(min(1.0 / frequency, SLOW_LOAD), rel=1e-9)

@@ -86,6 +86,7 @@ from .system import System as System
 from .system import check_system as check_system
 from .system_units import NaturalUnits as NaturalUnits
 from .system_units import natural_units as natural_units
+from .system_units import slowest_own_time as slowest_own_time
 from .system_units import time_without_period as time_without_period
 from .system_units import units_of_gaps as units_of_gaps
 from .without_force import inert_frictions as inert_frictions

@@ -31,6 +31,10 @@ TINY = float(np.finfo(float).tiny)
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
 # A distance that is this share of the largest one is rounding.
 ROUNDING = 1e-12
+# A load that is slow without end: its frequency is this share of its own.
+SLOWER = 2.0**-40
+# What moves by itself in a larger share of the time of a load moves with it.
+MOVED_BY_LOAD = 1e-3
 ANGLES = ("rad", "deg")  # units of coordinates that have their own natural unit
 
 
@@ -154,7 +158,8 @@ def natural_units(system: System) -> NaturalUnits:
     system
         What moves: as it was given, or `in_gap_coordinates`, whose coordinates are others.
     """
-    found: NaturalUnits = system._remembered(natural_units, lambda: _found(system))
+    rate = 0.0 if system.load.frequency is None else float(system.load.frequency)
+    found: NaturalUnits = system._remembered(natural_units, lambda: _found(system, rate))
     return found
 
 
@@ -184,14 +189,25 @@ def time_without_period(system: System) -> float:
     return time_without_period(alone)
 
 
+def slowest_own_time(system: System) -> float:
+    """The time in which a system moves by itself where its load is slow without end; inf for what
+    moves with its load alone."""
+    load = system.load
+    rate = 0.0 if load.frequency is None else float(load.frequency)
+    if rate == 0.0:
+        return natural_units(system).own_time
+    own_time = _found(system, rate * SLOWER).own_time
+    return own_time if own_time * rate * SLOWER < MOVED_BY_LOAD else math.inf
+
+
 def _power_of_two(value: float) -> float:
     return math.ldexp(1.0, round(math.log2(value)))
 
 
-def _found(system: System) -> NaturalUnits:
+def _found(system: System, rate: float) -> NaturalUnits:
+    """The natural units, where the load goes on with this frequency in place of its own."""
     model = system.model
     load = DeclaredLoad(system.load, model)
-    rate = 0.0 if system.load.frequency is None else float(system.load.frequency)
     instants = _instants(system.load)
     nearest: np.ndarray | None = None
     stiffest = 0.0

@@ -262,10 +262,20 @@ def compiled_lanes(
         from_start=options.from_start,
         natural_length=natural_units(system).length,
         settle=Until.SETTLED in options.until,
-        natural_time=longest_time(system),
+        natural_time=longest_time(system, *_periods_of(system, run, varied)),
         shortest_step=SHORTEST * natural_units(system).time,
         inert_frictions=inert_frictions(system, varied),
     )
+
+
+def _periods_of(
+    system: System, run: Program, varied: Mapping[str, Iterable[float]]
+) -> tuple[float, Program | None]:
+    """The longest period of the load, and the program where its numbers are those of all lanes."""
+    frequencies = tuple(varied.get("load.frequency", ())) or (system.load.frequency or 0.0,)
+    lowest = float(min(frequencies))
+    others = any(path != "load.frequency" and tuple(values) for path, values in varied.items())
+    return 2.0 * math.pi / lowest if lowest > 0.0 else math.inf, None if others else run
 
 
 _functions: dict[tuple[Any, ...], Any] = {}

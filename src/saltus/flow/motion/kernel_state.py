@@ -31,7 +31,7 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.systems import inert_frictions, natural_units, time_without_period
+from saltus.systems import inert_frictions, slowest_own_time, time_without_period
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -45,23 +45,32 @@ NUDGE: tuple[int, float] | None = None
 # still: the derivatives of the motion, in the load's time, would be scales without meaning, of
 # which rounding is a part (beyond some 1e10 times, reactions were lost in it).
 SLOW_LOAD = 1e4
+# A load is not slow whose period times the highest rate is at most this number, a small share of
+# what `SLOW_LOAD` asks. It spares most systems their own time, which takes ten times as long to
+# find as a short motion.
+NEVER_SLOW = 1e3
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
-def natural_time(system: System, length: float) -> float:
+def natural_time(system: System, length: float, run: Program) -> float:
     """The natural time of a motion under a load with a period, 0 if it has none.
 
     A frequency that acts on nothing is none, and one that is much slower than what moves by itself
     gives no scale.
     """
     of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
-    time = min(of_load, longest_time(system))
+    time = min(of_load, longest_time(system, length, run))
     return time if time < math.inf else 0.0
 
 
-def longest_time(system: System) -> float:
+def longest_time(system: System, length: float = math.inf, run: Program | None = None) -> float:
     """The natural time under a load whose period is as long as one likes; 0 for what has no time of
-    its own, inf where the load's is always taken."""
+    its own, inf where the load's is always taken.
+
+    It is found faster for periods up to a `length`, with the numbers of a program.
+    """
+    if run is not None and 0.0 < length * _highest_rate(run) <= NEVER_SLOW:
+        return _without_period(system)
     found: float = system._remembered(longest_time, lambda: _own_time(system))
     return found
 
@@ -70,10 +79,9 @@ def natural_times(system: System) -> dict[str, float | None]:
     """What `natural_time` does, as numbers, so that a page does it for other periods of the
     load.
     """
-    without = time_without_period(system) if _bounces(system) else math.inf
+    without = _without_period(system)
     return {
         "without_period": without if math.isfinite(without) else None,
-        "slow_load": SLOW_LOAD if _bounces(system) else None,
         "slow_time": _slow_time(system) if _bounces(system) else None,
     }
 
@@ -83,16 +91,27 @@ def _own_time(system: System) -> float:
     for it."""
     if not _bounces(system):
         return math.inf
-    period = system.load.period
-    # in usual units no own time is far below 1: under shorter periods it need not be found, which
-    # takes ten times as long as a short motion
-    slow = _slow_time(system) if period is not None and period > SLOW_LOAD else math.inf
-    return min(time_without_period(system), slow)
+    slow = _slow_time(system) if system.load.period is not None else math.inf
+    return min(_without_period(system), slow)
+
+
+def _without_period(system: System) -> float:
+    """The natural time of what has contacts and no load with a period; inf for all else."""
+    return time_without_period(system) if _bounces(system) else math.inf
 
 
 def _slow_time(system: System) -> float:
     """The natural time under a load that is slow without end."""
-    return SLOW_LOAD * natural_units(system).own_time
+    return SLOW_LOAD * slowest_own_time(system)
+
+
+def _highest_rate(run: Program) -> float:
+    """More than the rates of nearly all systems with these numbers, as sqrt(stiffness / mass)."""
+    sizes = [abs(value) for value in run.env[0].tolist() if value]
+    largest = max(sizes, default=1.0)
+    if len(run.data):
+        largest = max(largest, float(np.abs(run.data).max()))
+    return math.sqrt(largest) / math.sqrt(min(sizes, default=1.0))
 
 
 def _bounces(system: System) -> bool:
@@ -127,7 +146,7 @@ class KernelState:
             request.dense or request.sample_times is not None or _is_nonlinear(request.system)
         )
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
-        span = at.length, natural_time(request.system, at.length)
+        span = at.length, natural_time(request.system, at.length, run)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, *span, request.tol)
         self.array["nudged"], self.array["nudge"] = NUDGE or request.nudge
 

@@ -20,7 +20,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} data @property {number[]} modes @property {number[]} signs
  * @property {number[]} contact_coordinates @property {number[]} friction_coordinates
  * @property {number} positions_at @property {number} grounds_at @property {number} contact_numbers
- * @property {{without_period: number|null, slow_load: number|null, slow_time: number|null}} natural
+ * @property {{without_period: number|null, slow_time: number|null}} natural
  * @property {string[]} limits @property {import("./load_table.js").Records} records
  * @property {string[]} margins  What can be evaluated along a motion; the kinetic energy is the last with `energy`.
  * @property {{kind: string, role: string, points: number}[]} drawing  The shapes of the model's own drawing.

@@ -60,9 +60,9 @@ export class Run {
 
   /** The natural time of the motion: Python's `natural_time`. */
   naturalTime() {
-    const { without_period: own, slow_load: slow, slow_time: longest } = this.engine.layout.natural;
+    const { without_period: own, slow_time: slow } = this.engine.layout.natural;
     const ofLoad = this.length > 0 ? this.length / (2 * Math.PI) : Infinity;
-    const time = Math.min(ofLoad, own ?? Infinity, slow !== null && this.length > slow ? (longest ?? Infinity) : Infinity);
+    const time = Math.min(ofLoad, own ?? Infinity, this.length > 0 ? (slow ?? Infinity) : Infinity);
     return Number.isFinite(time) ? time : 0;
   }
 
