@@ -67,7 +67,44 @@ class Inert(Pile):
         )
 
 
-def drawn(seed: int) -> tuple[saltus.System, saltus.System, dict[str, Any]]:
+class WithoutPlaces(Pile):
+    """The same with frictions along b and along a sum, which contacts leave no place."""
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        mu = self.coefficient
+        return (
+            saltus.Friction(name="along", coordinate="b", kinetic=mu, ground_speed=0.1),
+            SLIDING,
+            saltus.Friction(name="both", coordinate={"b": 1.0, "a": 1.0}, kinetic=mu),
+        )
+
+
+class Roofed(Pile):
+    """The pile under a roof, so that a gap follows from the others, without any friction."""
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        roof = saltus.Contact(name="roof", coordinate="b", sign=-1, position=2.0)
+        return (*super().contacts, roof)
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        return ()
+
+
+class RoofedInert(Roofed):
+    """The same with a friction without force, and one in a contact."""
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        return (
+            saltus.Friction(name="guide", coordinate="b", kinetic=self.coefficient),
+            saltus.Friction(name="in", coordinate="s", contact="floor", kinetic=0.0),
+        )
+
+
+def drawn(seed: int, *kinds: type[Pile]) -> tuple[saltus.System, saltus.System, dict[str, Any]]:
     u = np.random.default_rng(seed).uniform
     thickness = u(0.1, 0.5)
     load = saltus.Load(
@@ -78,7 +115,7 @@ def drawn(seed: int) -> tuple[saltus.System, saltus.System, dict[str, Any]]:
     law = saltus.NewtonImpact(e=u(0.0, 0.8))
     plain, inert = (
         saltus.System(model=kind(thickness=thickness), load=load, impact=law)
-        for kind in (Pile, Inert)
+        for kind in kinds or (Pile, Inert)
     )
     return plain, inert, {"a": 0.3, "b": 0.3 + 2.0 * thickness, "s": 0.0}
 
@@ -88,8 +125,8 @@ def events_of(system: saltus.System, start: dict[str, Any]) -> list[tuple[float,
     return [(event.time, str(event.contact), str(event.kind)) for event in motion.events]
 
 
-def compare(seed: int) -> int:
-    plain, inert, start = drawn(seed)
+def compare(seed: int, *kinds: type[Pile]) -> int:
+    plain, inert, start = drawn(seed, *kinds)
     events, same = events_of(plain, start), events_of(inert, start)
     assert [what for _, *what in events] == [what for _, *what in same]
     times = [time for time, *_ in events]
@@ -100,6 +137,40 @@ def compare(seed: int) -> int:
 def test_motions_of_piles() -> None:
     """In each some impacts accumulate, in most on both contacts at one instant."""
     assert sum(compare(seed) for seed in range(12)) > 100
+
+
+@pytest.mark.parametrize("kinds", [(Pile, WithoutPlaces), (Roofed, RoofedInert)])
+def test_motions_of_piles_whose_contacts_leave_frictions_no_place(kinds: Any) -> None:
+    """They were refused."""
+    assert sum(compare(seed, *kinds) for seed in range(6)) > 50
+
+
+def test_answers_beside_frictions_without_place() -> None:
+    plain, inert, start = drawn(3, Pile, WithoutPlaces)
+    starts = {name: np.array([value, value + 0.1]) for name, value in start.items()}
+    ends = [saltus.simulate_many(system, periods=5, **starts) for system in (plain, inert)]
+    for name in ("a", "b", "s", "impact_count"):
+        assert ends[0][name].values == pytest.approx(ends[1][name].values, abs=1e-9)
+    said = [saltus.classify(system, **start) for system in (plain, inert)]
+    assert said[0].kind == said[1].kind
+    motion = saltus.simulate(inert, periods=3, **start)
+    assert abs(saltus.energies(motion).attrs["defect"]) < 1e-9
+    assert all(motion.sliding[name] == 2 for name in motion.sliding if name != "rub")
+
+
+@pytest.mark.parametrize("kind", [WithoutPlaces, RoofedInert])
+def test_a_friction_without_place_gets_no_force(kind: type[Pile]) -> None:
+    _, inert, start = drawn(3, Pile, kind)
+    path = "model.coefficient"
+    asked: dict[str, Any] = {"duration": 1.0, **start}
+    with pytest.raises(saltus.ParameterError, match="each sum must be a coordinate of its own"):
+        inert.with_({path: 0.1})
+    with pytest.raises(saltus.ParameterError, match="cannot get a force here"):
+        inert.in_gap_coordinates.with_({path: 0.1})
+    with pytest.raises(saltus.ParameterError, match="each sum must be a coordinate of its own"):
+        saltus.simulate_many(inert, parameters={path: np.array([0.0, 0.1])}, **asked)
+    with pytest.raises(saltus.ParameterError, match=f"{path} cannot be varied here"):
+        saltus.sensitivities(inert, parameters=[path], **asked)
 
 
 @pytest.mark.thorough

@@ -22,7 +22,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, ContactModel, Friction, Surface, solved_motion
+from saltus.systems.contact_model import (
+    Contact,
+    ContactModel,
+    Friction,
+    Surface,
+    called_part,
+    solved_motion,
+)
 from saltus.systems.gap_places import (
     CLOSED_BELOW,
     INVERSE,
@@ -79,16 +86,28 @@ class InGapCoordinates(ContactModel):
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
-        """The frictions, each along one of the coordinates."""
-        places = zip(super().frictions, self.gap_places.frictions, strict=True)
-        return tuple(
-            replace(
-                part,
-                coordinate=self.coordinates[i],
-                ground_speed=part.ground_speed if s > 0 else -part.ground_speed,
-            )
-            for part, (i, s) in places
-        )
+        """The frictions, each along one of the coordinates.
+
+        Raises
+        ------
+        ParameterError
+            One that has no place of its own, as it had no force, has got a force.
+        """
+        found = []
+        for k, (part, (i, s)) in enumerate(
+            zip(super().frictions, self.gap_places.frictions, strict=True)
+        ):
+            if k in self.gap_places.left_out:
+                _check_left_out(part)
+            ground_speed = part.ground_speed if s > 0 else -part.ground_speed
+            found.append(replace(part, coordinate=self.coordinates[i], ground_speed=ground_speed))
+        return tuple(found)
+
+    @property
+    def left_out(self) -> tuple[Friction, ...]:
+        """The frictions without force that have no place of their own, as the user gave them."""
+        given = super().frictions
+        return tuple(given[k] for k in self.gap_places.left_out)
 
     def _on_coordinates(self, parts: Any, places: tuple[tuple[int, int], ...]) -> tuple[Any, ...]:
         """Contacts or surfaces of single coordinates."""
@@ -135,8 +154,11 @@ class InGapCoordinates(ContactModel):
         moving, nonlinear = ([dict[str, Any]() for _ in rows] for _ in range(2))
         parts: list[Part] = [*super().contacts, *super().surfaces, *super().frictions]
         places = self.gap_places.contacts + self.gap_places.surfaces + self.gap_places.frictions
-        for part, (i, sign) in zip(parts, places, strict=True):
-            if sign > 0 and (i in self.gap_places.order or i >= len(names)):
+        first = len(parts) - len(self.gap_places.frictions)
+        left_out = [first + k for k in self.gap_places.left_out]
+        for number, (part, (i, sign)) in enumerate(zip(parts, places, strict=True)):
+            takes_place = sign > 0 and number not in left_out
+            if takes_place and (i in self.gap_places.order or i >= len(names)):
                 given = terms_of(part)
                 rows[i] = [given.get(name, 0.0) for name in names]
                 moving[i] = {
@@ -559,6 +581,17 @@ def _class_in(cls: Any, places: GapPlaces) -> Any:
 
 # behind the name of a model's class, the name of its class in these coordinates
 IN_GAPS = "InGapCoordinates"
+
+
+def _check_left_out(friction: Friction) -> None:
+    """Refuse a force of a friction that was left out, where its coefficients are numbers."""
+    numbers = [x for x in (friction.kinetic, friction.most) if isinstance(x, (int, float))]
+    if any(numbers):
+        raise ParameterError(
+            f"{called_part(friction)} has no coordinate of its own beside what contacts keep, as its"
+            " coefficients were 0: it cannot get a force here",
+            "model",
+        )
 
 
 def _check_dependent(model: InGapCoordinates) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -27,6 +27,8 @@ CLOSED_BELOW = 1e-13
 # behind the name of a model's function, its inverse, and the margin that ends this
 INVERSE = "_inverse"
 TURNS = " turns"
+# of a friction that does nothing there
+ANY_PLACE = (0, 1)
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class GapPlaces:
     solved: tuple[tuple[int, tuple[str, ...]], ...]
     # places of coordinates, with the functions of them alone that stand for them
     stands: tuple[tuple[int, str], ...]
+    # the frictions without force for whose sums there is no place: they name any coordinate
+    left_out: tuple[int, ...] = ()
 
 
 def terms_of(contact: Part) -> dict[str, Any]:
@@ -63,7 +67,7 @@ def places_of(model: Any) -> GapPlaces | None:
     holds a single coordinate.
 
     Functions that stand for the coordinate on which they depend are tried only if there is no other
-    way.
+    way; then frictions without force are left out.
     """
     parts: tuple[Part, ...] = (*model.contacts, *model.surfaces, *model.frictions)
     if all(isinstance(part.coordinate, str) for part in parts):
@@ -74,23 +78,43 @@ def places_of(model: Any) -> GapPlaces | None:
         for name in terms_of(part)
         if is_function(model, name)
     }
-    found = _placed(model, parts, reads, {})
     stands = {
         places[0]: name
         for name, places in reads.items()
         if len(places) == 1 and hasattr(model, name + INVERSE)
     }
-    if isinstance(found, str) and stands:
-        found = _placed(model, parts, reads, stands)
-    if isinstance(found, str):
-        raise ParameterError(found, "model")
-    return found
+    held = (*model.contacts, *model.surfaces)
+    acting = tuple(friction for friction in model.frictions if not has_no_force(friction))
+    refusals = list[str]()
+    for kept in (parts, (*held, *acting)) if len(acting) < len(model.frictions) else (parts,):
+        for standing in ({}, stands) if stands else ({},):
+            found = _placed(model, kept, reads, standing)
+            if isinstance(found, GapPlaces):
+                return _with_left_out(model, found)
+            refusals.append(found)
+    raise ParameterError(refusals[-1], "model")
+
+
+def has_no_force(friction: Friction) -> bool:
+    """Whether the coefficients of a friction are 0; they are numbers."""
+    return float(friction.kinetic) == 0.0 and float(friction.most) == 0.0
+
+
+def _with_left_out(model: Any, found: GapPlaces) -> GapPlaces:
+    """Places of all frictions, of which those without force were left out if any was."""
+    if len(found.frictions) == len(model.frictions):
+        return found
+    places = list(found.frictions)
+    left_out = tuple(k for k, friction in enumerate(model.frictions) if has_no_force(friction))
+    for k in left_out:
+        places.insert(k, ANY_PLACE)
+    return replace(found, frictions=tuple(places), left_out=left_out)
 
 
 def _placed(
     model: Any, parts: Sequence[Part], reads: dict[str, tuple[int, ...]], stands: dict[int, str]
 ) -> GapPlaces | str:
-    """The places of sums, or why there are none. Each takes that of the coordinate with the largest
+    """The places of the sums of `parts`, or why there are none. Each takes that of the coordinate with the largest
     coefficient, of several the last, after the elimination of earlier sums, which none of its
     functions reads and which no part holds alone."""
     names = columns_of(model.coordinates, tuple(stands.items()))
@@ -100,6 +124,7 @@ def _placed(
     order = list[int]()
     alone = {part.coordinate for part in parts if isinstance(part.coordinate, str)}
     rows = {names.index(name): {name: 1.0} for name in alone if name in names}
+    has_frictions = any(isinstance(part, Friction) for part in parts)
     reduced = dict[int, list[Fraction]]()
     for number, part in enumerate(parts):
         terms = {name: float(factor) for name, factor in terms_of(part).items()}
@@ -124,7 +149,7 @@ def _placed(
                 for place in range(len(names))
                 if left[place] and place not in rows and place not in read
             ]
-            follows = not (free or reads or model.frictions or hasattr(model, "mode_equations"))
+            follows = not (free or reads or has_frictions or hasattr(model, "mode_equations"))
             if not (free or follows) or any(
                 name in model.coordinates and name not in names for name in terms
             ):

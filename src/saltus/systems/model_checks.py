@@ -415,7 +415,10 @@ def _check_frictions(model: ContactModel) -> None:
     kind = type(model).__name__
     taken = list[Any]()
     pressed = [friction.contact for friction in model.frictions]
-    for friction in model.frictions:
+    without_place = [friction.name for friction in getattr(model, "left_out", ())]
+    placed = [each for each in model.frictions if each.name not in without_place]
+    along = [friction.coordinate for friction in placed]
+    for friction in placed:
         where = f"the friction {friction.name!r} of {kind}"
         if isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
             raise ParameterError(
@@ -445,7 +448,7 @@ def _check_frictions(model: ContactModel) -> None:
                 "model",
             )
         for other in (c for c in model.contacts if c.name == friction.contact):
-            if other.coordinate in [each.coordinate for each in model.frictions]:
+            if other.coordinate in along:
                 way = f"along whose coordinate {other.coordinate} a friction acts: take another one"
                 raise ParameterError(f"{where} is in the contact {other.name!r}, {way}", "model")
         if friction.stribeck_speed is not None and not float(friction.stribeck_speed) > 0.0:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import SaltusError
+from saltus.errors import ParameterError, SaltusError
+from saltus.systems.gap_places import has_no_force
+from saltus.systems.serial import replace
 
 if TYPE_CHECKING:
     from saltus.systems.system import System
@@ -29,14 +31,43 @@ def inert_frictions(system: System, varied: Mapping[str, Iterable[float]]) -> tu
     """
     inert: tuple[int, ...] = system._remembered("inert frictions", lambda: _without_force(system))
     paths = [path for path in varied if not path.startswith(OTHER_PARTS)]
+    if paths:
+        _check_left_out(system, {path: varied[path] for path in paths})
     if not inert or not paths:
         return inert
     for path in paths:
-        own = float(system.get(path))
-        values = [*varied[path]] or [own * (1.0 + s) + s for s in (MOVED, -MOVED)]
-        moved = [_moved(system, path, value) for value in values]
+        moved = [_moved(system, path, value) for value in _values_of(system, path, varied[path])]
         inert = tuple(k for k in inert if all(other is not None and k in other for other in moved))
     return inert
+
+
+def _check_left_out(system: System, varied: Mapping[str, Iterable[float]]) -> None:
+    """Refuse to vary what gives a force to a friction that has no coordinate, as it had none.
+
+    Raises
+    ------
+    ParameterError
+        The error names the friction and the number.
+    """
+    for friction in getattr(system.model, "left_out", ()):
+        for path, values in varied.items():
+            for value in _values_of(system, path, values):
+                try:
+                    moved = replace(system.model, {path.removeprefix("model."): float(value)})
+                except SaltusError:
+                    continue
+                if not all(map(has_no_force, moved.left_out)):
+                    raise ParameterError(
+                        f"the friction {friction.name!r} has no coordinate of its own beside the"
+                        f" sums of contacts, as its coefficients are 0: {path} cannot be varied here",
+                        path,
+                    )
+
+
+def _values_of(system: System, path: str, values: Iterable[float]) -> list[float]:
+    """Some of the values of a number, or values near its own."""
+    own = float(system.get(path))
+    return [*values] or [own * (1.0 + s) + s for s in (MOVED, -MOVED)]
 
 
 def _without_force(system: System) -> tuple[int, ...]:
@@ -44,7 +75,7 @@ def _without_force(system: System) -> tuple[int, ...]:
     return tuple(
         k
         for k, friction in enumerate(frictions)
-        if float(friction.kinetic) == 0.0 and float(friction.most) == 0.0
+        if has_no_force(friction)
     )
 
 
