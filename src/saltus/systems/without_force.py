@@ -72,11 +72,7 @@ def _values_of(system: System, path: str, values: Iterable[float]) -> list[float
 
 def _without_force(system: System) -> tuple[int, ...]:
     frictions: Any = getattr(system.model, "frictions", ())
-    return tuple(
-        k
-        for k, friction in enumerate(frictions)
-        if has_no_force(friction)
-    )
+    return tuple(k for k, friction in enumerate(frictions) if has_no_force(friction))
 
 
 def _moved(system: System, path: str, value: float) -> tuple[int, ...] | None:
