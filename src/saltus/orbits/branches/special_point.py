@@ -257,7 +257,7 @@ class SpecialPoint(Zero):
         return (
             f"SpecialPoint(kind='{self.kind}',"
             f" {'parameter' if len(self.parameters) == 1 else 'parameters'}={place},"
-            f" amplitude={self.amplitude:.9g}, period {self.orbit.period},"
+            f" amplitude={self.amplitude:.9g}, period {self.orbit.period:.9g},"
             f" {self.orbit.impact_count} impacts, bracket"
             f" {self.evidence.bracket:.1g}{self.note and '; ' + self.note})"
         )

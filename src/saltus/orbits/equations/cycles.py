@@ -21,7 +21,8 @@ from saltus.continuation import Units
 from saltus.errors import MotionError
 from saltus.flow import Motion, state_rates
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, Solution
-from saltus.orbits.equations.event_sequence import section_time
+from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
+from saltus.orbits.equations.event_sequence import EventSequence, section_time
 from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
@@ -34,6 +35,9 @@ HALVINGS = 60
 # How near to the ends of a step it is looked at, as a share of the step: the motion jumps there at
 # some of them.
 WITHIN = 1e-12
+# The least cosine of the angle, in natural units, between the flow and the normal of its section: at
+# a right angle of the two, where a branch would turn back, there is no return map.
+LEAST_STRAIGHT = 0.5
 
 
 class CycleEquations(WholeMotionEquations):
@@ -136,6 +140,24 @@ class CycleEquations(WholeMotionEquations):
         there[0, :n, :n] = state.there[0]
         parameters = np.vstack([state.parameters, np.zeros((1, state.parameters.shape[1]))])
         return replace(state, here=here, there=there, parameters=parameters)
+
+    def _seen_from_section(self, events: EventSequence, motion: Motion) -> EventSequence:
+        """The section is moved, too, where the flow crosses it at a small angle."""
+        flow = direction_at(motion, motion.start, self)
+        units = self.natural.state
+        straight = float((flow * units) @ (self._plane[1] * units))  # 1 at a right angle
+        share = (straight - LEAST_STRAIGHT) / (1.0 - LEAST_STRAIGHT)
+        least = EVENTS.section_distance
+        slanted = least + (0.5 - least) * share
+        return replace(events, section_distance=min(events.section_distance, slanted))
+
+    def stretch(self, solution: Solution) -> float:
+        """Also of coordinates of first order, by their rates."""
+        own = 2 * self.own
+        evaluation: Any = solution.evaluation
+        rates = evaluation.here[0, :own, own] / self.signature.span
+        largest = np.abs(rates * self.natural.time / self.natural.state)[: self.own].max()
+        return max(super().stretch(solution), float(largest))
 
     def _middle(self, state: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
         return np.append(state, unknowns[-1])

@@ -174,6 +174,10 @@ class WholeMotionEquations(OrbitEquations):
             None,
         )
 
+    def _seen_from_section(self, events: EventSequence, motion: Motion) -> EventSequence:
+        """The events, with how well the section lies."""
+        return events
+
     def _middle(self, state: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
         """The state after half of the time as unknowns of the halved equations."""
         return state
@@ -366,6 +370,7 @@ class WholeMotionEquations(OrbitEquations):
             half = motion.at(0.5 * (motion.start + motion.time))
             images = self.images if self.signature.symmetric else None
             events = sequence_of(motion, sampled, self.natural, images, self.smooth_surfaces)
+            events = self._seen_from_section(events, motion)
             middle = np.concatenate([np.atleast_1d(part) for part in half])
             extremes = self._extremes(sampled)
             middle[self.following] = 0.0

@@ -15,6 +15,8 @@ from saltus.flow import Motion, Stop, simulate
 from saltus.orbits.equations.contract import OrbitEquations
 from saltus.orbits.equations.cycles import direction_at, passages, states_of
 from saltus.orbits.equations.event_sequence import section_time
+from saltus.orbits.orbit import PeriodicOrbit
+from saltus.orbits.signature import TOLERANCES
 from saltus.progress import Progress
 from saltus.systems import System, arguments_of, natural_units
 
@@ -42,6 +44,7 @@ class FindCycleSettings:
 
 
 SETTINGS = FindCycleSettings()
+SHORTEST = 1e-6  # of a round, as a share of the time of several rounds
 
 
 class Return(NamedTuple):
@@ -134,9 +137,29 @@ def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Ret
     if period is not None:
         chosen = int(np.argmin(np.abs(times - begin - period)))
     else:
-        near = max(SETTINGS.as_near * float(distance.min()), 0.01 * SETTINGS.returned * size)
+        near = max(SETTINGS.as_near * float(distance.min()), SETTINGS.returned * size)
         chosen = int(np.argmax(distance <= near))
     return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size)
+
+
+def round_within(orbit: PeriodicOrbit) -> float | None:
+    """The time of a shorter round that a cycle, solved as one, repeats; None if it repeats none."""
+    equations: Any = orbit.equations
+    motion = orbit.followed
+    state = orbit.solution.unknowns[:-1]
+    normal = np.split(np.array(orbit.signature.through), 2)[1]
+    times = passages(motion, state, normal)
+    # that of the start itself may lie on either side of both ends
+    inside = (times > motion.start + SHORTEST * orbit.period) & (
+        times < motion.time - SHORTEST * orbit.period
+    )
+    times = times[inside]
+    if not times.size:
+        return None
+    apart = np.abs((states_of(motion, times) - state) / equations.natural.state)
+    apart[:, equations.following] = 0.0
+    near = np.flatnonzero(apart.max(axis=1) < TOLERANCES.halves)
+    return float(times[near[0]] - motion.start) if near.size else None
 
 
 def after(

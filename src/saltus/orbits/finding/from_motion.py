@@ -29,7 +29,7 @@ from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_sy
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.event_sequence import STAYS
 from saltus.orbits.equations.kinds import equations_of, kinds_of
-from saltus.orbits.finding.cycles import Return, after, next_return, settled_return
+from saltus.orbits.finding.cycles import Return, after, next_return, round_within, settled_return
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
@@ -198,6 +198,9 @@ def _cycle(
     progress(0.99, "solving for the orbit")
     start = arguments_of(base.system, on_this_side(base.system, found.state))
     orbit = orbit_from(base, start, 1, found.time)
+    shorter = None if orbit is None else round_within(orbit)
+    if orbit is not None and shorter is not None:
+        orbit = orbit_from(base, orbit.equations.start(orbit.solution), 1, shorter) or orbit
     if orbit is not None and orbit.admissible:
         progress(1.0, "done")
         return orbit
