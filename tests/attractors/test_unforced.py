@@ -1,5 +1,5 @@
-"""Motions on which nothing acts that varies: a cycle has no forcing period, and one judge says
-so.
+"""Motions on which nothing acts that varies: a cycle has no forcing period, and its own period is
+found.
 """
 
 import math
@@ -34,16 +34,40 @@ def belt(**load) -> saltus.System:
     ],
     ids=["no clock", "a clock", "a load of 0", "a clock of the cycle's period"],
 )
-def test_all_verdicts_on_a_cycle_are_the_same_sentence(load):
+def test_a_cycle_is_found_whatever_the_clock_is(load):
     system = belt(**load)
     motion = saltus.simulate(system, x=0.25, velocity=0.1, duration=100.0)
     slips = motion.events.of(saltus.EventKind.SLIP).times
     assert np.diff(slips)[1:] == pytest.approx(CYCLE, abs=1e-9)
     verdict = saltus.classify(system, x=0.25, velocity=0.1, periods=64, transient=20)
-    assert (verdict.kind, verdict.cause) == (Ending.UNDECIDED, Reason.SELF_EXCITED)
-    found = saltus.find_attractors(system, starts=4)
-    assert (len(found), found.undecided) == (0, 4)
-    assert all(reason.endswith(verdict.reason) for reason in found.reasons)
+    assert (verdict.kind, verdict.cause) == (Ending.PERIODIC, Reason.CYCLE)
+    assert verdict.period == pytest.approx(CYCLE, abs=1e-12)
+    assert verdict.orbit.multipliers == pytest.approx([0.0], abs=1e-12)
+    found = saltus.find_attractors(system, starts=32)
+    assert [attractor.period for attractor in found] == pytest.approx([CYCLE], abs=1e-12)
+    # without damping a mass that is always slower than the belt goes round a circle of its own
+    radius = np.hypot(found.states[:, 0] - 0.2, found.states[:, 1])
+    slower = radius < 0.1 - 1e-9
+    assert (found.assigned == np.where(slower, -1, 1)).all()
+    assert 0 < found.undecided == slower.sum()
+    assert all("round a cycle, which has no forcing period" in text for text in found.reasons)
+
+
+def test_an_equilibrium_and_a_cycle_beside_it_have_their_basins():
+    """With damping the circle about the equilibrium that touches the belt's speed shrinks: what
+    is inside it comes to rest, what is outside of the cycle settles on that."""
+    model = saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.1, damping=0.05)
+    system = saltus.System(model=model)
+    window = ((0.05, 0.4), (-0.15, 0.05))
+    data = saltus.basins_of_attraction(system, window=window, points=5)
+    assert data["attractor_period"].values[0] == 1.0
+    x, velocity = np.meshgrid(data["x"].values, data["velocity"].values)
+    for place, speed, label in zip(
+        x.ravel().tolist(), velocity.ravel().tolist(), data["label"].values.ravel(), strict=True
+    ):
+        motion = saltus.simulate(system, x=place, velocity=speed, duration=400.0)
+        sticks = motion.events.of(saltus.EventKind.STICK).times
+        assert label == (2 if (sticks > 300.0).any() else 1)
 
 
 def test_the_judge_of_charts_and_diagrams_says_the_same():

@@ -131,12 +131,6 @@ def test_hertz_s_law_is_taken_where_it_is_rounded_off():
     assert motion.events[0].time == pytest.approx(0.1, abs=1e-12)
 
 
-def test_cycles_without_a_period_are_undecided():
-    belt = saltus.BeltOscillator(kinetic=0.2, static=0.3, belt_speed=0.2)
-    free = System(model=belt)
-    assert str(saltus.classify(free, x=0.5, periods=100).kind) == "undecided"
-
-
 def test_contacts_hold_coordinates_that_have_a_velocity():
     """A contact of a coordinate of first order has no speed that could stop."""
 

@@ -81,11 +81,13 @@ class Target:
     states: np.ndarray  # (n, d), coordinates and velocities at phase 0
     # the natural units of the state variables, (d,), in which distances are measured
     units: Any = 1.0
+    # whether it is the closed curve of a cycle without a load, which has all phases of the clock
+    curve: bool = False
 
     @property
     def dense(self) -> bool:
         """Whether the states are a sample of infinitely many."""
-        return self.kind not in (Ending.REST, Ending.PERIODIC)
+        return self.curve or self.kind not in (Ending.REST, Ending.PERIODIC)
 
     @cached_property
     def _tree(self) -> Any:
@@ -119,7 +121,8 @@ class Target:
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
-        return {"label": self.label, "kind": str(self.kind), "states": self.states.tolist()}
+        known = {"label": self.label, "kind": str(self.kind), "states": self.states.tolist()}
+        return known | ({"curve": True} if self.curve else {})
 
     def size(self, states: np.ndarray) -> Any:
         """The largest variable of states (..., d) in natural units, at least 1, (...)."""
@@ -130,7 +133,7 @@ class Target:
         """The inverse of `to_dict`."""
         kind = Ending[str(data["kind"]).upper().replace("-", "_")]
         states = np.atleast_2d(np.asarray(data["states"], dtype=float))
-        return cls(int(data["label"]), kind, states, units)
+        return cls(int(data["label"]), kind, states, units, bool(data.get("curve", False)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +193,10 @@ class Attractor:
         return self.target.states
 
     @property
-    def period(self) -> int:
-        """Forcing periods after which it repeats; 0 for rest and for sets that do not repeat."""
+    def period(self) -> Any:
+        """Forcing periods after which it repeats, of a cycle without a load the time; 0 for rest and
+        for sets that do not repeat.
+        """
         return 0 if self.orbit is None else self.orbit.period
 
     @property
@@ -227,7 +232,7 @@ class Attractor:
         return replace(self, target=target, mirror=label_of.get(self.mirror, UNDECIDED), **changes)
 
     def __repr__(self) -> str:
-        what = f"period {self.period}" if self.orbit is not None else self.kind
+        what = f"period {self.period:.9g}" if self.orbit is not None else self.kind
         share = (
             f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts"
             if self.of
@@ -329,7 +334,9 @@ class Attractors(Result):
         members = self.members
         columns = {
             "attractor": [m.label for m in members],
-            "kind": [f"period {m.period}" if m.orbit is not None else str(m.kind) for m in members],
+            "kind": [
+                f"period {m.period:.9g}" if m.orbit is not None else str(m.kind) for m in members
+            ],
             "amplitude": [m.amplitude for m in members],
             "share of the starts": [
                 f"{100 * m.fraction:.3g} +- {100 * m.error:.2g} %" if m.of else "" for m in members
@@ -445,9 +452,10 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
         row[: len(member.states)] = member.states[:LAST_STATES]
     columns: dict[str, Any] = {}
     for key, (part, units, text) in attractor_columns(system).items():
-        values = np.array(
-            [getattr(member, part) for member in members], dtype=int if key == "period" else float
-        )
+        found = [getattr(member, part) for member in members]
+        # that of a cycle without a load is a time
+        whole = key == "period" and not any(isinstance(value, float) for value in found)
+        values = np.array(found, dtype=int if whole else float)
         columns[{"error": "fraction_error", "period": "attractor_period"}.get(key, key)] = variable(
             "attractor", values, units, text
         )

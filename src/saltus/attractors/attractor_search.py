@@ -21,8 +21,10 @@ from saltus.attractors.attractor import (
     Target,
 )
 from saltus.attractors.classification import classify
-from saltus.attractors.judgement import reason_cycle, reason_unforced
+from saltus.attractors.judgement import Reason, reason_cycle, reason_unforced
 from saltus.attractors.stroboscopic_section import (
+    certify_cycle,
+    cycle_states,
     section_states,
     solved_orbit,
     stays_at_rest,
@@ -143,7 +145,7 @@ class KnownAttractors:
         where = f"at {_shown(states[-1])}"
         cycle = reason_cycle(self.system, states[-1])
         if cycle is not None:
-            return self._fail(f"{where}: {cycle.sentence}")
+            return self.on_cycle(states[-1], cycle)
         orbit = solved_orbit(self.system, states[-1], len(states))
         far = SETTINGS.beside * self._near(states)
         if orbit is None or self._cycle(states).distance(orbit.section_state) > far:
@@ -181,6 +183,8 @@ class KnownAttractors:
 
     def add_orbit(self, orbit: PeriodicOrbit, states: np.ndarray | None = None) -> int:
         """The label of a stable orbit."""
+        if orbit.system.load.period is None:
+            return self.add_cycle(orbit)
         if states is None:
             states = section_states(self.system, orbit.section_state[None], orbit.period)[0]
         known = self.label_of(states)
@@ -193,6 +197,31 @@ class KnownAttractors:
         )
         return self._add(Ending.PERIODIC, states, (orbit.lowest, orbit.highest), evidence, orbit)
 
+    def on_cycle(self, state: np.ndarray, otherwise: Reason) -> int:
+        """The label of the cycle on which a motion from a state (d,) settles; UNDECIDED where it
+        settles on none that attracts, for the reason `otherwise`.
+        """
+        found = certify_cycle(self.system, state)
+        if found.orbit is None or not found.sound:
+            return self._fail(f"at {_shown(state)}: {otherwise.sentence}")
+        return self.add_cycle(found.orbit)
+
+    def add_cycle(self, orbit: PeriodicOrbit) -> int:
+        """The label of a stable cycle without a load."""
+        states = cycle_states(orbit)
+        for member in self.members:
+            if member.target.curve and np.median(member.target.distance(states)) < (
+                member.target.grain
+            ):
+                return member.label
+        largest = np.abs(orbit.multipliers).max(initial=0.0)
+        evidence = (
+            f"cycle of period {orbit.period:.9g}: residual {orbit.residual:.1g}, largest "
+            f"multiplier {largest:.6g}"
+        )
+        extrema = (orbit.lowest, orbit.highest)
+        return self._add(Ending.PERIODIC, states, extrema, evidence, orbit, curve=True)
+
     def _add(
         self,
         kind: Ending,
@@ -200,9 +229,10 @@ class KnownAttractors:
         extrema: tuple[float, float],
         evidence: str,
         orbit: PeriodicOrbit | None = None,
+        curve: bool = False,
     ) -> int:
         low, high = extrema
-        target = Target(len(self.members), kind, states, self._units)
+        target = Target(len(self.members), kind, states, self._units, curve)
         self.members.append(
             Attractor(target, high, low, orbit, starts=0, of=0, mirror=UNDECIDED, evidence=evidence)
         )
@@ -292,6 +322,10 @@ class KnownAttractors:
 
     def _image(self, member: Attractor) -> int | None:
         """The label of the mirror image of an attractor."""
+        if member.target.curve:
+            image = image_of(self.system, member.states[:1])[0]
+            found = certify_cycle(self.system, image)
+            return self.add_cycle(found.orbit) if found.orbit is not None and found.sound else None
         states = image_of(self.system, section_states(self.system, member.states, 0.5)[:, 0])
         if member.target.dense:
             for other in (known.target for known in self.members if known.target.dense):
@@ -457,6 +491,12 @@ def _assigned(
     later = found.assign(ends)
     found.assign_unsettled(ends, later)
     unforced = reason_unforced(found.system)
+    for _ in range(SETTINGS.verdicts):
+        waiting = np.flatnonzero(later == WAITING)
+        if unforced is None or not waiting.size:
+            break
+        later[waiting[0]] = found.on_cycle(ends.states[waiting[0], -1], unforced)
+        found.assign_unsettled(ends, later)
     if unforced is not None and (later == WAITING).any():
         number = int((later == WAITING).sum())
         found.reasons.append(f"of {number} motions: {unforced.sentence}")

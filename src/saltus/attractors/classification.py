@@ -24,7 +24,13 @@ from saltus.attractors.judgement import (
 from saltus.attractors.lyapunov.growth import LYAPUNOV
 from saltus.attractors.lyapunov.spectrum import Exponents, lyapunov_spectrum
 from saltus.attractors.nonperiodic import FEWEST_ENTRIES, ZeroOne, excludes_tori, zero_one_of_bands
-from saltus.attractors.stroboscopic_section import Certificate, certify, stays_at_rest, with_clock
+from saltus.attractors.stroboscopic_section import (
+    Certificate,
+    certify,
+    certify_cycle,
+    stays_at_rest,
+    with_clock,
+)
 from saltus.checks import Speeds, check_count, check_number
 from saltus.errors import MotionError
 from saltus.flow import RECURRENCE, Ending, EventKind, Recurrence, find_recurrence, simulate
@@ -56,7 +62,8 @@ class Verdict(Result):
     reason
         The sentence of the reason, with its numbers.
     period
-        The forcing periods after which it repeats itself; None if it does not.
+        The forcing periods after which it repeats itself, of a cycle without a load the time; None
+        if it does not.
     orbit
         The attracting orbit on which the motion is, solved by its own equations; else None.
     exponents
@@ -81,7 +88,7 @@ class Verdict(Result):
     kind: Ending
     cause: Reason
     reason: str
-    period: int | None
+    period: Any
     orbit: PeriodicOrbit | None
     exponents: Exponents | None
     zero_one: ZeroOne | None
@@ -145,7 +152,7 @@ class Verdict(Result):
         return html_table(f"Verdict: {self.kind}", known | self.evidence)
 
     def __repr__(self) -> str:
-        return f"Verdict({self.kind}{f' {self.period}' if self.period else ''}: {self.reason})"
+        return f"Verdict({self.kind}{f' {self.period:.9g}' if self.period else ''}: {self.reason})"
 
 
 @dataclass(frozen=True)
@@ -228,7 +235,7 @@ def classify(
     * `periodic`: it repeats itself, and is on an orbit that solves its own equations, has all
       multipliers inside the unit circle
       and repeats itself in direct simulation. Under constant loads an equilibrium is such an orbit,
-      of period 1.
+      of period 1; a cycle, as of a mass on a belt, is one whose period is a time.
     * `chaotic`: it has not settled after transient + periods. Also `judge`, the judge of charts and
       diagrams, finds the largest Lyapunov exponent above 0 by more than its error and what regular
       motion may show. Of 16 companions, which begin in the motion's last states, none settles in
@@ -301,7 +308,7 @@ def _settled(case: _Case, ends: Recurrence, start: np.ndarray) -> Verdict | None
     period = int(ends.period[0])
     cycle = reason_cycle(case.clock, ends.last[0])
     if cycle is not None:
-        return case.undecided(cycle, ends, {})
+        return _on_cycle(case, ends, cycle)
     seen = "it repeats itself"
     found = certify(case.clock, ends.states[0, -1], period)
     every = f"every {period} forcing periods" if period > 1 else ""
@@ -379,11 +386,24 @@ def _on_orbit(case: _Case, ends: Recurrence, found: Certificate, seen: str, **mo
     )
 
 
+def _on_cycle(case: _Case, ends: Recurrence, otherwise: Reason) -> Verdict:
+    """The verdict on a motion that goes on moving although nothing acts that varies: on the cycle on
+    which it settles, if that is found and attracts; else undecided.
+    """
+    found = certify_cycle(case.system, ends.last[0])
+    orbit = found.orbit
+    if orbit is None or not found.sound:
+        return case.undecided(otherwise, ends, {}, evidence=found.evidence)
+    numbers = {"time": orbit.period, "multiplier": abs(orbit.multipliers[0])}
+    more: dict[str, Any] = {"period": orbit.period, "orbit": orbit, "evidence": found.evidence}
+    return case.verdict(Ending.PERIODIC, Reason.CYCLE, ends, numbers, **more)
+
+
 def _judged(case: _Case, ends: Recurrence) -> Verdict:
     """The verdict on a motion that has neither come to rest nor repeated itself."""
     unforced = reason_unforced(case.system)
     if unforced is not None:
-        return case.undecided(unforced, ends, {})
+        return _on_cycle(case, ends, unforced)
     states = ends.states[:, -JUDGEMENT.companions :]
     answer = judge(
         case.system, states, {}, settings=case.settings, progress=part_of(case.progress, 0.3, 0.6)

@@ -92,6 +92,10 @@ class Reason(NumberedSentence):
             " drive it round a cycle, which has no forcing period"
         ),
     )
+    CYCLE = (
+        20,
+        "it goes round a cycle in the time {time:.12g}, with the largest multiplier {multiplier:.6g}",
+    )
     ROUNDING = (
         19,
         (

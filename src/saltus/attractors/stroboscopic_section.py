@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Stop, motions_from, nearest_return, simulate, stroboscopic
-from saltus.orbits import PeriodicOrbit, Signature, equations_of, orbit_from
+from saltus.orbits import PeriodicOrbit, Signature, equations_of, find_orbit, orbit_from
 from saltus.systems import (
     Load,
     System,
@@ -80,6 +80,43 @@ def is_unforced(system: System) -> bool:
             if term.once or (term.periodic and getattr(term, "amplitude", 1.0) != 0.0):
                 return False
     return True
+
+
+def without_clock(system: System) -> System:
+    """A system on which nothing acts that varies with time, under a load without a frequency."""
+    if system.load.frequency is None:
+        return system
+    channels = {
+        name: float(signal.derivative(0.0, system.load.frequency))
+        for name, signal in system.load.channels.items()
+    }
+    return System(model=system.model, load=Load(**channels), impact=system.impact)
+
+
+# states of a cycle that stand for its curve
+CURVE_STATES = 2048
+
+
+def cycle_states(orbit: PeriodicOrbit) -> np.ndarray:
+    """The states of a cycle over a period, (n, d), evenly spaced in time."""
+    motion = orbit.motion()
+    times = np.linspace(motion.start, motion.time, CURVE_STATES, endpoint=False)
+    position, velocity = motion.at(times)
+    states = np.concatenate([np.atleast_2d(position), np.atleast_2d(velocity)]).T
+    states[:, states.shape[1] - len(orbit.system.model.first_order) :] = 0.0
+    return np.asarray(states)
+
+
+def certify_cycle(system: System, state: np.ndarray) -> Certificate:
+    """The cycle on which a motion from a state (d,) settles, of a system on which nothing acts that
+    varies with time.
+    """
+    free = without_clock(system)
+    try:
+        orbit = find_orbit(free, **arguments_of(free, state))
+    except MotionError:
+        return Certificate(None, np.inf, SETTINGS.slow)
+    return Certificate(orbit, 0.0, SETTINGS.slow)  # the motion was followed until it is there
 
 
 def section_states(

@@ -99,10 +99,11 @@ class Labelling:
         for target in self.targets:
             if target.kind is Ending.REST:
                 label[self._rests(target, ends)] = target.label
-            elif target.kind is Ending.PERIODIC:
+            elif not target.dense:
                 label[_on_orbit(target, ends)] = target.label
             elif at_the_end:
-                rows = np.flatnonzero(ends.unsettled & (label == UNDECIDED))
+                moving = ends.unsettled | (ends.periodic if target.curve else False)
+                rows = np.flatnonzero(moving & (label == UNDECIDED))
                 if rows.size:
                     apart = np.median(target.distance(ends.states[rows, -LAST_STATES:]), axis=1)
                     label[rows[apart < target.grain]] = target.label
