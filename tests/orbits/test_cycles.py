@@ -1,30 +1,24 @@
 """Cycles of systems on which nothing acts that varies with time: their period is an unknown."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import pytest
+from orbits.cycle_cases import (
+    CASES,
+    Clock,
+    Lorenz,
+    Piecewise,
+    Roessler,
+    StoppedVanDerPol,
+    VanDerPol,
+    along_branch,
+    difference_multipliers,
+)
 from scipy.integrate import solve_ivp
 
 import saltus
-from saltus import BeltOscillator, ContactModel, System
-
-
-@dataclass(frozen=True, kw_only=True)
-class VanDerPol(ContactModel):
-    """x'' = mu (1 - x^2) x' - x."""
-
-    mu: float = 1.0
-    coordinates: ClassVar = ("x",)
-    channels: ClassVar = ()
-
-    def force(self, t, x, velocity, load):
-        return self.mu * (1.0 - x * x) * velocity - x
-
-
-saltus.register(VanDerPol)
+from saltus import BeltOscillator, NewtonImpact, System
 
 
 def stick_slip_period(kinetic, static, belt_speed):
@@ -142,32 +136,150 @@ def test_what_is_no_cycle_is_refused_in_a_sentence():
         )
 
 
-def difference_multipliers(orbit, step=1e-6):
-    """The eigenvalues but 1 of the map over a period, by central differences of the motion."""
-    start = orbit.start()
-    names = orbit.system.model.coordinates
-    state = np.array([*(start[name] for name in names), *np.atleast_1d(start["velocity"])])
-    count = len(names)
-
-    def later(state):
-        velocity = state[count] if count == 1 else tuple(state[count:])
-        motion = saltus.simulate(
-            orbit.system,
-            **dict(zip(names, state[:count].tolist(), strict=True)),
-            velocity=velocity,
-            duration=orbit.period,
-            tol=1e-14,
-        )
-        return motion.final_state
-
-    columns = [
-        (later(state + step * axis) - later(state - step * axis)) / (2.0 * step)
-        for axis in np.eye(len(state))
-    ]
-    values = np.linalg.eigvals(np.array(columns).T)
-    return np.delete(values, np.argmin(np.abs(values - 1.0)))
-
-
 def test_multipliers_are_those_of_differences(van_der_pol, belt):
     for orbit in (van_der_pol, belt):
         assert np.abs(difference_multipliers(orbit) - orbit.multipliers).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", ["soft stop", "clock", "two masses"])
+def test_branches_have_the_multipliers_of_differences(name):
+    compared, worst = along_branch(name, seed=0)
+    assert compared >= 3
+    assert worst < 1e-6
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("seed", range(4))
+def test_many_branches_have_the_multipliers_of_differences(name, seed):
+    compared, worst = along_branch(name, seed)
+    assert compared >= 3
+    assert worst < 1e-6
+
+
+def test_a_cycle_of_first_order_is_that_of_an_independent_solver():
+    """Example 9.2 of COCO (Dankowicz and Schilder, Recipes for Continuation, 2013): each crossing is
+    an event of DOP853."""
+    model = Piecewise()
+
+    def right(left, _, x):
+        return model.force(0.0, x, (), None, type("Sides", (), {"axis": -1.0 if left else 1.0}))
+
+    def axis(_, x):
+        return x[0]
+
+    state, crossings = np.array([0.0, 1.0]), []
+    axis.terminal = True
+    for k in range(60):
+        left = k % 2 == 1
+        run = solve_ivp(
+            lambda t, x, left=left: right(left, t, x),
+            (0.0, 20.0),
+            [-1e-13 if left else 1e-13, state[1]],
+            method="DOP853",
+            events=axis,
+            rtol=1e-13,
+            atol=1e-14,
+        )
+        state = run.y_events[0][0]
+        crossings.append((run.t_events[0][0], state[1]))
+    (right_time, low), (left_time, high) = crossings[-2:]
+    orbit = saltus.find_orbit(System(model=model), x1=0.1, x2=1.2)
+    assert orbit.period == pytest.approx(right_time + left_time, abs=1e-10)
+    seen = sorted(event_state(orbit))
+    assert seen == pytest.approx(sorted([low, high]), abs=1e-10)
+
+
+def event_state(orbit):
+    """The second coordinate at the events of one period."""
+    motion = orbit.motion()
+    return [float(motion.at(event.time)[0][1]) for event in motion.events]
+
+
+def test_a_grazing_of_a_cycle_lies_where_the_free_one_touches(van_der_pol):
+    system = System(model=StoppedVanDerPol(place=1.7), impact=NewtonImpact(0.7))
+    orbit = saltus.find_orbit(system, x=0.2, velocity=0.9)
+    assert orbit.impact_count == 1
+    branch = saltus.continue_orbit(orbit, "model.place", (1.6, 2.3))
+    (grazing,) = branch.special
+    assert str(grazing.kind) == "GR"
+    assert grazing.parameter == pytest.approx(van_der_pol.highest, abs=1e-9)
+    assert branch.orbits[-1].impact_count == 0
+    assert branch.orbits[-1].period == pytest.approx(van_der_pol.period, abs=1e-10)
+
+
+def test_periods_double_where_a_multiplier_is_minus_1():
+    orbit = saltus.find_orbit(System(model=Roessler()), x=1.0, y=1.0, z=0.1)
+    branch = saltus.continue_orbit(orbit, "model.c", (2.4, 3.2))
+    (doubling,) = branch.special
+    assert str(doubling.kind) == "PD"
+    assert min(abs(difference_multipliers(doubling.orbit) + 1.0)) < 1e-7
+    (doubled,) = saltus.switch_branch(doubling, (2.4, 3.2))
+    last = doubled.orbits[-1]
+    assert last.signature.period == 2
+    assert 1.99 < last.period / branch.at(3.2)[0].period < 2.01
+    assert last.defect < 1e-10
+    # beyond it the motion settles on the doubled orbit
+    settled = saltus.find_orbit(last.system, x=1.0, y=1.0, z=0.1)
+    assert settled.period == pytest.approx(last.period, abs=1e-9)
+
+
+def test_a_symmetric_cycle_loses_its_symmetry_at_a_branch_point():
+    """Near 313 (C. Sparrow, The Lorenz equations, 1982, section 4)."""
+    orbit = saltus.find_orbit(System(model=Lorenz()), x=1.0, y=1.0, z=300.0)
+    branch = saltus.continue_orbit(orbit, "model.r", (305.0, 352.0))
+    (breaking,) = branch.special
+    assert str(breaking.kind) == "BPC"
+    assert breaking.parameter == pytest.approx(313.0, abs=0.1)
+    ways = saltus.switch_branch(breaking, (300.0, 352.0))
+    ends = [way.orbits[-1] for way in ways]
+    assert [end.stable for end in ends] == [True, True]
+    # mirror images of one another: x and y change their signs
+    assert ends[0].extrema[0] == pytest.approx(-ends[1].extrema[0][::-1], abs=1e-6)
+    assert abs(ends[0].extrema[0].sum()) > 1.0
+
+
+@pytest.mark.parametrize("speed", [1.0, 1.9, 4.0])
+def test_a_lossless_motion_between_stops_has_its_closed_form(speed):
+    """x'' = -x between -0.8 and 1: two arcs of a circle of the radius of the start."""
+    system = System(model=Clock(push=0.0), impact=NewtonImpact(1.0))
+    orbit = saltus.find_orbit(system, x=0.2, velocity=speed)
+    radius = math.hypot(0.2, speed)
+    arcs = [math.asin(min(1.0, place / radius)) for place in (1.0, 0.8)]
+    assert orbit.period == pytest.approx(2.0 * sum(arcs), abs=1e-11)
+    assert orbit.multipliers == pytest.approx([1.0], abs=1e-8)
+    assert not orbit.isolated
+    with pytest.raises(saltus.ParameterError, match="not isolated"):
+        saltus.continue_orbit(orbit, "model.place", (0.9, 1.1))
+
+
+def test_the_energies_of_cycles_close(belt, van_der_pol):
+    for orbit in (belt, van_der_pol):
+        balance = saltus.energies(orbit)
+        assert abs(balance.defect) < 1e-12
+        stored = balance.energy[balance.role == "stored"]
+        assert np.abs(stored).max() < 1e-11
+    # the belt gives its speed times the friction; the mass moves by nothing in a period
+    balance = saltus.energies(belt)
+    slides = belt.period - 2.0
+    supplied = 0.1 * (0.2 * slides + (0.1 + 0.3) / 2.0 * 2.0)
+    assert float(balance.energy.sel(part="ground.belt")) == pytest.approx(supplied, abs=1e-12)
+
+
+@pytest.mark.parametrize(("rate", "length"), [(1e3, 1e-6), (1e-3, 1e3)])
+def test_a_cycle_is_the_same_in_other_units(belt, rate, length):
+    system = System(
+        model=BeltOscillator(
+            stiffness=rate**2, normal_force=rate**2 * length, belt_speed=0.1 * rate * length
+        )
+    )
+    other = saltus.find_orbit(system, x=0.25 * length, velocity=0.1 * rate * length)
+    assert other.period * rate == pytest.approx(belt.period, rel=1e-12)
+    assert other.highest / length == pytest.approx(belt.highest, rel=1e-12)
+    path = "model.belt_speed"
+    one = saltus.continue_orbit(belt, path, (0.05, 0.3))
+    scale = rate * length
+    two = saltus.continue_orbit(other, path, (0.05 * scale, 0.3 * scale))
+    assert len(two.special) == len(one.special)
+    assert [end.reason for end in two.ends] == [end.reason for end in one.ends]
+    assert two.at(0.2 * scale)[0].period * rate == pytest.approx(one.at(0.2)[0].period, rel=1e-11)
