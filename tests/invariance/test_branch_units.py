@@ -180,6 +180,48 @@ def test_a_branch_begun_at_the_end_of_a_family_is_its_parents() -> None:
     assert parent.special[0].parameter == pytest.approx(last.frequency, abs=1e-10)
 
 
+def test_a_torus_between_the_last_point_of_a_step_and_a_grazing_is_found() -> None:
+    """The pair of multipliers that leaves the circle there has become real, and one of them has
+    no bound, at the grazing itself: no value on either side showed it."""
+    case = random_case("chain", 60)
+    orbit = saltus.find_orbit(case.system, **case.start)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.43, case.frequency))
+    graze, torus = sorted(branch.special, key=lambda point: point.parameter)[:2]
+    assert [str(graze.kind), str(torus.kind)] == ["GR", "NS"]
+    assert torus.parameter - graze.parameter < 2e-4
+    # the pair by differences of motions over one period
+    system = case.system.with_({"load.frequency": torus.parameter})
+    start = torus.orbit.start()
+    state = np.array([start["x"], start["y"], *start["velocity"]])
+    steps = 1e-6 * np.eye(4)
+    ends = [
+        np.subtract(
+            *(
+                saltus.simulate(
+                    system,
+                    x=at[0],
+                    y=at[1],
+                    velocity=tuple(at[2:]),
+                    time=start["time"],
+                    periods=torus.orbit.period,
+                ).final_state
+                for at in (state + step, state - step)
+            )
+        )
+        / 2e-6
+        for step in steps
+    ]
+    pair = np.linalg.eigvals(np.array(ends).T)
+    assert np.sort(np.abs(pair))[-2:] == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert abs(pair.imag).max() > 0.1
+    # from beyond it
+    beyond = min(branch.orbits, key=lambda each: abs(each.frequency - torus.parameter + 5e-5))
+    again = saltus.continue_orbit(beyond, "load.frequency", (0.4328, 0.434))
+    assert [point.parameter for point in again.special if str(point.kind) == "NS"] == pytest.approx(
+        [torus.parameter], abs=1e-9
+    )
+
+
 MODELS = int(os.environ.get("SALTUS_MODELS", "6"))
 
 

@@ -163,3 +163,76 @@ def test_a_surface_without_effect_changes_no_unit():
     )
     assert other.own_time == pytest.approx(0.5, rel=1e-14)
     assert (other.length, other.time, other.own_time) == (one.length, one.time, one.own_time)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Harvester(saltus.ContactModel):
+    """A mass before a wall, with a voltage that follows its speed and a charge that follows that,
+    in any units."""
+
+    length: float = 1.0
+    time: float = 1.0
+    volt: float = 1.0
+    coordinates: ClassVar[tuple] = ("x", "voltage", "charge")
+    first_order: ClassVar[tuple] = ("voltage", "charge")
+    channels: ClassVar[tuple] = ("force",)
+
+    @property
+    def contacts(self):
+        return (saltus.Contact(name="wall", coordinate="x", position=0.4 * self.length, sign=-1),)
+
+    def force(self, t, q, velocity, load):
+        x, voltage, charge = q
+        push = load.force(t) - x / self.time**2
+        pushed = push - 0.3 * voltage * self.length / self.volt / self.time**2
+        filled = (0.8 * x / self.length * self.volt - 0.6 * voltage) / self.time
+        return pushed, filled, (voltage / self.volt - 0.2 * charge) / self.time
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filter(saltus.Model):
+    """A voltage that follows a source, in any units."""
+
+    time: float = 1.0
+    coordinates: ClassVar[tuple] = ("voltage",)
+    first_order: ClassVar[tuple] = ("voltage",)
+    channels: ClassVar[tuple] = ("source",)
+
+    def acceleration(self, t, theta, velocity, side, load):
+        return (load.source(t) - theta) / self.time
+
+
+@pytest.mark.parametrize("volt", [1e-6, 1e3])
+@pytest.mark.parametrize(("length", "rate"), SCALES)
+def test_coordinates_of_first_order_have_units_of_their_own(length, rate, volt):
+    """The unit of one was mixed with the unit of the other ones, in a sum of squares."""
+
+    def made(length=1.0, time=1.0, volt=1.0):
+        force = saltus.Harmonic(0.5 * length / time**2)
+        load = saltus.Load(frequency=1.1 / time, force=force)
+        return saltus.System(model=Harvester(length=length, time=time, volt=volt), load=load)
+
+    of_one = natural_units(made())
+    scaled = natural_units(made(length, 1.0 / rate, volt))
+    np.testing.assert_allclose(scaled.lengths, of_one.lengths * [length, volt, 1.0], rtol=1e-12)
+    assert scaled.time * rate == pytest.approx(of_one.time, rel=1e-12)
+    assert scaled.own_time * rate == pytest.approx(of_one.own_time, rel=1e-12)
+    assert of_one.lengths.min() > 0.1
+
+
+@pytest.mark.parametrize(("volt", "rate"), SCALES)
+@pytest.mark.parametrize("frequency", [None, 2.0])
+def test_coordinates_of_first_order_alone(frequency, volt, rate):
+    """Under a constant source of 3 the voltage is 3 in the end, and its time is its own."""
+
+    def made(volt=1.0, rate=1.0):
+        source = 3.0 * volt if frequency is None else saltus.Harmonic(3.0 * volt)
+        load = saltus.Load(frequency=None if frequency is None else frequency * rate, source=source)
+        return saltus.System(model=Filter(time=1.0 / rate), load=load)
+
+    units = natural_units(made(volt, rate))
+    assert units.time * rate == pytest.approx(1.0 if frequency is None else 0.5, rel=1e-12)
+    if frequency is None:
+        assert units.lengths[0] / volt == pytest.approx(3.0, rel=1e-12)
+    of_one = natural_units(made())
+    assert units.lengths[0] / volt == pytest.approx(of_one.lengths[0], rel=1e-12)

@@ -34,6 +34,9 @@ class TrailSettings:
     # A new point is no nearer to an end of the interval than this share of it: little would be
     # gained.
     inner: float = 0.1
+    # How far before an event, and behind one, the functions are read too, as a share of the way to
+    # the next point: at the event itself some have no value, and grow without bound beside it.
+    beside_event: float = 1e-2
     # A value at the zero of another test function that is smaller than this share of the values at
     # both ends of the interval is rounding of 0.
     rounding: float = 1e-6
@@ -127,6 +130,7 @@ class Trail:
         """
         if samples is self.seen:
             return samples
+        samples = self._with_points_beside_events(samples)
         looks = 0
         i = 0
         known = self.last[:-1]
@@ -147,6 +151,19 @@ class Trail:
                 samples, looks = [*samples[: i + 1], middle, *samples[i + 1 :]], looks + 1
         self.seen = samples
         return samples
+
+    def _with_points_beside_events(self, samples: list[TrailPoint]) -> list[TrailPoint]:
+        """The points of a step, with a further one beside each end at which an event has no count
+        of `Events.outside`, so that what happens up to the event is seen."""
+        first, *_, last = samples
+        found = list(samples)
+        if last.outside is None and last is not first:
+            beside = self._middle(samples[-2], last, 1.0 - SETTINGS.beside_event)
+            found[-1:-1] = [] if beside is None else [beside]
+        if first.outside is None and last is not first:
+            beside = self._middle(first, found[1], SETTINGS.beside_event)
+            found[1:1] = [] if beside is None else [beside]
+        return found
 
     def explained(self, a: TrailPoint, b: TrailPoint) -> bool:
         """Whether the counts of `Events.outside` at two points are equal, or a decisive test

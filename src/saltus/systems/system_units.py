@@ -212,6 +212,7 @@ def _found(system: System, rate: float) -> NaturalUnits:
     nearest: np.ndarray | None = None
     stiffest = 0.0
     quickest = 0.0
+    moving = len(model.moving)
     push = np.zeros(len(model.coordinates))
     with np.errstate(all="ignore"):
         for place, outward in _places(model, load, instants):
@@ -220,23 +221,30 @@ def _found(system: System, rate: float) -> NaturalUnits:
                 continue
             stiffest = max(stiffest, found.stiffness)
             quickest = max(quickest, found.rate)
-            if found.distance.any() and (
-                nearest is None or np.linalg.norm(found.distance) < np.linalg.norm(nearest)
-            ):
+            # coordinates of first order have other units
+            compared = slice(moving or None)
+            near = np.linalg.norm(found.distance[compared])
+            if near > 0.0 and (nearest is None or near < np.linalg.norm(nearest[compared])):
                 nearest = found.distance
                 push = found.acceleration
+        # sums that follow from displacements are such, too
+        of_own = len(push) - getattr(model, "dependent", 0)
+        first_order = (np.arange(len(push)) >= moving) & (np.arange(len(push)) < of_own)
         angular = np.array([model.unit_of(name) in ANGLES for name in model.coordinates])
+        angular &= np.arange(len(push)) < moving
         # a slow load leaves angles to move by themselves within a radian
         own_rate = math.sqrt(float(np.abs(push).max(where=angular, initial=0.0)))
-        known = _time(max(rate, own_rate if rate > 0.0 else 0.0), nearest, push, stiffest)
+        known = _time(
+            max(rate, own_rate if rate > 0.0 else 0.0),
+            None if nearest is None else nearest[:moving],
+            push[:moving],
+            stiffest,
+        )
         time = known or 1.0
         if nearest is None:
             nearest = _other_length(system, load, time)
-    largest = float(np.max(nearest, where=~angular, initial=0.0))
-    first_order = np.arange(len(nearest)) >= len(model.moving)
-    # what the load does not move has a distance that is rounding of the others
-    moved = nearest > ROUNDING * np.max(nearest, initial=0.0)
-    lengths = np.where(first_order & moved, nearest, largest)
+    largest = float(np.max(nearest[:moving], where=~angular[:moving], initial=0.0))
+    lengths = np.where(first_order & (nearest > 0.0), nearest, largest)
     lengths = np.where(angular, 1.0, lengths)
     sound = np.isfinite(lengths) & (lengths > 0.0)
     own_time = min(time, 1.0 / quickest) if quickest > 0.0 and not angular.any() else time
@@ -351,28 +359,65 @@ def _held_away(
                     pushes.append(value / scales)
     if not pushes:
         return None
-    moved = np.zeros((len(pushes), len(place)))
+    moving = len(model.moving)
+    accelerations = np.array(pushes)[:, :moving]
+    moved = np.zeros_like(accelerations)
     stiffness = 0.0
-    for slopes in _slopes_beside(model, place, load):
-        left, sizes, right = np.linalg.svd(slopes * scales / scales[:, None])
+    softest, *_ = all_slopes = _slopes_beside(model, place, load)
+    for slopes in all_slopes:
+        own = (slopes * scales / scales[:, None])[:moving, :moving]
+        left, sizes, right = np.linalg.svd(own)
         # bodies that nothing holds have a stiffness of rounding, which would put them infinitely far
         sizes = np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, 0.0)
         stiffness = max(stiffness, float(sizes.max(initial=0.0)))
         shares = np.maximum(sizes, rate**2)
-        along = np.array(pushes) @ left
+        along = accelerations @ left
         along = np.divide(along, shares, out=np.zeros_like(along), where=shares > 0.0) @ right
         # the softer side of a stop is the one through which a system moves, in its mirror image too
         if np.linalg.norm(along) > np.linalg.norm(moved):
             moved = along
+            softest = slopes
     distance = _mean(moved)
     acceleration = _mean(np.array(pushes))
-    squared = float(np.linalg.norm(acceleration)) / max(float(np.linalg.norm(distance)), TINY)
+    squared = float(np.linalg.norm(acceleration[:moving])) / max(
+        float(np.linalg.norm(distance)), TINY
+    )
     swing = SWING * _mean(moved - moved.mean(axis=0))
     # a contact from which all is pulled away may be any distance away
     away = float(outward @ np.mean(pushes, axis=0)) > 0.0
-    if np.linalg.norm(swing) > (TOLD if away else FARTHEST) * np.linalg.norm(distance):
+    swings = np.linalg.norm(swing) > (TOLD if away else FARTHEST) * np.linalg.norm(distance)
+    following = _following(softest, moved, np.array(pushes)[:, moving:], rate)
+    if swings:
         distance = swing
-    return Held(distance, acceleration, stiffness, math.sqrt(squared))
+        following = following - following.mean(axis=0)
+    behind = (SWING if swings else 1.0) * _mean(following)
+    if not moving:  # their rates are squared, as those of oscillations are
+        stiffness = float(np.abs(np.diag(softest)).max()) ** 2
+    return Held(np.append(distance, behind), acceleration, stiffness, math.sqrt(squared))
+
+
+def _following(
+    slopes: np.ndarray, moved: np.ndarray, rates: np.ndarray, frequency: float
+) -> np.ndarray:
+    """How far the coordinates of first order are moved at each instant (..., n), by what acts on
+    them and by the others, which are `moved`; 0 where that is rounding.
+
+    Each has a unit of its own, so that no size of several of them is taken.
+    """
+    first = moved.shape[1]
+    own = np.diag(slopes)[first:]
+    beside = slopes[first:, first:] - np.diag(own)
+    speeds = np.maximum(np.abs(own), frequency)
+    driven = rates - moved @ slopes[first:, :first].T
+    size = np.abs(rates) + np.abs(moved) @ np.abs(slopes[first:, :first]).T
+    found = np.zeros_like(driven)
+    terms = np.zeros_like(driven)
+    for _ in own:  # one may drive another one
+        found = -np.divide(driven - found @ beside.T, speeds, out=found * 0.0, where=speeds > 0.0)
+        terms = np.divide(
+            size + terms @ np.abs(beside).T, speeds, out=terms * 0.0, where=speeds > 0.0
+        )
+    return np.where(np.abs(found) > ROUNDING * terms, found, 0.0)
 
 
 def _masses(model: Any) -> np.ndarray:
