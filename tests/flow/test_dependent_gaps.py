@@ -115,6 +115,27 @@ def test_rows_of_unequal_masses_between_walls_keep_the_balances(seed):
     assert check_balances(TEN, np.random.default_rng(seed)) >= 10
 
 
+# Of the rows below, by their numbers, the first that end in a collapse of four to eight balls.
+COLLAPSES = (12, 27, 34, 52, 69, 681)
+
+
+def test_balls_that_collapse_at_a_wall_stay_there_until_they_are_struck():
+    """Nothing presses on them: the rounding of a sum, or of a coupling that is 0, must not open
+    their contacts.
+    """
+    random = np.random.default_rng(11)
+    rows = [row_between_walls(count) for count in range(2, 9)]
+    for number in range(max(COLLAPSES) + 1):
+        row = rows[number % len(rows)]
+        count = len(row.coordinates)
+        if number in COLLAPSES:
+            check_balances(row, random)
+        else:  # as many random numbers
+            random.uniform(size=count + 2)
+            random.uniform(size=count)
+            random.normal(size=count)
+
+
 @pytest.mark.thorough
 def test_ten_thousand_rows_between_walls_keep_the_balances():
     """About one in three hundred is refused, with its contacts: balls that collapse beside others

@@ -404,15 +404,13 @@ class InGapCoordinates(ContactModel):
         """For each dependent sum its row B T of the other coordinates' accelerations, and the value
         b that B T z'' has while its contact is closed, where q_0'' is q'' for z'' = 0:
 
-            b = -B q_0'' - n'' - 2 (B q' + n') - (B q + n - s).
+            b = -B q_0'' - n''.
 
-        The last two terms are 0 but for rounding, which dies out by them.
+        Terms that let the rounding of the sum and of its rate die out would press on the contact:
+        where nothing else does, they would decide whether it stays closed.
         """
         found = self._of_sums(t, theta, velocity, load)
-        return [
-            (row, -(bend + 2.0 * rate + left))
-            for row, (left, rate, bend) in zip(self.sum_rows(), found, strict=True)
-        ]
+        return [(row, -bend) for row, (_, _, bend) in zip(self.sum_rows(), found, strict=True)]
 
     def completed(
         self, t: Any, load: Any, state: np.ndarray, held: Sequence[int] = ()

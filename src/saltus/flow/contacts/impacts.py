@@ -16,6 +16,7 @@ from saltus.flow.contacts.layout import (
     FINISHED,
     MOST_EXCESS,
     MOST_FROZEN_IMPACTS,
+    UNCOUPLED,
     VANISHED,
     ContactColumn,
     FrictionColumn,
@@ -133,6 +134,11 @@ def fill_contact_matrices(motion):
             motion.coupling[i, j] = signs[i] * signs[j] * motion.inverse[a, b]
         motion.gaps[i] = signs[i] * (motion.coordinates[a] - contact_position(motion, i))
         motion.rates[i] = signs[i] * motion.velocities[a]
+    for i in range(count):
+        for j in range(count):
+            most = abs(motion.coupling[i, i] * motion.coupling[j, j])
+            if i != j and motion.coupling[i, j] * motion.coupling[i, j] <= UNCOUPLED * most:
+                motion.coupling[i, j] = 0.0
     return regular
 
 
@@ -469,9 +475,43 @@ def bring_to_rest(motion, near):
     for a in range(motion.local):
         for j in range(count):
             motion.velocities[a] += push(motion, a, j) * motion.impulses[j]
+    keep_sums(motion, near)
     for i in range(count):
         if near >> i & 1:
             settle_contact(motion, i, 0.0)
+
+
+@lean_jit
+def keep_sums(motion, near):
+    """Move the widest open gap of each dependent sum (`InGapCoordinates`), so that the sum follows
+    from the others once the contacts in `near` are at their positions.
+
+    An accumulation ends before all of its gaps are 0, and what is left of them must not stay as a
+    difference of the sum and its terms.
+    """
+    local = motion.local
+    for d in range(local - motion.first_order, local):
+        lacking = 0.0
+        for i in range(motion.contacts.shape[0]):
+            if near >> i & 1:
+                place = motion.contacts[i, ContactColumn.COORDINATE]
+                moved = contact_position(motion, i) - motion.coordinates[place]
+                lacking += motion.solver_numbers[d * local + place] * moved
+        widest = -1
+        room = 0.0
+        for i in range(motion.contacts.shape[0]):
+            place = motion.contacts[i, ContactColumn.COORDINATE]
+            shut = near >> i & 1 or motion.contacts[i, ContactColumn.CLOSED] == 1
+            if shut or place >= local - motion.first_order:
+                continue
+            if motion.solver_numbers[d * local + place] != 0.0 and motion.open_gaps[i] > room:
+                widest = i
+                room = motion.open_gaps[i]
+        if widest >= 0 and abs(lacking) < room:
+            place = motion.contacts[widest, ContactColumn.COORDINATE]
+            moved = -lacking / motion.solver_numbers[d * local + place]
+            motion.coordinates[place] += moved
+            motion.open_gaps[widest] += motion.signs[widest] * moved
 
 
 @lean_jit

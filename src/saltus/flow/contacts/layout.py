@@ -167,6 +167,10 @@ TRIED_AGAIN = 32
 # Reactions smaller than this vanish together, in units of the largest one so far: the rounding of
 # the loads that hold the contacts.
 TIED = 1e-12
+# A square of a coupling of two contacts that is no more than this share of the product of their own
+# is rounding of the inverse mass matrix: a distant impact would open a contact on which nothing
+# presses.
+UNCOUPLED = 2.0**-92
 
 
 @jit
