@@ -173,6 +173,38 @@ def test_a_friction_without_place_gets_no_force(kind: type[Pile]) -> None:
         saltus.sensitivities(inert, parameters=[path], **asked)
 
 
+def test_accumulations_of_a_pile_do_not_depend_on_the_time_asked_for() -> None:
+    """Two that run into one another: a step to a later end is 1e8 times as long as a bounce."""
+    plain, _, start = drawn(507)
+    ends = [
+        [
+            (event.contact, event.kind, pytest.approx(event.time, abs=1e-12))
+            for event in saltus.simulate(plain, velocity=(0.0,) * 3, **start, duration=end).events
+            if event.time < 1.2319
+        ]
+        for end in (1.2319, 1.24, 3.0, 8.0)
+    ]
+    assert len(ends[0]) > 20
+    assert all(events == ends[0] for events in ends[1:])
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "seed"), [(0.02, 5), (0.02, 16), (0.02, 46), (0.1, 11), (0.1, 47), (0.3, 3)]
+)
+def test_piles_rest_on_frictions_along_their_gaps(coefficient: float, seed: int) -> None:
+    """A body bounces while the other one rests on it, or is about to hit it: the friction along its
+    gap turns with each bounce.
+    """
+    plain, _, start = drawn(seed)
+    model = Inert(thickness=plain.model.thickness, coefficient=coefficient)
+    rubbed = saltus.System(model=model, load=plain.load, impact=plain.impact)
+    motion = saltus.simulate(rubbed, velocity=(0.0,) * 3, **start, periods=5)
+    assert [event for event in motion.events if event.kind == "held" and "floor" in event.contact]
+    assert saltus.energies(motion, periods=5).defect < 1e-10
+    a, b, _ = motion.at(np.linspace(0.0, motion.time, 500))[0]
+    assert min(a.min(), (b - a).min() - model.thickness) > -1e-12
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("first", range(100, 600, 50))
 def test_motions_of_many_piles(first: int) -> None:

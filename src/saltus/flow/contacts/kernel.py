@@ -165,12 +165,14 @@ def end_accumulation_of(motion, t):
     free_pulls(motion, t)
     near = near_contacts(motion, slow)
     turns = turns_with(motion, last)
+    if turns and near != 0:
+        near = near & closed_bits(motion) | 1 << last
     if near == 0 or (turns and not slides_on(motion, near)):
         return t
     limit = min(frozen_limit(motion, near), motion_end(motion) - t)
     together = near
     left = (
-        rubbed_accumulation(motion, t, near, last, limit)
+        rubbed_accumulation(motion, t, near & ~(1 << last), last, limit)
         if turns
         else rest_after(motion, near, -1, limit)
     )
@@ -392,6 +394,32 @@ def first_guard(motion, h, whole):
     return hit, first, shorter and hit < 0
 
 
+# The share of a step up to which guards are looked at once more for earlier zeros: in units of what
+# a gap is there, the rounding of the whole step's series is the inverse square of it.
+SMALL_SHARE = 0.125
+EARLIER = 1.0 - 2.0**-20  # A zero before this share of the shorter step is another instant.
+
+
+@lean_jit
+def earlier_guard(motion, h, hit, rubs, first):
+    """The contact, the friction and the share of the step of the first event, where a guard reaches
+    0 before the event that the step's whole length has shown.
+
+    A gap of a bounce that is far shorter than the step reaches 0 and rises again within the
+    rounding of a series that is scaled to the step.
+    """
+    for _ in range(motion.contacts.shape[0]):
+        if not 0.0 < first < SMALL_SHARE:
+            break
+        nearer, share, _ = first_guard(motion, first * h, False)
+        if nearer < 0 or nearer == hit or not share < EARLIER:
+            break
+        hit = nearer
+        rubs = -1
+        first *= share
+    return hit, rubs, first
+
+
 @lean_jit
 def contacts_closing_with(motion, hit, tau):
     """The open contacts that close with `hit` at `tau` within the step, to within rounding, as
@@ -485,6 +513,7 @@ def seek_event(motion, t, target):
         rubs = -1
     if (shorter or shorter_rub) and hit < 0 and rubs < 0:
         h = 0.5 * h
+    hit, rubs, first = earlier_guard(motion, h, hit, rubs, first)
     limit = -1
     first_limit = NEVER
     held = count + 2 * motion.frictions.shape[0]

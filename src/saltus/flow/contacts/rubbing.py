@@ -26,6 +26,7 @@ from saltus.flow.contacts.complementarity import (
     worst_violation,
 )
 from saltus.flow.contacts.frictions import rubs_along
+from saltus.flow.contacts.impacts import hold_coordinates, time_to_close
 from saltus.flow.contacts.layout import (
     VIOLATED,
     ContactColumn,
@@ -319,28 +320,47 @@ def turns_with(motion, i):
     return rubs if rubs and ground_speed(motion, rubs - 1) == 0.0 else 0
 
 
+OTHERS = 10.0  # A contact is beside an accumulation if it closes later by this factor.
+
+
 @lean_jit
-def rubbed_accumulation(motion, t, near, i, limit):
+def fall_beside(motion, t, i, closed):
+    """The acceleration with which a contact closes while those in `closed` are held; -1 if one of
+    these does not press."""
+    expand(motion, t, 1.0, 0)
+    for j in range(motion.contacts.shape[0]):
+        if closed >> j & 1 and not motion.margin_series[j, 0] > 0.0:
+            return -1.0
+    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    return -motion.signs[i] * motion.acceleration_series[coordinate, 0]
+
+
+@lean_jit
+def rubbed_accumulation(motion, t, closed, i, limit):
     """The time in which a contact loses its speed by impacts, where a friction along its coordinate
     turns at the top of each flight. The accelerations are constant, b before the top and c after
     it:
 
         (u / b + u / sqrt(b c)) / (1 - e sqrt(c / b))    for a speed u.
 
-    -1 if it does not lose it within `limit`, or others in `near` take part.
+    -1 if it does not lose it within `limit`, or if others take part: those in `closed` must press
+    on their contacts before the top and after it, and open ones must not close by far.
     """
     u = motion.rates[i]
     k = rubs_along(motion, i) - 1
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    for j in range(motion.contacts.shape[0]):
+        if j != i and not closed >> j & 1:
+            # the impacts change the rates of the others by about their own speeds
+            rate = motion.rates[j] - OTHERS * u
+            limit = min(limit, time_to_close(motion.gaps[j], rate, motion.pulls[j]) / OTHERS)
+    hold_coordinates(motion)
     place = motion.parameters.size - motion.local
     place += k - 2 - motion.frictions.shape[0]
     motion.parameters[place] = motion.signs[i]
-    expand(motion, t, 1.0, 0)
-    rising = -motion.signs[i] * motion.acceleration_series[coordinate, 0]
+    rising = fall_beside(motion, t, i, closed)
     motion.parameters[place] = -motion.signs[i]
-    expand(motion, t, 1.0, 0)
-    falling = -motion.signs[i] * motion.acceleration_series[coordinate, 0]
-    if not (rising > 0.0 and falling > 0.0 and motion.gaps[i] == 0.0 and near == 1 << i):
+    falling = fall_beside(motion, t, i, closed)
+    if not (rising > 0.0 and falling > 0.0):
         return -1.0
     left = 1.0 - restitution(motion, i, i) * math.sqrt(falling / rising)
     found = (u / rising + u / math.sqrt(rising * falling)) / left if left > 0.0 else np.inf
