@@ -3,6 +3,7 @@ notebook shows.
 """
 
 import csv
+import io
 import sys
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import pytest
 import xarray as xr
 
 import saltus
+from saltus import progress
 from saltus.errors import ParameterError
 
 SYSTEM = saltus.System(
@@ -220,6 +222,31 @@ def test_progress_in_a_notebook_is_one_line_that_is_written_over(monkeypatch, ca
     assert len(shown) == 2
     saltus.show_progress(1.0, "again")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("call", [saltus.simulate, saltus.simulate_many])
+def test_long_work_that_nobody_watches_shows_its_progress_in_a_terminal(monkeypatch, call):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    system = saltus.System(model=saltus.WallOscillator(), load=saltus.Load(frequency=1.1))
+    asked = {"x": -0.5, "periods": 40_000}
+    call(system, x=-0.5, periods=1)
+    seen = []
+    for after, stream, options in (
+        (0.0, Terminal(), {}),
+        (0.0, io.StringIO(), {}),  # a file
+        (0.0, Terminal(), {"progress": lambda fraction, what: None}),
+        (1e9, Terminal(), {}),
+    ):
+        monkeypatch.setattr(progress, "UNWATCHED", after)
+        monkeypatch.setattr(sys, "stderr", stream)
+        call(system, **asked, **options)
+        seen.append(stream.getvalue())
+        asked["x"] -= 0.01  # another motion, as the last one is remembered
+    assert "following the motion" in seen[0]
+    assert seen[1:] == ["", "", ""]
 
 
 def test_what_is_no_result_is_refused():

@@ -10,6 +10,7 @@ import html
 import io
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -19,6 +20,7 @@ from typing import Any
 from saltus.errors import ParameterError, shown
 
 Progress = Callable[[float, str], object]
+UNWATCHED = 10.0  # seconds after which work that nobody watches shows its progress by itself
 LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of other threads
 
 
@@ -32,8 +34,7 @@ class LineBelowCell:
 
     def show(self, fraction: float, what: str) -> bool:
         """Show the line; False outside of a notebook."""
-        shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-        if not hasattr(shell, "kernel"):
+        if not _in_notebook():
             return False
         notebook = sys.modules["IPython"].display
         done = fraction >= 1.0
@@ -52,12 +53,16 @@ class LineBelowCell:
 
 def show_below_cell(figure: Any) -> None:
     """In a notebook, show a figure below the cell that makes it; elsewhere do nothing."""
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    if hasattr(shell, "kernel"):
+    if _in_notebook():
         picture = io.BytesIO()
         notebook = sys.modules["IPython"].display
         figure.savefig(picture, format="png", dpi=110)
         notebook.display(notebook.Image(picture.getvalue()))
+
+
+def _in_notebook() -> bool:
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return hasattr(shell, "kernel")
 
 
 LINE = LineBelowCell()
@@ -94,6 +99,32 @@ def show_progress(fraction: float, what: str) -> None:
         file=sys.stderr,
         flush=True,
     )
+
+
+class LongWork:
+    """The progress of work that nobody watches, which is shown after a while where a person reads:
+    in a terminal or a notebook. A file is not written to."""
+
+    def __init__(self) -> None:
+        self.begin = time.monotonic()
+        self.shown = False
+
+    def __call__(self, fraction: float, what: str) -> None:
+        """Show the line, if it has taken long."""
+        long = fraction < 1.0 and time.monotonic() - self.begin > UNWATCHED
+        if self.shown or (long and (_in_notebook() or _is_terminal())):
+            self.shown = True
+            show_progress(fraction, what)
+
+
+def shown_if_long(progress: Progress) -> Progress:
+    """A progress; in the place of `silent`, where nobody watches what this is a part of either, one
+    that is shown after a while."""
+    return LongWork() if progress is silent and _watch.get() is None else progress
+
+
+def _is_terminal() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 class FractionMemory:
@@ -135,7 +166,7 @@ def say(what: str) -> None:
     watch = _watch.get()
     if watch is not None:
         watch.progress(watch.fraction, what)
-    elif sys.stderr is not None and sys.stderr.isatty():
+    elif _is_terminal():
         print(f"saltus: {what}", file=sys.stderr, flush=True)
 
 

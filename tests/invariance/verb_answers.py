@@ -96,18 +96,22 @@ def exponents_of(recipe: Recipe) -> VerbAnswer:
 
 
 def window_of(recipe: Recipe, half: float = 0.8) -> tuple[tuple[float, float], ...]:
-    """A window about the start: half widths of 0.8 in the first recipe's units."""
+    """A window about the start: half widths of 0.8 in the first recipe's units, in the order of the
+    model's coordinates."""
     view = recipe.view
-    places = recipe.position.tolist()
-    speeds = recipe.velocity.tolist()
-    length, speed = half * view.length, half * view.length / view.time
-    following = (
-        [] if recipe.lag is None else [(recipe.lag_start - length, recipe.lag_start + length)]
-    )
+    model: Any = recipe.system().model
+    start = start_of(recipe)
+    places = [start[name] for name in model.coordinates]
+    speeds = np.atleast_1d(start["velocity"]).tolist()[: len(model.moving)]
+    # amplitudes of modes have the unit of a displacement times the root of a mass
+    local = getattr(model, "local_count", len(places))
+    lengths = [
+        half * view.length * (1.0 if i < local else view.mass**0.5) for i in range(len(places))
+    ]
+    rates = [length / view.time for length in lengths]
     return (
-        *((x - length, x + length) for x in places),
-        *following,
-        *((v - speed, v + speed) for v in speeds),
+        *((x - length, x + length) for x, length in zip(places, lengths, strict=True)),
+        *((v - rate, v + rate) for v, rate in zip(speeds, rates, strict=False)),
     )
 
 

@@ -242,3 +242,37 @@ def test_masses_that_nothing_holds_or_joins_move_freely() -> None:
     assert frequencies(reduced) == pytest.approx(np.zeros(4), abs=1e-6)
     with pytest.raises(saltus.ParameterError, match="all of them are 0"):
         saltus.Structure.reduced(np.zeros((4, 4)), np.eye(4), modes=3, contacts=[wall(3)])
+
+
+@pytest.mark.parametrize("make", [saltus.Structure, saltus.Structure.reduced])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [("mass", 1e-320), ("mass", 1e120), ("stiffness", 1e-310), ("stiffness", 1e200)],
+)
+def test_matrices_whose_products_are_no_numbers_are_refused(make, name, size):
+    """They were followed with NumPy's warnings."""
+    springs = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    given = {"mass": np.eye(2), "stiffness": springs}
+    given[name] = given[name] * size
+    modes = {} if make is saltus.Structure else {"modes": 1}
+    stop = wall(1, 0.2)
+    with pytest.raises(saltus.ParameterError, match=f"^{name} must have numbers of 1e-100 to 1e"):
+        make(**given, **modes, contacts=[stop], forces={"f": 0})
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("unit", [1e-60, 1e-20, 1e20, 1e60])
+def test_masses_of_any_unit_stand_beside_modes_of_mass_1(unit):
+    """A row's mass beside a mode's of 1 made SciPy warn of an ill-conditioned matrix."""
+    springs = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    stop = wall(1, 0.2)
+    ends = []
+    for size in (1.0, unit):
+        model = saltus.Structure.reduced(
+            size * np.diag([1.0, 0.5]), size * springs, modes=1, contacts=[stop], forces={"f": 0}
+        )
+        load = saltus.Load(frequency=1.1, f=saltus.Harmonic(0.3 * size))
+        system = saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.6))
+        motion = saltus.simulate(system, **model.start(), periods=4)
+        ends.append([len(motion.impacts), *model.displacements(motion.position)])
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9)

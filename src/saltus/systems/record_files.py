@@ -447,6 +447,18 @@ def _unpacked(text: str, name: str) -> np.ndarray:
     return array
 
 
+def check_range_of(largest: float, name: str) -> None:
+    """Refuse a matrix whose largest number is so large or small that products of it are no
+    numbers."""
+    least = 1.0 / LIMITS.value
+    if largest != 0.0 and not least <= largest <= LIMITS.value:
+        raise ParameterError(
+            f"{name} must have numbers of {least:g} to {LIMITS.value:g} in size, and its largest is"
+            f" {largest:g}: choose other units",
+            name,
+        )
+
+
 def check_matrices(given: Mapping[str, np.ndarray]) -> None:
     """Refuse matrices that are not those of a structure: its `mass`, its `stiffness` and maybe its
     `damping`.
@@ -462,6 +474,7 @@ def check_matrices(given: Mapping[str, np.ndarray]) -> None:
                 f"{name} must be {len(mass)} x {len(mass)} as the mass is, got {len(a)} x {len(a)}",
                 name,
             )
+        check_range_of(np.abs(a).max(), name)
         if name != "damping" and np.abs(a - a.T).max() > 1e-9 * np.abs(a).max():
             i, j = np.unravel_index(np.abs(a - a.T).argmax(), a.shape)
             raise ParameterError(

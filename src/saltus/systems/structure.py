@@ -39,6 +39,7 @@ from saltus.systems.record_files import (
     ConstantNumbers,
     check_independent,
     check_matrices,
+    check_range_of,
     read_array,
 )
 from saltus.systems.reduction import check_symmetric, shapes_of, sparse_matrix
@@ -171,7 +172,12 @@ def modes_of(
     m = mass.array
     k = stiffness.array
     r = rows.array
-    inertial = solve(m, r.T, assume_a="pos") if len(r) else np.zeros((len(m), 0))
+    # a power of 2 for each coordinate, as modes of mass 1 stand beside masses in a user's unit
+    even = np.exp2(-np.round(0.5 * np.log2(np.diag(m))))
+    inertial = np.zeros((len(m), 0))
+    if len(r):
+        weighted = even[:, None] * r.T
+        inertial = even[:, None] * solve(even[:, None] * m * even, weighted, assume_a="pos")
     local = np.linalg.inv(r @ inertial) if len(r) else np.zeros((0, 0))
     free = null_space(r) if len(r) else np.eye(len(m))
     shapes = np.zeros((len(m), 0))
@@ -438,6 +444,7 @@ class Structure(ContactModel):
                     f"{matrix.shape[0]} x {matrix.shape[0]}",
                     name,
                 )
+            check_range_of(abs(matrix).max(), name)
             if name != "damping":
                 check_symmetric(matrix, name)
         all_names = _names_of(names, size)

@@ -48,7 +48,7 @@ from saltus.flow.lanes.memory import (
     Work,
     is_over,
 )
-from saltus.progress import LOOK_INTERVAL, Progress, silent
+from saltus.progress import LOOK_INTERVAL, Progress, shown_if_long, silent
 from saltus.taylor.vectors import CACHE_LINE, WIDTH
 
 WHAT = "following the motions"  # for the progress
@@ -205,6 +205,7 @@ class Lanes:
         waiting = chunks(n, threads, self.kept)
         lock = threading.Lock()
         compile_everything(self.several)  # here, not in each thread
+        progress = shown_if_long(progress)
         progress(0.0, WHAT)
         pool = _pool(os.getpid())
         workers = list[Future[None]]()

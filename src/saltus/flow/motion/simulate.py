@@ -37,7 +37,7 @@ from saltus.flow.motion.kernel_state import (
 )
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
-from saltus.progress import Progress, silent
+from saltus.progress import Progress, shown_if_long, silent
 from saltus.systems import System, check_system, natural_units, read_start
 from saltus.taylor import structure_key
 
@@ -474,6 +474,7 @@ def _advance(
     end = at.last * at.length + at.end
     checked_at = begin
     counted = 0
+    progress = shown_if_long(progress)
     progress(0.0, WHAT)
     while True:
         status = now.advance(run, recorder.steps, recorder.events)
