@@ -169,7 +169,7 @@ def test_a_sweep_has_the_extrema_of_each_coordinate() -> None:
             assert float(at[f"largest_{name}"]) == pytest.approx(expected, rel=1e-6)
             assert float(at[f"smallest_{name}"]) == pytest.approx(-expected, rel=1e-6)
     assert float(sweep.amplitude[0, 0]) == pytest.approx(amplitude(0.5), rel=1e-6)
-    assert "all coordinates" in sweep.amplitude.attrs["long_name"]
+    assert sweep.amplitude.attrs["long_name"] == "max abs(x1) in a period"
     short = saltus.frequency_sweep(system, [0.5, 0.55], periods=3, x1=0.0, mode_1=0.0)
     assert (short.outcome == "undecided").all()  # three periods are too few
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from saltus.attractors.stroboscopic_section import is_constant
 from saltus.checks import check_count
-from saltus.flow import Ending, extrema_names, state_names
+from saltus.flow import Ending, extrema_names, state_names, unit_of
 from saltus.orbits import PeriodicOrbit
 from saltus.progress import html_table, rows_table
 from saltus.result import Result, provenance
-from saltus.systems import System, Window
+from saltus.systems import System, Window, driven_displacements
 
 if TYPE_CHECKING:
     import xarray
@@ -145,9 +145,9 @@ class Attractor:
     target
         Its label, its kind and its states at phase 0 of the load.
     highest
-        The largest coordinate on it; with several coordinates the largest of all.
+        The largest coordinate on it; of several coordinates the one that the load drives.
     lowest
-        The smallest coordinate on it.
+        The smallest one.
     orbit
         The orbit if it is periodic, solved by its own equations and stable by its multipliers; else
         None.
@@ -201,7 +201,7 @@ class Attractor:
 
     @property
     def amplitude(self) -> float:
-        """max abs of the coordinate."""
+        """max abs of the coordinate; of several, of the one that the load drives."""
         return max(abs(self.highest), abs(self.lowest))
 
     @property
@@ -428,10 +428,10 @@ def attractor_columns(system: System) -> dict[str, tuple[str, str, str]]:
     """The columns of a table of attractors by their names: the property of `Attractor`, the unit
     and the text of each.
     """
-    names = system.model.coordinates
-    unit = system.model.unit_of(system.model.coordinates[0])
-    high, low = extrema_names(names)
-    name = names[0] if len(names) == 1 else "any coordinate"
+    driven = driven_displacements(system)
+    unit = unit_of(system, driven[0])
+    high, low = extrema_names(driven)
+    name = " or ".join(driven)
     return {
         "fraction": ("fraction", "1", "share of the initial states that end there"),
         "error": ("error", "1", "binomial standard error of the share"),

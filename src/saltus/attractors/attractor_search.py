@@ -37,6 +37,7 @@ from saltus.flow import (
     Ending,
     Recurrence,
     check_device,
+    driven_range,
     extrema_names,
     find_recurrence,
     motions_from,
@@ -53,6 +54,7 @@ from saltus.systems import (
     before_impacts,
     check_reached,
     check_window,
+    driven_displacements,
     image_of,
     initial_states,
     middle_of,
@@ -171,15 +173,24 @@ class KnownAttractors:
             near = member.target.distance(state) < self._near(state)
             if member.kind is Ending.REST and near:
                 return member.label
-        held = state[: len(self.system.model.coordinates)]
-        # contacts may hold it to a wall that moves
-        if self.system.in_gap_coordinates is not self.system:
-            held = simulate(self.system, **arguments_of(self.system, state), periods=1).extrema
         evidence = (
             "proved: captured at the contact for all later loads, or at rest where no "
             "load ever pulls"
         )
-        return self._add(Ending.REST, state[None], (float(held.min()), float(held.max())), evidence)
+        model = self.system.model
+        weights = np.array([model.weights_of(name) for name in driven_displacements(self.system)])
+        places = weights @ state[: len(model.coordinates)]
+        held = float(places.min()), float(places.max())
+        # contacts may hold it to a wall that moves
+        if self.system.in_gap_coordinates is not self.system:
+            held = self._range_from(arguments_of(self.system, state), periods=1)
+        return self._add(Ending.REST, state[None], held, evidence)
+
+    def _range_from(self, start: dict[str, Any], periods: int) -> tuple[float, float]:
+        """The least and the largest value of the displacement that the load drives, over so many
+        forcing periods."""
+        motion = simulate(self.system, **start, periods=periods, tol=1e-10)
+        return driven_range(motion)
 
     def add_orbit(self, orbit: PeriodicOrbit, states: np.ndarray | None = None) -> int:
         """The label of a stable orbit."""
@@ -286,15 +297,14 @@ class KnownAttractors:
                 f"{where}: {verdict.kind}, but areas do not shrink, so nothing attracts"
             )
         # lanes record the extrema of other coordinates
-        sums = self.system.in_gap_coordinates is not self.system
-        sampled = ("state",) if sums else ("state", "extrema")
+        several = len(self.system.model.coordinates) > 1
+        several = several or self.system.in_gap_coordinates is not self.system
+        sampled = ("state",) if several else ("state", "extrema")
         sample = motions_from(
             self.system, state[None], periods=SETTINGS.sample, sample=sampled, last="all", tol=1e-10
         )
-        if sums:
-            extrema = simulate(self.system, **start, periods=SETTINGS.sample, tol=1e-10).extrema
-            low = float(extrema.min())
-            high = float(extrema.max())
+        if several:
+            low, high = self._range_from(start, SETTINGS.sample)
         else:
             high, low = (
                 float(sample[f"overall_{name}"].values[0])
@@ -332,9 +342,11 @@ class KnownAttractors:
                 if np.median(other.distance(states)) < other.grain:
                     return other.label
             middle = middle_of(self.system)
-            if middle is None:
-                return None  # the extrema of which coordinate turn about which centre is not known
-            extrema = (2.0 * middle - member.highest, 2.0 * middle - member.lowest)
+            if len(self.system.model.coordinates) > 1 or middle is None:
+                start = arguments_of(self.system, states[-1])
+                extrema = self._range_from(start, SETTINGS.sample)
+            else:
+                extrema = (2.0 * middle - member.highest, 2.0 * middle - member.lowest)
             evidence = f"mirror image of a {member.kind} one: {member.evidence}"
             return self._add(member.kind, states, extrema, evidence)
         known_label = self.label_of(states)

@@ -249,7 +249,7 @@ def approached_orbit(
     apart = np.abs((states - orbit.section_state) / units).max(axis=1)
     apart = apart[int(np.argmin(apart[:q])) :: q]  # at the phase of the orbit's own state
     quarter = max(1, len(apart) // 4)
-    is_near = apart[0] <= within * orbit.amplitude / orbit.equations.natural.length
+    is_near = apart[0] <= within * orbit.size / orbit.equations.natural.length
     return orbit if is_near and apart[-quarter:].max() < apart[:quarter].max() else None
 
 

@@ -45,6 +45,16 @@ from .motion.motion import Motion as Motion
 from .motion.motion import state_names as state_names
 from .motion.portable import PortableKernel as PortableKernel
 from .motion.portable import PortableMotion as PortableMotion
+from .motion.quantities import Extreme as Extreme
+from .motion.quantities import Functions as Functions
+from .motion.quantities import Quantity as Quantity
+from .motion.quantities import check_new_names as check_new_names
+from .motion.quantities import displacements_of as displacements_of
+from .motion.quantities import driven_range as driven_range
+from .motion.quantities import extremes_of as extremes_of
+from .motion.quantities import own_quantities as own_quantities
+from .motion.quantities import quantity_of as quantity_of
+from .motion.quantities import unit_of as unit_of
 from .motion.sensitivities import Sensitivities as Sensitivities
 from .motion.sensitivities import derivatives_of as derivatives_of
 from .motion.sensitivities import sensitivities as sensitivities

@@ -5,6 +5,7 @@ simulation.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,27 @@ import numpy as np
 from saltus.checks import LIMITS, check_count, with_answers
 from saltus.continuation import NEWTON, newton
 from saltus.errors import MotionError
-from saltus.flow import Motion, SegmentColumn, Validity, simulate
+from saltus.flow import (
+    Extreme,
+    Motion,
+    SegmentColumn,
+    Validity,
+    displacements_of,
+    quantity_of,
+    simulate,
+)
 from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result, function_for
-from saltus.systems import System, arguments_of, middle_of, natural_units, state_of
+from saltus.systems import (
+    System,
+    arguments_of,
+    driven_displacements,
+    middle_of,
+    natural_units,
+    state_of,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -273,29 +289,87 @@ class PeriodicOrbit(Result):
         return middle_of(self.equations.system) if self.symmetric else 0.0
 
     @cached_property
-    def highest(self) -> float:
-        """The largest value of the coordinate; with several coordinates, of any of them."""
+    def reach(self) -> tuple[float, float]:
+        """The least and the largest value of any coordinate, by which orbits are told apart. It is
+        no quantity of its own where coordinates have different meanings.
+        """
         if self._in_others or self._middle is None:
-            return float(self._own_extrema[:, 1].max())
-        top = self._extremes[:, SegmentColumn.HIGHEST].max()
-        bottom = self._extremes[:, SegmentColumn.LOWEST].min()
-        return float(max(top, 2.0 * self._middle - bottom) if self.symmetric else top)
+            return float(self._own_extrema[:, 0].min()), float(self._own_extrema[:, 1].max())
+        top = float(self._extremes[:, SegmentColumn.HIGHEST].max())
+        bottom = float(self._extremes[:, SegmentColumn.LOWEST].min())
+        if not self.symmetric:
+            return bottom, top
+        high = max(top, 2.0 * self._middle - bottom)
+        return 2.0 * self._middle - high, high
+
+    @property
+    def size(self) -> float:
+        """The largest absolute value of any coordinate, as `reach` has it."""
+        return max(map(abs, self.reach))
 
     @cached_property
+    def _driven_range(self) -> tuple[float, float]:
+        """The least and the largest value of the displacement that the load drives; nan where the
+        motion cannot be followed by direct simulation."""
+        ranges = [self.ranges[name] for name in driven_displacements(self.equations.given)]
+        return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """The least and the largest value over its period of each coordinate and each named point;
+        nan where the motion cannot be followed by direct simulation.
+        """
+        given = self.equations.given
+        if len(given.model.coordinates) == 1:
+            return {given.model.coordinates[0]: self.reach}
+        names = displacements_of(given)
+        try:
+            motion = self.motion()
+        except MotionError:
+            return dict.fromkeys(names, (math.nan, math.nan))
+        return {name: motion.range_of(name) for name in names}
+
+    @property
+    def highest(self) -> float:
+        """The largest value of the coordinate; of several, of the one that the load drives."""
+        return self._driven_range[1]
+
+    @property
     def lowest(self) -> float:
-        """The least value of the coordinate; with several coordinates, of any of them."""
-        if self._in_others or self._middle is None:
-            return float(self._own_extrema[:, 0].min())
-        return (
-            2.0 * self._middle - self.highest
-            if self.symmetric
-            else float(self._extremes[:, SegmentColumn.LOWEST].min())
-        )
+        """The least value of the coordinate; of several, of the one that the load drives."""
+        return self._driven_range[0]
 
     @property
     def amplitude(self) -> float:
-        """max abs(theta)."""
-        return max(abs(self.highest), abs(self.lowest))
+        """The largest absolute value of the coordinate; of several, of the one that the load drives.
+        `quantity` has that of another one.
+        """
+        return max(map(abs, self._driven_range))
+
+    def quantity(self, which: str | Callable[[Motion], Any] = "amplitude") -> float:
+        """A quantity of its motion over its period.
+
+        Parameters
+        ----------
+        which
+            "amplitude", "highest" or "lowest" of the coordinate that the load drives;
+            "amplitude_x", "largest_x" or "smallest_x" of a coordinate or a named point x, of which
+            "x" alone is the amplitude; or a function of a motion.
+
+        Raises
+        ------
+        ParameterError
+            There is no such quantity.
+
+        Examples
+        --------
+        >>> orbit.quantity("largest_theta") == orbit.highest
+        True
+        """
+        asked = quantity_of(self.equations.given, which)
+        if isinstance(asked, Extreme) and set(asked.displacements) <= set(self.ranges):
+            return asked.over(self.ranges)
+        return asked.of(self.motion())
 
     @cached_property
     def clearance(self) -> float:

@@ -20,8 +20,8 @@ def same_orbit(a: PeriodicOrbit, b: PeriodicOrbit, mirrored: bool = True) -> boo
     if (a.period, a.signature.impact_count) != (b.period, b.signature.impact_count):
         return False
     natural = a.equations.natural
-    one = np.array([a.highest, a.lowest]) / natural.length
-    other = np.array([b.highest, b.lowest]) / natural.length
+    one = np.array(a.reach[::-1]) / natural.length
+    other = np.array(b.reach[::-1]) / natural.length
     same = np.abs(one - other).max() < TOLERANCES.same_orbit or (
         mirrored and np.abs(one + other[::-1]).max() < TOLERANCES.same_orbit
     )

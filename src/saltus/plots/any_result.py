@@ -11,7 +11,7 @@ import math
 import textwrap
 import warnings
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from inspect import signature
 from typing import Any
 
@@ -54,6 +54,7 @@ from saltus.plots.conventions import (
     new_figure,
     shades,
     style_on_top,
+    with_amplitudes,
 )
 from saltus.plots.conventions import style as look
 from saltus.plots.curves import (
@@ -504,7 +505,7 @@ def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
             for part in result:
                 _draw(part, {**options, "ax": ax}, None)
         return ax
-    data = result.to_xarray() if hasattr(result, "to_xarray") else result
+    data = _dataset_of(result, options)
     if not hasattr(data, "attrs") or not hasattr(data, "data_vars"):
         raise ParameterError(
             f"result must be a Dataset, a DataTree or an object with to_xarray, got "
@@ -532,6 +533,31 @@ def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
     height = max(0.75 * LOOK.single_column, 0.63 * width)
     with look():
         return draw(data, figure=new_figure(width, height), **options)
+
+
+def _dataset_of(result: Any, options: dict[str, Any]) -> Any:
+    """The dataset of a result, with a quantity that is given as a function of a motion; the option
+    then names it."""
+    which = options.get("quantity")
+    make = getattr(result, "to_xarray", None)
+    takes_functions = make is not None and "functions" in signature(make).parameters
+    if not callable(which):
+        data = result if make is None else make()
+        known = {which, f"amplitude_{which}", f"largest_{which}"}
+        if make is None or not takes_functions or which is None or known & {*with_amplitudes(data)}:
+            return data
+        with suppress(ParameterError):  # it is refused with those that there are
+            return make(functions={which: which})
+        return data
+    if make is None or not takes_functions:
+        raise ParameterError(
+            "quantity is a function, which has no motions here: give the study that makes this "
+            'result functions={"name": function}, and quantity="name" here',
+            "quantity",
+        )
+    name = getattr(which, "__name__", "")
+    options["quantity"] = name if name.isidentifier() else "function"
+    return make(functions={options["quantity"]: which})
 
 
 def _by_content(data: Any) -> Callable[..., Any] | None:

@@ -433,10 +433,12 @@ def parameter_name(path: str) -> str:
 
 def quantity_name(dataset: Any, quantity: str) -> str:
     """The symbol of an amplitude, or a quantity's name in words."""
-    if quantity in ("amplitude", "highest", "lowest") and "coordinate" in dataset.attrs:
-        return f"${peak(dataset.attrs['coordinate'], quantity)}$"
+    driven = dataset.attrs.get("shown", dataset.attrs.get("coordinate"))
+    if quantity in ("amplitude", "highest", "lowest") and driven is not None:
+        return f"${peak(str(driven), quantity)}$"
     kind, _, coordinate = quantity.partition("_")
-    if coordinate and coordinate in str(dataset.attrs.get("coordinate", "")).split():
+    named = str(dataset.attrs.get("coordinate", "")).split()
+    if coordinate and (coordinate in named or f"largest_{coordinate}" in dataset):
         return {
             "amplitude": f"${peak(coordinate)}$",
             "largest": f"${peak(coordinate, 'highest')}$",
@@ -460,11 +462,26 @@ def with_amplitudes(dataset: Any) -> Any:
 
 
 def shown_quantity(dataset: Any) -> str:
-    """The amplitude that is drawn of a branch or a sweep: of the coordinate that its model names,
-    else of all coordinates.
+    """The amplitude that is drawn of a branch or a sweep by default: of the displacement that the
+    load drives.
     """
     name = dataset.attrs.get("shown")
     return f"amplitude_{name}" if name and f"largest_{name}" in dataset else "amplitude"
+
+
+def chosen_quantity(quantity: str | None, known: Iterable[str], usual: str) -> str:
+    """The quantity that is drawn: `usual` without a choice; a coordinate or a point alone stands for
+    its amplitude. One that there is not is refused with those that there are.
+    """
+    known = [*known]
+    if quantity is None:
+        return usual
+    for name in (quantity, f"amplitude_{quantity}"):
+        if name in known:
+            return name
+    raise ParameterError(
+        f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity"
+    )
 
 
 def parameter_symbol(path: str) -> str:

@@ -14,11 +14,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
+from saltus.errors import ParameterError
 from saltus.plots.basins import attractor_colours
 from saltus.plots.branch_cuts import ModelValidity, smooth_lines
 from saltus.plots.conventions import (
     LOOK,
     axes_or_new,
+    chosen_quantity,
     drawing,
     legend_of,
     marks_of,
@@ -67,6 +69,29 @@ def _in_ink(dataset: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
             yield dataset.isel(point=part), PALE_INK
 
 
+def branch_quantities(dataset: Any) -> list[str]:
+    """The numbers of the points of a branch that its special points have, too."""
+    return [
+        str(name)
+        for name, part in dataset.data_vars.items()
+        if part.dims == ("point",)
+        and part.dtype.kind in "fi"
+        and name != "parameter"
+        and f"special_{name}" in dataset
+    ]
+
+
+def _finite(dataset: Any, quantity: str) -> Any:
+    """The points and the special points of a branch at which a quantity has a value."""
+    points = np.isfinite(dataset[quantity].values)
+    special = np.isfinite(dataset[f"special_{quantity}"].values)
+    if not points.any():
+        raise ParameterError(f"{quantity} has no value at any point of this branch", "quantity")
+    if points.all() and special.all():
+        return dataset
+    return dataset.isel(point=points, special=special)
+
+
 @drawing
 def draw_branch(
     dataset: Any,
@@ -78,14 +103,16 @@ def draw_branch(
     """Draw the dataset of a branch: stable motions solid, unstable ones dashed, and its special
     points; returns `ax`.
 
-    The `quantity` is any number of its points. By default it is the amplitude: of a `Structure`
-    that of the local displacement which the load drives, else the largest of any coordinate. With
-    several coordinates there are "amplitude_x", "largest_x" and "smallest_x" of each coordinate x.
+    The `quantity` is any number of its points, or a function of a motion. By default it is the
+    amplitude; of several coordinates that of the one which the load drives. With several there are
+    "amplitude_x", "largest_x" and "smallest_x" of each coordinate and of each named point x, of
+    which "x" alone is the amplitude.
 
     Of the dataset of a proof, what is proved is in full ink, and the rest pale.
     """
     dataset = with_amplitudes(dataset)
-    quantity = quantity or shown_quantity(dataset)
+    quantity = chosen_quantity(quantity, branch_quantities(dataset), shown_quantity(dataset))
+    dataset = _finite(dataset, quantity)
     own, ax = ax is None, axes_or_new(ax, width, 0.75 * width)
     for part, ink in _in_ink(dataset):
         for line in smooth_lines(part, quantity):

@@ -22,6 +22,7 @@ from saltus.plots.conventions import (
     asked_legend,
     axes_or_new,
     cell_edges,
+    chosen_quantity,
     drawing,
     is_flat,
     legend_of,
@@ -447,8 +448,8 @@ def draw_sweep(
     An arrow goes from the last value before a jump to the first one after it. The grey band is
     where the amplitudes up and down differ by more than a hundredth of the largest one.
 
-    The `quantity` is any of its numbers over both directions, such as "impact_count" or one of its
-    `functions`. By default it is the amplitude, as in `draw_branch`, or, where most motions have
+    The `quantity` is any of its numbers over both directions, such as "impact_count", "largest_x" or
+    "x" (the amplitude) of a coordinate or a named point x, or one of its `functions`. By default it is the amplitude, as in `draw_branch`, or, where most motions have
     the same, as between two stops, the first of the functions.
     """
     dataset = with_amplitudes(dataset)
@@ -457,16 +458,12 @@ def draw_sweep(
         for name, part in dataset.items()
         if part.dims == ("direction", "value") and part.dtype.kind == "f"
     ]
-    if quantity is not None and quantity not in known:
-        raise ParameterError(
-            f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity"
-        )
-    if quantity is None:
-        # as functions have
-        functions = [name for name in known if dataset[name].attrs.get("long_name") == name]
-        quantity = shown_quantity(dataset)
-        if functions and is_flat(dataset[quantity].values.ravel()):
-            quantity = functions[0]
+    # as functions have
+    functions = [name for name in known if dataset[name].attrs.get("long_name") == name]
+    usual = shown_quantity(dataset)
+    if functions and is_flat(dataset[usual].values.ravel()):
+        usual = functions[0]
+    quantity = chosen_quantity(quantity, known, usual)
     own = ax is None
     ax = axes_or_new(ax, width, 0.62 * width)
     values = dataset["value"].values
@@ -517,7 +514,7 @@ def _jumps(dataset: Any, way: str, quantity: str) -> np.ndarray:
     """
     chosen = dataset["jump_direction"].values == way
     places = [dataset[f"jump_{name}"].values[chosen] for name in ("before", "after")]
-    if quantity == "amplitude":
+    if np.array_equal(dataset[quantity], dataset["amplitude"], equal_nan=True):
         sizes = [dataset[f"jump_amplitude_{name}"].values[chosen] for name in ("before", "after")]
         return np.stack([*places, *sizes], axis=1)
     values = dataset["value"].values

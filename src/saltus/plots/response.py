@@ -18,19 +18,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from saltus.branch_tables import branches_of
-from saltus.errors import ParameterError, shown
 from saltus.plots.branch_cuts import ModelValidity, margins_of, smooth_lines, validity_of
 from saltus.plots.conventions import (
     LOOK,
+    chosen_quantity,
     drawing,
     is_flat,
     legend_of,
     new_figure,
     outside_legend,
     parameter_name,
-    peak,
+    quantity_name,
     symbol,
     unit_in_brackets,
+    with_amplitudes,
 )
 
 # Simulated motions are drawn at about this many values: more dots would hide the lines.
@@ -378,24 +379,22 @@ def draw_diagram(
     2,).
 
     In a figure the states at phase 0 are below the branches; into given axes only the branches are
-    drawn. The `quantity` is the amplitude, the highest or the lowest value of a coordinate, or,
-    with several contacts, the least speed of an impact ("slowest", 0 without impacts). The default
-    is the amplitude, or "slowest" if most motions have the same amplitude, as between two walls.
+    drawn. The `quantity` is the amplitude, the highest or the lowest value of the coordinate (of
+    several, of the one that the load drives), or, with several contacts, the least speed of an
+    impact ("slowest", 0 without impacts). With several coordinates there are "largest_x" and
+    "smallest_x" of each coordinate and of each named point x, of which "x" alone is the amplitude;
+    and there are the diagram's own `functions`. The default is the amplitude, or "slowest" if most
+    motions have the same amplitude, as between two walls.
     """
-    known = [name for name in QUANTITIES if name in tree["attractors"]]
-    if quantity is not None and quantity not in known:
-        raise ParameterError(
-            f"quantity must be one of {', '.join(known)}, got {shown(quantity)}", "quantity"
-        )
-    quantity = quantity or (
-        "slowest"
-        if "slowest" in known and is_flat(tree["attractors"]["amplitude"].values)
-        else "amplitude"
-    )
+    tree = _with_amplitudes(tree)
+    known = _quantities(tree)
+    usual = "amplitude"
+    if "slowest" in known and is_flat(tree["attractors"]["amplitude"].values):
+        usual = "slowest"
+    quantity = chosen_quantity(quantity, known, usual)
     tree = _with_finite_speeds(tree) if quantity == "slowest" else tree
     low, high = (float(x) for x in tree.attrs["bounds"])
-    names = tree.attrs["coordinate"]
-    unit = _unit(tree)
+    unit = _unit(tree, quantity)
     simulated = "stroboscopic" in tree.children and ax is None
     if ax is None:
         figure = (
@@ -415,11 +414,11 @@ def draw_diagram(
     axes[0].set_ylabel(
         f"least speed of an impact{unit}"
         if quantity == "slowest"
-        else f"${peak(names, quantity)}${unit}"
+        else f"{quantity_name(tree, quantity)}{unit}"
     )
     limits = (
         []
-        if quantity == "slowest"
+        if quantity not in QUANTITIES[:3]
         else [float(limit) for limit in np.atleast_1d(tree.attrs["limits"])]
     )
     draw_response(axes[0], tree, quantity)
@@ -427,7 +426,10 @@ def draw_diagram(
     note_missed(axes[0], tree)
     if simulated:
         draw_stroboscopic_states(axes[1], tree)
-        axes[1].set_ylabel(f"${symbol(names.split()[0])}$ at phase 0{unit}")
+        section = tree["stroboscopic"]
+        name = section.attrs.get("coordinate", tree.attrs["coordinate"].split()[0])
+        unit = unit_in_brackets(section["position"])
+        axes[1].set_ylabel(f"${symbol(name)}$ at phase 0{unit}")
         axes[1].set_title("stroboscopic points of direct simulation", loc="left", pad=3)
     axes[-1].set_xlabel(parameter_name(tree.attrs["path"]))
     response_legend(
@@ -450,10 +452,36 @@ def _with_finite_speeds(tree: Any) -> Any:
     return tree
 
 
-def _unit(tree: Any) -> str:
-    """The unit of the amplitudes, as the branches carry it."""
+def _with_amplitudes(tree: Any) -> Any:
+    """The diagram with the amplitudes of all displacements whose extrema it has."""
+    tree = tree.copy()
+    for table in ("attractors", "unplaced", "points", "special"):
+        if table in tree.children:
+            tree[table].dataset = with_amplitudes(tree[table].to_dataset())
+    return tree
+
+
+def _quantities(tree: Any) -> list[str]:
+    """The numbers that branches, special points and simulated motions have, the usual ones first."""
+    dots = tree["attractors"]
+    own = [
+        str(name)
+        for name, part in dots.data_vars.items()
+        if part.dtype.kind == "f" and name != "parameter" and name not in QUANTITIES
+    ]
     points = tree["points"]
-    return unit_in_brackets(points["amplitude"]) if "amplitude" in points else ""
+    special = tree["special"]
+    empty = "parameter" not in points
+    return [
+        name
+        for name in (*QUANTITIES, *own)
+        if name in dots and (empty or (name in points and f"special_{name}" in special))
+    ]
+
+
+def _unit(tree: Any, quantity: str) -> str:
+    """The unit of a quantity, as the simulated motions carry it."""
+    return unit_in_brackets(tree["attractors"][quantity])
 
 
 def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, float]:
@@ -466,7 +494,7 @@ def _range(tree: Any, quantity: str, low: float, high: float) -> tuple[float, fl
         x = points["parameter"].values
         found = np.append(found, points[quantity].values[(x >= low) & (x <= high)])
     found = found[np.isfinite(found)]
-    from_zero = quantity in ("amplitude", "slowest")
+    from_zero = quantity == "slowest" or quantity.startswith("amplitude")
     top = float(np.max(found, initial=0.0 if from_zero or not found.size else -np.inf))
     bottom = 0.0 if from_zero else float(np.min(found, initial=top))
     return (bottom, top) if top > bottom else (bottom, bottom + 1.0)

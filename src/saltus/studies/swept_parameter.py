@@ -5,6 +5,7 @@ motion goes on.
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,21 +18,48 @@ from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import (
     Ending,
+    Extreme,
+    Functions,
     Motion,
+    Quantity,
     Recurrence,
     captured_between,
+    check_new_names,
+    driven_range,
+    extremes_of,
     find_recurrence,
+    own_quantities,
     simulate,
     state_names,
+    unit_of,
 )
 from saltus.progress import Progress, part_of, silent
 from saltus.result import provenance
-from saltus.systems import System, arguments_of, check_along, check_path, check_system, read_start
+from saltus.systems import (
+    System,
+    arguments_of,
+    check_along,
+    check_path,
+    check_system,
+    driven_displacements,
+    read_start,
+)
 
 if TYPE_CHECKING:
     import xarray
 
 DIRECTIONS = ("up", "down")
+# Columns of a sweep over both directions: what is read of the recurrence at each value, the unit and
+# the text of each.
+COLUMNS: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
+    "impact_count": (lambda row: row.impact_count[0], "1", "impacts in a period"),
+    "period": (
+        lambda row: row.period[0],
+        "1",
+        "forcing periods after which it repeats itself; 0 where it does not",
+    ),
+    "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
+}
 
 
 @dataclass(frozen=True)
@@ -76,6 +104,7 @@ class SweepRequest:
     functions: Any
     velocity: Any
     coordinates: Any
+    own: tuple[Quantity, ...] = field(init=False)  # the functions
     grid: np.ndarray = field(init=False)
     falling: bool = field(init=False)  # whether the sweep begins downwards
     start: np.ndarray = field(init=False)  # (d,)
@@ -96,12 +125,15 @@ class SweepRequest:
                 f"{shown(self.values)}",
                 "values",
             )
-        for name, function in (self.functions or {}).items():
-            if not callable(function):
-                raise ParameterError(
-                    f"functions must be functions of a motion, and {name!r} is {shown(function)}",
-                    "functions",
-                )
+        object.__setattr__(self, "own", own_quantities(self.system, self.functions))
+        names = {
+            "amplitude",
+            "hysteresis",
+            "outcome",
+            *COLUMNS,
+            *state_names(self.coordinate_names),
+        }
+        check_new_names(self.own, names | {each.name for each in self.extremes})
         check_along(self.system, self.path, grid, "values")
         check_count("periods", self.periods, 1)
         check_count("max_period", self.max_period, 1)
@@ -147,31 +179,50 @@ class SweepRequest:
             threads=1 if len(states) == 1 else None,
         )
 
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """The names of the coordinates."""
+        names: tuple[str, ...] = self.system.model.coordinates
+        return names
+
+    @property
+    def extremes(self) -> tuple[Extreme, ...]:
+        """The largest and the smallest value of each displacement, in the order of the columns."""
+        found = extremes_of(self.system)
+        return found[::2] + found[1::2]
+
+    def _motion(self, value: float, rows: Recurrence, i: int) -> Motion:
+        """The motion on which a value was left: one period of it or, if it has none, `max_period`
+        forcing periods, but no more than each value is kept for."""
+        system = self.system.with_({self.path: float(value)})
+        periods = int(rows.period[i]) or min(self.max_period, self.periods)
+        return simulate(system, **arguments_of(system, rows.last[i]), periods=periods, tol=self.tol)
+
     def numbers_of(self, value: float, row: Recurrence) -> dict[str, float]:
-        """The extrema of each coordinate, and the functions, of the motion on which one value was
-        left: of one period of it or, if it has none, of `max_period` forcing periods, but of no
-        more than each value is kept for."""
-        names = self.system.model.coordinates
-        extrema = [[row.lowest[0], row.highest[0]]]
-        given = dict(self.functions or {})
-        if given or len(names) > 1:
-            system = self.system.with_({self.path: float(value)})
-            periods = int(row.period[0]) or min(self.max_period, self.periods)
-            motion = simulate(
-                system, **arguments_of(system, row.last[0]), periods=periods, tol=self.tol
-            )
-            extrema = motion.extrema.tolist() if len(names) > 1 else extrema
-        found = {f"largest_{name}": high for name, (_, high) in zip(names, extrema, strict=True)}
-        found |= {f"smallest_{name}": low for name, (low, _) in zip(names, extrema, strict=True)}
-        for name, function in given.items():
-            number = np.asarray(function(motion))
-            if number.ndim or number.dtype.kind not in "biuf":
-                raise ParameterError(
-                    f"functions must return a number, and {name!r} returned {shown(number)}",
-                    "functions",
-                )
-            found[str(name)] = float(number)
-        return found
+        """The extrema of each displacement, and the functions, of the motion on which one value was
+        left.
+        """
+        several = len(self.coordinate_names) > 1
+        if not (self.own or several):
+            ranges = {self.coordinate_names[0]: (float(row.lowest[0]), float(row.highest[0]))}
+            return {each.name: each.over(ranges) for each in self.extremes}
+        motion = self._motion(value, row, 0)
+        found = {each.name: each.of(motion) for each in self.own}
+        if not several:
+            ranges = {self.coordinate_names[0]: (float(row.lowest[0]), float(row.highest[0]))}
+            return {each.name: each.over(ranges) for each in self.extremes} | found
+        return {each.name: each.of(motion) for each in self.extremes} | found
+
+    def amplitude_of(self, value: float, rows: Recurrence, i: int) -> float:
+        """The amplitude of the motion on which a value was left: of the coordinate or, of several,
+        of the displacement that the load drives.
+        """
+        if len(self.coordinate_names) == 1:
+            return float(max(abs(rows.highest[i]), abs(rows.lowest[i])))
+        if rows.ended[i]:
+            return math.nan
+        low, high = driven_range(self._motion(value, rows, i))
+        return max(abs(low), abs(high))
 
 
 def _check(progress: object = None, **arguments: Any) -> None:
@@ -195,7 +246,7 @@ def frequency_sweep(
     max_period: int = 16,
     velocity: float = 0.0,
     tol: float = 1e-11,
-    functions: Mapping[str, Callable[[Motion], Any]] | None = None,
+    functions: Functions | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> xarray.Dataset:
@@ -241,9 +292,10 @@ def frequency_sweep(
     Returns
     -------
     xarray.Dataset
-        A Dataset, whose values increase. Over (direction, value): `amplitude` (largest absolute
-        value of all coordinates), `largest_...` and `smallest_...` of each coordinate in the
-        motion's period; `impact_count`, `period` (0: it does not repeat itself), `outcome`, the
+        A Dataset, whose values increase. Over (direction, value): `amplitude` (the largest
+        absolute value of the coordinate; of several, of the one that the load drives),
+        `largest_...` and `smallest_...` of each coordinate and of each named point in the motion's
+        period; `impact_count`, `period` (0: it does not repeat itself), `outcome`, the
         state at phase 0, and the `functions`. Over (value): `hysteresis`. Over (jump): its
         direction, the values that enclose it and the amplitudes there. At values that were not
         reached, as a margin ended the motion before, there is nan.
@@ -297,24 +349,24 @@ class _OneWay:
     values: np.ndarray
     start: np.ndarray
     rows: list[Recurrence]
-    numbers: list[dict[str, float]]  # the extrema of the coordinates, and the functions
+    numbers: list[dict[str, float]]  # the extrema of the displacements, and the functions
+    driven: tuple[str, ...]  # the displacements that the load drives
 
     @property
     def amplitude(self) -> np.ndarray:
         """The amplitude at each value."""
-        return np.array([amplitude_of(row) for row in self.rows])
-
-
-def amplitude_of(rows: Recurrence, i: int = 0) -> float:
-    """The largest absolute value of the coordinates in the period of one of the motions."""
-    return float(max(abs(rows.highest[i]), abs(rows.lowest[i])))
+        extremes = [
+            [numbers[f"{kind}_{name}"] for kind in ("largest", "smallest") for name in self.driven]
+            for numbers in self.numbers
+        ]
+        return np.asarray(np.abs(np.reshape(extremes, (-1, 2 * len(self.driven)))).max(axis=1))
 
 
 def _swept(
     asked: SweepRequest, values: np.ndarray, state: np.ndarray, progress: Progress
 ) -> _OneWay:
     """Follow the motion from value to value, until a margin ends it."""
-    run = _OneWay(values, state, [], [])
+    run = _OneWay(values, state, [], [], driven_displacements(asked.system))
     for i, (value, captured) in enumerate(zip(values, asked.proved_speeds(values), strict=True)):
         progress(i / len(values), "")
         row = asked.ends(
@@ -356,11 +408,12 @@ class _Step:
         """Whether so much of the step is left there that it may be a jump."""
         return self.change >= SETTINGS.kept * abs(self.after - self.before)
 
-    def goes_on(self, value: float, rows: Recurrence, i: int) -> bool:
+    def goes_on(self, asked: SweepRequest, value: float, rows: Recurrence, i: int) -> bool:
         """Take the motion at the next value; returns whether the change is still to come."""
-        size, self.ended = amplitude_of(rows, i), bool(rows.ended[i])
+        self.ended = bool(rows.ended[i])
         if self.ended:
             return False
+        size = asked.amplitude_of(value, rows, i)
         if abs(size - self.after) < abs(size - self.size):
             self.found = (self.low, value, self.size, size)
             return False
@@ -422,7 +475,7 @@ def _sweep_parts(asked: SweepRequest, steps: list[_Step], parts: int, progress: 
         going = [
             (step, inner)
             for (step, inner), value, i in here
-            if step.goes_on(value, rows, i) and k + 1 < len(inner)
+            if step.goes_on(asked, value, rows, i) and k + 1 < len(inner)
         ]
         if not going:
             return
@@ -464,20 +517,10 @@ def _dataset(
 
     model = asked.system.model
     count = asked.grid.size
-    name = model.coordinates[0]
+    driven = driven_displacements(asked.system)
     names = model.coordinates
-    unit = model.unit_of(name)
-    of = f"abs({name})" if len(names) == 1 else "abs of all coordinates"
-    columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
-        "amplitude": (amplitude_of, unit, f"max {of} in a period"),
-        "impact_count": (lambda row: row.impact_count[0], "1", "impacts in a period"),
-        "period": (
-            lambda row: row.period[0],
-            "1",
-            "forcing periods after which it repeats itself; 0 where it does not",
-        ),
-        "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
-    }
+    unit = unit_of(asked.system, driven[0])
+    columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = dict(COLUMNS)
     for i, state in enumerate(state_names(names)):
         columns[state] = (
             partial(_state_of, i),
@@ -487,11 +530,13 @@ def _dataset(
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype=f"<U{max(len(each.name) for each in Ending)}")
     texts = {
-        f"{most}_{each}": {"units": model.unit_of(each), "long_name": f"{most} {each} in a period"}
-        for most in ("largest", "smallest")
-        for each in names
+        each.name: {
+            "units": each.unit,
+            "long_name": f"{each.kind} {each.displacements[0]} in a period",
+        }
+        for each in asked.extremes
     }
-    own = {key: np.full((2, count), np.nan) for key in (*texts, *map(str, asked.functions or {}))}
+    own = {each.name: np.full((2, count), np.nan) for each in (*asked.extremes, *asked.own)}
     for way, run in enumerate(runs):
         for key, values in own.items():
             values[way, np.searchsorted(asked.grid, run.values)] = [
@@ -503,8 +548,12 @@ def _dataset(
         for column, (read, _, _) in zip(values, columns.values(), strict=True):
             column[places] = [read(row) for row in run.rows]
     over = ("direction", "value")
+    sizes = [own[f"{kind}_{name}"] for kind in ("largest", "smallest") for name in driven]
+    amplitude = np.abs(sizes).max(axis=0)
+    said = {"units": unit, "long_name": f"max abs({' or '.join(driven)}) in a period"}
     data = xarray.Dataset(
-        {
+        {"amplitude": (over, amplitude, said)}
+        | {
             key: (over, table[key], {"units": units, "long_name": text})
             for key, (_, units, text) in columns.items()
         },
@@ -524,8 +573,8 @@ def _dataset(
         outcome,
         {"long_name": "rest, periodic, or moving without repeating itself"},
     )
-    up, down = table["amplitude"]
-    apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(table["amplitude"], initial=0.0)
+    up, down = amplitude
+    apart = np.abs(up - down) > SETTINGS.hysteresis * np.nanmax(amplitude, initial=0.0)
     data["hysteresis"] = (
         "value",
         apart.astype(np.int8),
@@ -551,6 +600,5 @@ def _dataset(
     }
     data.attrs = {"title": "sweep computed by saltus", "kind": "frequency_sweep"}
     data.attrs |= provenance(asked.system, tol=asked.tol, **numbers)
-    if chosen := asked.system.model.shown_coordinate(asked.system.load):
-        data.attrs["shown"] = chosen
+    data.attrs["shown"] = " ".join(driven)
     return data

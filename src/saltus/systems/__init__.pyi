@@ -8,6 +8,8 @@ from .contact_model import stick_margins as stick_margins
 from .drawings import Shape as Shape
 from .drawings import drawing_of as drawing_of
 from .drawings import stops_of as stops_of
+from .driven import driven_displacement as driven_displacement
+from .driven import driven_displacements as driven_displacements
 from .gap_coordinates import fields_of as fields_of
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw

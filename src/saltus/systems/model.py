@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -112,7 +112,8 @@ class Model:
         return self.units[self.coordinates.index(coordinate)] if self.units else "1"
 
     def shown_coordinate(self, load: Any) -> str | None:
-        """The coordinate whose amplitude pictures show; None for the largest of all coordinates.
+        """The coordinate, or the point, whose amplitude results and pictures show; None for the one
+        that the load drives (`driven_displacement`).
 
         Parameters
         ----------
@@ -120,6 +121,23 @@ class Model:
             The load of the system.
         """
         return None
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of its points, sums of coordinates whose displacements results have too."""
+        return ()
+
+    def weights_of(self, displacement: str) -> np.ndarray | None:
+        """The weight of each coordinate in a displacement, (n,); None if no displacement is called
+        so.
+
+        Parameters
+        ----------
+        displacement
+            The name of a coordinate or of a point.
+        """
+        names = list(self.coordinates)
+        return np.eye(len(names))[names.index(displacement)] if displacement in names else None
 
     def margin_kind(self, margin: str) -> MarginKind:
         """The meaning of one of the margins.
@@ -673,6 +691,29 @@ def each_of(values: Any) -> list[Any]:
         if isinstance(values, (tuple, list)) or (isinstance(values, np.ndarray) and values.ndim > 1)
         else [values]
     )
+
+
+SHARE_DIGITS = 9  # the last digits of a share are rounding
+
+
+def first_of_largest(names: Sequence[str], shares: np.ndarray, held: Collection[str] = ()) -> str:
+    """The name with the largest share; of equal ones first those that no contact holds, then the
+    first by name, so that the order of declaration does not decide.
+
+    Parameters
+    ----------
+    names, shares
+        The names, and the share of each, (n,).
+    held
+        Names that contacts hold.
+    """
+    largest = float(np.max(shares, initial=0.0))
+    equal = [
+        name
+        for name, share in zip(names, shares.tolist(), strict=True)
+        if round(share / (largest or 1.0), SHARE_DIGITS) == float(largest > 0.0)
+    ]
+    return min(equal, key=lambda name: (name in held, name))
 
 
 def less(values: Sequence[Any], others: Sequence[Any]) -> list[Any]:

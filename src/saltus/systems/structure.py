@@ -34,7 +34,7 @@ from saltus.systems.contact_model import Contact, ContactModel, Friction, Surfac
 from saltus.systems.eigenmodes import eigenmodes_of
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
 from saltus.systems.matrix_files import matrices_in
-from saltus.systems.model import Count, is_zero
+from saltus.systems.model import Count, first_of_largest, is_zero
 from saltus.systems.record_files import (
     ConstantNumbers,
     check_independent,
@@ -486,25 +486,75 @@ class Structure(ContactModel):
         return (*local, *(f"{MODE}{i + 1}" for i in range(len(self.names) - len(local))))
 
     def shown_coordinate(self, load: Any) -> str | None:
-        """The local displacement that the load drives most directly, the first of equal ones; None
-        if there is no local displacement.
+        """The displacement that the load drives most directly, of contacts, surfaces, frictions and
+        points. It is the row of the matrices on which alone the load acts, if none of them is as
+        direct, and the row that it drives most directly where it drives none of them.
 
         Parameters
         ----------
         load
             The load of the system.
         """
-        local = self.form[0]
-        driving = [np.array(row) for name, row in self.forces.items() if name in load.channels]
-        shares = [0.0 for _ in local]
-        for i, name in enumerate(local):
-            row = np.array(self.points.get(name) or _vector(name, self.names, name))
-            for force in driving:
-                size = float(np.linalg.norm(row) * np.linalg.norm(force))
-                # a cosine, of which the last digits are rounding
-                share = round(abs(float(row @ force)) / size, 9) if size else 0.0
-                shares[i] = max(shares[i], share)
-        return local[shares.index(max(shares))] if local else None
+        known = list(dict.fromkeys([*self.form[0], *self.points]))
+        given = {name: load.channels[name] for name in self.forces if name in load.channels}
+        moving = [name for name, signal in given.items() if signal.periodic or signal.once]
+        driving = [np.array(self.forces[name]) for name in moving or given]
+        shares = self._shares(known, driving)
+        alone = {
+            self.names[i]
+            for row in driving
+            for i in np.flatnonzero(row)
+            if np.count_nonzero(row) == 1
+        }
+        if alone and shares.max(initial=0.0) < 1.0:
+            return min(alone)
+        if shares.any():
+            return first_of_largest(known, shares)
+        shares = self._shares(self.names, driving)
+        return first_of_largest(self.names, shares) if shares.any() else min(known or self.names)
+
+    def _shares(self, names: Sequence[str], driving: Sequence[np.ndarray]) -> np.ndarray:
+        """How directly any of some forces drives each displacement, (names,): the cosine of their
+        rows in the inverse of the mass, which does not depend on units."""
+        if not len(names):
+            return np.zeros(0)
+        rows = np.array([self._row_of(name) for name in names])
+        mass = np.asarray(self.mass.array)
+        moved = np.linalg.solve(mass, rows.T)
+        sizes = np.sqrt(np.einsum("ij,ji->i", rows, moved))
+        shares = np.zeros(len(names))
+        for force in driving:
+            size = math.sqrt(float(force @ np.linalg.solve(mass, force)))
+            found = np.abs(force @ moved)
+            shares = np.maximum(
+                shares,
+                np.divide(found, sizes * size, out=np.zeros_like(found), where=sizes * size > 0),
+            )
+        # a cosine, of which the last digits are rounding
+        return np.asarray(np.round(shares, 9))
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Its points that are no coordinates."""
+        return tuple(name for name in self.points if name not in self.coordinates)
+
+    def _row_of(self, name: str) -> np.ndarray:
+        """The coefficients of all rows of a local displacement, a point or a row."""
+        return np.array(self.points.get(name) or _vector(name, self.names, name))
+
+    def weights_of(self, displacement: str) -> np.ndarray | None:
+        """The weight of each coordinate in the displacement of a coordinate, a point, or a row of
+        the matrices, (n,); None if none is called so.
+
+        Parameters
+        ----------
+        displacement
+            Its name.
+        """
+        found = super().weights_of(displacement)
+        if found is None and displacement in (*self.points, *self.names):
+            return np.asarray(self._row_of(displacement) @ vars(self)["_modes"].basis)
+        return found
 
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -208,7 +208,7 @@ def _found(system: System, rate: float) -> NaturalUnits:
     """The natural units, where the load goes on with this frequency in place of its own."""
     model = system.model
     load = DeclaredLoad(system.load, model)
-    instants = _instants(system.load)
+    instants = instants_of(system.load)
     nearest: np.ndarray | None = None
     stiffest = 0.0
     quickest = 0.0
@@ -315,7 +315,7 @@ def _is_sum(part: Any, names: tuple[str, ...]) -> bool:
     )
 
 
-def _instants(load: Load) -> np.ndarray:
+def instants_of(load: Load) -> np.ndarray:
     """Instants over a period of a load; over the longest of its records and pulses without one."""
     span = load.period
     if span is None:

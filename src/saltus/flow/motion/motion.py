@@ -4,6 +4,7 @@ motion.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
@@ -320,13 +321,55 @@ class Motion(Result):
             raise ParameterError(
                 f"times must be at least two in ascending order, got {shown(times)}", "times"
             )
+        return self._extrema_between(bounds, self._states)
+
+    def range_of(self, displacement: str) -> tuple[float, float]:
+        """The least and the largest value of a coordinate, or of a named point of a `Structure`.
+
+        Parameters
+        ----------
+        displacement
+            The name of the coordinate or the point.
+
+        Raises
+        ------
+        ParameterError
+            Nothing is called so, or the motion was computed with dense=False.
+        """
+        model = self.system.model
+        if displacement in model.coordinates:
+            low, high = self.extrema[model.coordinates.index(displacement)].tolist()
+            return low, high
+        weights = model.weights_of(displacement)
+        if weights is None:
+            known = (*model.coordinates, *model.point_names)
+            raise ParameterError(
+                f"there is no displacement {shown(displacement)}; {near(str(displacement), known)}",
+                "displacement",
+            )
+
+        def moved(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            position, velocity, side = self._states(times)
+            return (weights @ position)[None], (weights @ velocity)[None], side
+
+        ends = np.array([self.start, self.time])
+        low, high = self._extrema_between(ends, moved)[0, 0].tolist()
+        return low, high
+
+    def _extrema_between(
+        self,
+        bounds: np.ndarray,
+        states: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]],
+    ) -> np.ndarray:
+        """`extrema_between` of displacements, of which `states` gives positions, velocities and
+        sides at times."""
         self._check_times(bounds)
         steps = (
             [] if self.dense is None else [self.dense.start, self.dense.start + self.dense.length]
         )
         edges = np.unique(np.clip(np.concatenate([bounds, *steps]), bounds[0], bounds[-1]))
         seen = edges[:-1, None] + SHARES * np.diff(edges)[:, None]
-        position, velocity, _ = self._states(np.append(seen.ravel(), bounds))
+        position, velocity, _ = states(np.append(seen.ravel(), bounds))
         at_bounds = position[:, seen.size :].T
         rate = velocity[:, : seen.size].reshape(len(velocity), *seen.shape)
         within = np.searchsorted(bounds, edges[:-1], side="right") - 1
@@ -347,24 +390,10 @@ class Motion(Result):
         reach = (high - low) * fastest
         # the others are not the outermost
         last = (near - reach < found[0][row, place]) | (near + reach > found[1][row, place])
-        turned = self._turned(place[last], low[last], high[last])
+        turned = _turned(states, place[last], low[last], high[last])
         for extremum, values in zip((np.minimum, np.maximum), found, strict=True):
             extremum.at(values, (row[last], place[last]), turned)
         return np.stack(found, axis=-1)
-
-    def _turned(self, place: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Coordinates, by their places, where their velocities are 0 between two times at which
-        these have different signs, (n,) each: by regula falsi, in which the value at an end that
-        stays is halved. A coordinate's error is the square of that of the time."""
-        each = np.arange(len(place))
-        a, b = (self._states(times)[1][place, each] for times in (low, high))
-        for _ in SHARES:
-            middle = low - a * (high - low) / np.where(a == b, 1.0, b - a)
-            now = self._states(middle)[1][place, each]
-            same = now * b > 0.0  # the root lies before
-            a, b = np.where(same, 0.5 * a, now), np.where(same, now, 0.5 * b)
-            low, high = np.where(same, low, middle), np.where(same, middle, high)
-        return self._states(middle)[0][place, each] if low.size else low
 
     @cached_property
     def validity(self) -> Validity:
@@ -613,3 +642,23 @@ def state_names(names: tuple[str, ...]) -> tuple[str, ...]:
     coordinates.
     """
     return *names, *(rate_name(name, names) for name in names)
+
+
+def _turned(
+    states: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]],
+    place: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> np.ndarray:
+    """Coordinates, by their places, where their velocities are 0 between two times at which
+    these have different signs, (n,) each: by regula falsi, in which the value at an end that
+    stays is halved. A coordinate's error is the square of that of the time."""
+    each = np.arange(len(place))
+    a, b = (states(times)[1][place, each] for times in (low, high))
+    for _ in SHARES:
+        middle = low - a * (high - low) / np.where(a == b, 1.0, b - a)
+        now = states(middle)[1][place, each]
+        same = now * b > 0.0  # the root lies before
+        a, b = np.where(same, 0.5 * a, now), np.where(same, now, 0.5 * b)
+        low, high = np.where(same, low, middle), np.where(same, middle, high)
+    return states(middle)[0][place, each] if low.size else low

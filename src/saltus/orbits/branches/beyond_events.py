@@ -262,7 +262,7 @@ def _stands(point: OrbitPoint) -> bool:
     orbit = point.orbit
     return (
         bool(orbit.equations.system.model.frictions)
-        and orbit.highest - orbit.lowest < SETTINGS.standing * orbit.equations.natural.length
+        and orbit.reach[1] - orbit.reach[0] < SETTINGS.standing * orbit.equations.natural.length
     )
 
 

@@ -5,6 +5,7 @@ Its dataset stores it without loss, and its orbits are read back from there.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,15 @@ import numpy as np
 from saltus.checks import answered, check_dataset, check_number, with_answers
 from saltus.continuation import NEWTON, Course, End
 from saltus.errors import ParameterError
+from saltus.flow import (
+    Functions,
+    Motion,
+    Quantity,
+    check_new_names,
+    extremes_of,
+    own_quantities,
+    unit_of,
+)
 from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint, SpecialPoints
 from saltus.orbits.equations.contract import OrbitEquations
@@ -22,7 +32,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
 from saltus.progress import html_table
 from saltus.result import Result, check_provenance, provenance
-from saltus.systems import System
+from saltus.systems import System, driven_displacements
 
 if TYPE_CHECKING:
     import xarray
@@ -73,8 +83,35 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
 
     @cached_property
     def amplitudes(self) -> np.ndarray:
-        """max abs(theta) along it, (n,)."""
+        """The amplitudes along it, (n,); of several coordinates those of the one that the load
+        drives.
+        """
         return np.array([point.orbit.amplitude for point in self.points])
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """The `size` of each orbit, (n,)."""
+        return np.array([point.orbit.size for point in self.points])
+
+    def quantity(self, which: str | Callable[[Motion], Any] = "amplitude") -> np.ndarray:
+        """A quantity of the motions along it, (n,).
+
+        Parameters
+        ----------
+        which
+            A quantity as `PeriodicOrbit.quantity` takes it: a name, or a function of a motion.
+
+        Raises
+        ------
+        ParameterError
+            There is no such quantity.
+
+        Examples
+        --------
+        >>> bool((branch.quantity("largest_theta") <= branch.amplitudes).all())
+        True
+        """
+        return np.array([point.orbit.quantity(which) for point in self.points])
 
     @cached_property
     def stable(self) -> np.ndarray:
@@ -97,9 +134,16 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
         check_number("value", value)
         return [point.orbit for point in self.solved_at(value)]
 
-    def to_xarray(self) -> xarray.Dataset:
-        """The branch as a dataset, see `branch_dataset`."""
-        return branch_dataset(self)
+    def to_xarray(self, functions: Functions | None = None) -> xarray.Dataset:
+        """The branch as a dataset, see `branch_dataset`.
+
+        Parameters
+        ----------
+        functions
+            Further quantities of the motions by name, as `frequency_sweep` takes them: each has a
+            column.
+        """
+        return branch_dataset(self, functions)
 
     def _repr_html_(self) -> str:
         facts = {
@@ -132,8 +176,10 @@ class Branch(Result, Course[OrbitPoint, SpecialPoint]):
         )
 
 
-def branch_dataset(branch: Branch) -> xarray.Dataset:
+def branch_dataset(branch: Branch, functions: Functions | None = None) -> xarray.Dataset:
     """The dataset of a branch: points along `point`, special points along `special`.
+
+    A quantity `x` of the points has the name `special_x` at the special points.
 
     `stable` and `symmetric` are 0 or 1; `unknowns` and `sides` are those of each orbit (see
     `equations/`), padded with nan and 0 to one length. Orbits that rest also have the times of
@@ -145,11 +191,17 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
     orbits = branch.orbits
     equations = orbits[0].equations
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
-    data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits)}
+    data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits, equations)}
+    own = own_quantities(equations.given, functions)
+    check_new_names(own, data)
+    data |= {
+        quantity.name: ("point", values, _attributes(quantity))
+        for quantity, values in zip(own, _values(orbits, own), strict=True)
+    }
     data |= (
         multiplier_columns(orbits)
         | solution_columns(orbits)
-        | _special(branch.special, equations.given.model.coordinates)
+        | _special(branch.special, equations, own)
         | _rests(orbits)
     )
     attributes: dict[str, Any] = {
@@ -163,16 +215,18 @@ def branch_dataset(branch: Branch) -> xarray.Dataset:
         "closed": int(branch.closed),
         "missed": "; ".join(map(str, branch.missed)),
     }
-    if chosen := equations.given.model.shown_coordinate(equations.given.load):
-        attributes["shown"] = chosen
+    attributes["shown"] = " ".join(driven_displacements(equations.given))
     return xarray.Dataset(data, attrs=provenance(equations.given, tol=equations.tol, **attributes))
 
 
-def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[str, str]]]:
+def _columns(
+    orbits: list[PeriodicOrbit], equations: OrbitEquations
+) -> list[tuple[str, np.ndarray, dict[str, str]]]:
     """The quantities that are one number for each orbit."""
-    model = orbits[0].equations.given.model
-    angle = {"units": model.unit_of(model.coordinates[0])}
-    coordinate = " or ".join(model.coordinates)
+    given = equations.given
+    model = given.model
+    coordinate = " or ".join(driven_displacements(given))
+    angle = {"units": unit_of(given, driven_displacements(given)[0])}
 
     def column(value: Any, kind: Any = float) -> np.ndarray:
         return np.array([value(orbit) for orbit in orbits], dtype=kind)
@@ -201,17 +255,27 @@ def _columns(orbits: list[PeriodicOrbit]) -> list[tuple[str, np.ndarray, dict[st
         ("rest_share", column(lambda o: o.rest_share), {}),
     ]
     if len(model.coordinates) > 1:
-        extrema = np.array([orbit.extrema for orbit in orbits])
-        for i, name in enumerate(model.coordinates):
-            unit = {"units": model.unit_of(name)}
-            columns += [
-                (f"largest_{name}", extrema[:, i, 1], {**unit, "long_name": f"max {name}"}),
-                (f"smallest_{name}", extrema[:, i, 0], {**unit, "long_name": f"min {name}"}),
-            ]
-    for name in orbits[0].equations.margins:
+        for extreme in extremes_of(given):
+            values = column(lambda o, which=extreme: which.over(o.ranges))
+            columns.append((extreme.name, values, _attributes(extreme)))
+    for name in equations.margins:
         attrs = {"long_name": f"least {name}", "margin_kind": str(model.margin_kind(name))}
         columns.append((f"margin_{name}", column(lambda o, name=name: o.margins[name]), attrs))
     return columns
+
+
+def _attributes(quantity: Quantity) -> dict[str, str]:
+    """The unit and the text of a quantity."""
+    return {"units": quantity.unit, "long_name": quantity.text}
+
+
+def _values(orbits: Iterable[PeriodicOrbit], own: Sequence[Quantity]) -> np.ndarray:
+    """The quantities of orbits, (quantities, orbits): each orbit is followed once."""
+    rows = []
+    for orbit in orbits:
+        motion = orbit.motion() if own else None
+        rows.append([quantity.of(motion) for quantity in own if motion is not None])
+    return np.array(rows, dtype=float).reshape(len(rows), len(own)).T
 
 
 def _rests(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
@@ -289,8 +353,10 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     }
 
 
-def _special(special: tuple[SpecialPoint, ...], coordinates: tuple[str, ...]) -> dict[str, Any]:
-    """The special points with their evidence."""
+def _special(
+    special: tuple[SpecialPoint, ...], equations: OrbitEquations, own: Sequence[Quantity]
+) -> dict[str, Any]:
+    """The special points with their evidence and their quantities."""
     rows: dict[str, list[Any]] = {
         "kind": [str(s.kind) for s in special],
         "special_parameter": [s.parameter for s in special],
@@ -307,10 +373,11 @@ def _special(special: tuple[SpecialPoint, ...], coordinates: tuple[str, ...]) ->
         "test_value": [s.evidence.value for s in special],
         "special_defect": [s.defect for s in special],
     }
-    if len(coordinates) > 1:
-        for i, name in enumerate(coordinates):
-            rows[f"special_largest_{name}"] = [s.orbit.extrema[i, 1] for s in special]
-            rows[f"special_smallest_{name}"] = [s.orbit.extrema[i, 0] for s in special]
+    for quantity, values in zip(own, _values([s.orbit for s in special], own), strict=True):
+        rows[f"special_{quantity.name}"] = values.tolist()
+    for name, values, _ in _columns([s.orbit for s in special], equations):
+        if name != "stable":
+            rows.setdefault(f"special_{name}", values.tolist())
     proofs = [s.evidence.proof for s in special]
     if any(proof is not None for proof in proofs):
         rows["special_proved"] = [int(p is not None and bool(p.proved)) for p in proofs]

@@ -14,6 +14,7 @@ import numpy as np
 from saltus.checks import check_bounds, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
+from saltus.flow import unit_of
 from saltus.orbits.branches.begun_at_special import from_a_change, with_special_start
 from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.branch import START, Branch
@@ -32,7 +33,7 @@ from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import check_along, check_path
+from saltus.systems import check_along, check_path, driven_displacement
 
 if TYPE_CHECKING:
     import xarray
@@ -404,7 +405,7 @@ class Cascade(Result):
         """
         orbit = self.points[0].orbit
         path = self.points[0].orbit.equations.paths[0]
-        name = orbit.system.model.coordinates[0]
+        name = driven_displacement(orbit.equations.given)
         amplitudes = [point.amplitude for point in self.points]
         columns: dict[str, tuple[Any, ...]] = {
             "parameter": ("doubling", self.parameters, "1", path),
@@ -412,7 +413,7 @@ class Cascade(Result):
             "amplitude": (
                 "doubling",
                 amplitudes,
-                orbit.system.model.unit_of(name),
+                unit_of(orbit.equations.given, name),
                 f"max abs({name})",
             ),
             "ratio": (

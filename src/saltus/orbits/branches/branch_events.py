@@ -104,11 +104,11 @@ class OrbitEvents(Events):
 
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or that grows without end."""
-        amplitude = ahead.orbit.amplitude
+        size = ahead.orbit.size
         length = ahead.orbit.equations.natural.length
-        if amplitude > SETTINGS.largest * max(length, run.points[0].orbit.amplitude):
-            return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{amplitude:.3g}")
-        if amplitude >= SHRUNK_TO_REST * length:
+        if size > SETTINGS.largest * max(length, run.points[0].orbit.size):
+            return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{size:.3g}")
+        if size >= SHRUNK_TO_REST * length:
             return None
         lost = ahead.orbit.equations.lost_ahead(ahead)
         if lost is None:
@@ -372,8 +372,8 @@ def _gather(
         return False
     if np.ptp(places) < SETTINGS.accumulation_width * abs(following.parameter):
         return True
-    largest = max(point.orbit.amplitude for point in points)
-    small = following.orbit.amplitude < SETTINGS.shrunk * largest
+    largest = max(point.orbit.size for point in points)
+    small = following.orbit.size < SETTINGS.shrunk * largest
     return small and counts[-1] > SETTINGS.shrunk_impacts
 
 
@@ -431,7 +431,7 @@ def _same_place(a: Zero, b: Zero) -> bool:
     other = b.point
     same = (a.kind, one.orbit.signature) == (b.kind, other.orbit.signature)
     near = math.isclose(one.parameter, other.parameter, rel_tol=1e-10)
-    return same and near and math.isclose(one.orbit.amplitude, other.orbit.amplitude, rel_tol=1e-9)
+    return same and near and math.isclose(one.orbit.size, other.orbit.size, rel_tol=1e-9)
 
 
 TURN = 10.0

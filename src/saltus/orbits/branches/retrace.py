@@ -68,10 +68,10 @@ def _has_events_of(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:
 def _may_be_on(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:
     """Whether the amplitude of a point lies between those of the ends of a step, as far as a step
     is straight."""
-    sizes = a.orbit.amplitude, b.orbit.amplitude
+    sizes = a.orbit.size, b.orbit.size
     rounding = TOLERANCES.same_orbit * max(sizes)
     reach = (max(sizes) - min(sizes)) + rounding
-    return min(sizes) - reach <= point.orbit.amplitude <= max(sizes) + reach
+    return min(sizes) - reach <= point.orbit.size <= max(sizes) + reach
 
 
 def _is_on_step(a: OrbitPoint, b: OrbitPoint, point: OrbitPoint) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from saltus.checks import with_answers
 from saltus.continuation import Corrected, Course, Units
 from saltus.errors import ParameterError
+from saltus.flow import unit_of
 from saltus.orbits.branches.branch import multiplier_columns, solution_columns
 from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
 from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
@@ -20,6 +21,7 @@ from saltus.orbits.branches.vanishing import Vanishing
 from saltus.orbits.equations.contract import OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import Result, provenance
+from saltus.systems import driven_displacement
 
 if TYPE_CHECKING:
     import xarray
@@ -220,9 +222,8 @@ class SpecialCurve(Result, Course[SpecialCurvePoint, SpecialPoint]):
 
         orbits = self.orbits
         equations = self.orbits[0].equations
-        model = equations.given.model
-        name = model.coordinates[0]
-        angle = {"units": model.unit_of(name), "long_name": f"max abs({name})"}
+        name = driven_displacement(equations.given)
+        angle = {"units": unit_of(equations.given, name), "long_name": f"max abs({name})"}
         data: dict[str, Any] = {
             "parameter": (("point", "path"), self.parameters),
             "amplitude": ("point", np.array([o.amplitude for o in orbits]), angle),

@@ -360,7 +360,7 @@ def orbit_near(
             orbit = simplest(found)
         if orbit is not None and orbit.admissible:
             break
-    if orbit is not None and orbit.highest == orbit.lowest and orbit.motion().stop is Stop.REST:
+    if orbit is not None and orbit.reach[0] == orbit.reach[1] and orbit.motion().stop is Stop.REST:
         raise MotionError(STAYS)
     return orbit
 
@@ -465,7 +465,7 @@ def solved_near(system: System, path: str, state: np.ndarray, period: int) -> Pe
     if orbit is None or not orbit.admissible:
         return None
     still = NEAR_RETURNS.still * orbit.equations.natural.length
-    return orbit if orbit.amplitude > still else None
+    return orbit if orbit.size > still else None
 
 
 def _guesses(states: np.ndarray, period: int, units: np.ndarray) -> np.ndarray:

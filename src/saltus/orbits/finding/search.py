@@ -12,7 +12,7 @@ import numpy as np
 
 from saltus.checks import as_numbers, check_count, check_starts
 from saltus.errors import ParameterError, shown
-from saltus.flow import Recurrence, find_recurrence
+from saltus.flow import Recurrence, driven_range, find_recurrence, simulate, unit_of
 from saltus.orbits.finding.from_motion import NEAR_RETURNS, orbits_near_returns, solved_near
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.verify import same_orbit
@@ -22,9 +22,11 @@ from saltus.systems import (
     Box,
     System,
     Window,
+    arguments_of,
     check_path,
     check_system,
     check_window,
+    driven_displacement,
     initial_states,
     is_still,
     natural_units,
@@ -56,7 +58,7 @@ class Settled:
 
     value: np.ndarray  # of the parameter
     period: np.ndarray  # forcing periods after which the motion repeats itself
-    highest: np.ndarray  # the first coordinate's largest value over that time
+    highest: np.ndarray  # the largest value over that time of the displacement that the load drives
     lowest: np.ndarray
 
     @property
@@ -117,8 +119,8 @@ class Search(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The orbits over `orbit`, the numbers of unsettled and of resting motions over `value`,
         settled motions over `motion`."""
-        name = self.system.model.coordinates[0]
-        unit = self.system.model.unit_of(name)
+        name = driven_displacement(self.system)
+        unit = unit_of(self.system, name)
         text = f"max abs({name})"
         columns: dict[str, tuple[Any, ...]] = {
             "parameter": (
@@ -319,6 +321,9 @@ def _attracting(
             unsettled += 1
             continue
         known = np.concatenate([known, states[-period:]])
+        if len(system.model.coordinates) > 1:
+            motion = simulate(system, **arguments_of(system, states[-1]), periods=period)
+            lowest, highest = driven_range(motion)
         seen.append((period, float(highest), float(lowest)))
         orbit = solved_near(system, path, states[-1], period)
         if orbit is not None:

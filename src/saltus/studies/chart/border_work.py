@@ -39,6 +39,7 @@ def curve_dataset(curve: Any, paths: Sequence[str]) -> xarray.Dataset:
     `residual` of its orbits.
     """
     data = curve.to_xarray()
+    data["amplitude"] = data["amplitude"].copy(data=[orbit.size for orbit in curve.orbits])
     order = [list(curve.paths).index(path) for path in paths]
     for name, i in zip(("horizontal", "vertical"), order, strict=True):
         data[name] = ("point", curve.parameters[:, i])
@@ -177,16 +178,14 @@ def stability_loss(branch: Branch) -> SpecialPoint | str:
         return "the orbit is not stable to its multipliers"
     if not known:
         return "no special point where the stability is lost"
-    scale = np.array([np.ptp(branch.parameters) or 1.0, np.ptp(branch.amplitudes) or 1.0])
+    scale = np.array([np.ptp(branch.parameters) or 1.0, np.ptp(branch.sizes) or 1.0])
     beside = (
-        np.array(
-            [[p.parameter, p.orbit.amplitude] for p in points[unstable[0] - 1 : unstable[0] + 1]]
-        )
+        np.array([[p.parameter, p.orbit.size] for p in points[unstable[0] - 1 : unstable[0] + 1]])
         / scale
     )
 
     def distance(special: SpecialPoint) -> float:
-        spot = np.array([special.parameter, special.amplitude]) / scale
+        spot = np.array([special.parameter, special.orbit.size]) / scale
         return float(np.linalg.norm(spot - beside, axis=1).sum())
 
     return min(known, key=distance)

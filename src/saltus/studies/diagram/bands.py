@@ -16,7 +16,7 @@ from saltus.flow import Ending, Motion, find_recurrence
 from saltus.orbits import Branch, PeriodicOrbit, SpecialKind, SpecialPoint, is_symmetric
 from saltus.result import Result, provenance
 from saltus.studies.diagram.simulated import SimulatedMotions
-from saltus.systems import System, image_of, natural_units
+from saltus.systems import System, driven_displacement, image_of, natural_units
 
 if TYPE_CHECKING:
     import xarray
@@ -141,7 +141,8 @@ class Bands(Result):
         low = float(self.tried.values.min())
         high = float(self.tried.values.max())
         about = {"title": "bands of chaos computed by saltus", "kind": "chaotic_bands"}
-        name = self.system.model.coordinates[0]
+        name = driven_displacement(self.system)
+        name = name if name in self.system.model.coordinates else self.system.model.coordinates[0]
         where: dict[str, Any] = {"path": self.path, "bounds": [low, high], "coordinate": name}
         root = xarray.Dataset(attrs=about | provenance(self.system, **where))
         return ResultTree.from_dict({"/": root, **self.to_datasets()})
@@ -191,15 +192,18 @@ class Bands(Result):
         shown = np.isfinite(motions.peaks)
         value = np.broadcast_to(motions.value[:, None], shown.shape)
         model = self.system.model
-        unit = model.unit_of(model.coordinates[0])
+        name = driven_displacement(self.system)
+        name = name if name in model.coordinates else model.coordinates[0]
+        place = model.coordinates.index(name)
+        unit = model.unit_of(name)
         columns = {
             "position": (
-                motions.states[..., 0],
+                motions.states[..., place],
                 unit,
-                "first coordinate at phase 0, in the last forcing periods",
+                f"{name} at phase 0, in the last forcing periods",
             ),
             "velocity": (
-                motions.states[..., motions.states.shape[-1] // 2],
+                motions.states[..., motions.states.shape[-1] // 2 + place],
                 unit,
                 "its velocity there",
             ),
@@ -210,7 +214,8 @@ class Bands(Result):
             {
                 name: ("dot", array[shown], {"units": units, "long_name": text})
                 for name, (array, units, text) in columns.items()
-            }
+            },
+            attrs={"coordinate": name},
         )
 
 
@@ -474,7 +479,7 @@ def _turns(branch: Branch, special: SpecialPoint) -> bool:
     away = np.abs(branch.parameters - special.parameter)
     scale = max(abs(special.parameter), float(np.ptp(branch.parameters)))
     length = natural_units(special.orbit.system).length
-    apart = away / scale + np.abs(branch.amplitudes - special.amplitude) / length
+    apart = away / scale + np.abs(branch.sizes - special.orbit.size) / length
     nearest = int(apart.argmin())
     there = away > SETTINGS.same_place * scale
     below = np.flatnonzero(there[:nearest])[-1:]

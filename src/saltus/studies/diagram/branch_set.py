@@ -56,7 +56,7 @@ class PlacedBranch:
         """
         units = self.units
         rows = [
-            (value, o.highest, o.lowest, o.stable, o.period, o.impact_count, _seen(o, units)[2])
+            (value, *o.reach[::-1], o.stable, o.period, o.impact_count, _seen(o, units)[2])
             for value, o in zip(self.branch.parameters.tolist(), self.branch.orbits, strict=True)
         ]
         return np.array(rows, dtype=float).reshape(-1, 7).T
@@ -187,7 +187,7 @@ class PlacedBranch:
             # a cubic may be far off beside narrow peaks
             ends = self.columns[SEEN][:, before : before + 2].T
             near = (
-                PLACEMENT.near * max(orbit.amplitude, PLACEMENT.least * self.units.length)
+                PLACEMENT.near * max(orbit.size, PLACEMENT.least * self.units.length)
                 + 2.0 * np.abs(ends[1] - ends[0]).max()
             )
             if (
@@ -240,8 +240,7 @@ def _seen(orbit: PeriodicOrbit, units: NaturalUnits) -> np.ndarray:
     slowest = orbit.slowest * units.time
     return np.array(
         [
-            orbit.highest,
-            orbit.lowest,
+            *orbit.reach[::-1],
             max(slowest, least) if least and slowest < np.inf else least,
         ]
     )
@@ -492,7 +491,7 @@ class BranchSet:
             if not _is_parent(special, branch)
         ]
         visible = {
-            id(special): special.amplitude >= BRANCHES.visible * branch.amplitudes.max()
+            id(special): special.orbit.size >= BRANCHES.visible * branch.sizes.max()
             for special in own
         }
         # a family often ends at the next special point, so only every other one is computed in
@@ -578,7 +577,7 @@ def _meet(end: PeriodicOrbit, special: SpecialPoint, bounds: tuple[float, float]
     length = natural_units(special.orbit.system).length
     return (
         abs(end.solution.values[0] - special.parameter) < near
-        and abs(end.amplitude - special.amplitude) < BRANCHES.same_place * length
+        and abs(end.size - special.orbit.size) < BRANCHES.same_place * length
     )
 
 

@@ -4,7 +4,7 @@ along one parameter.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,16 @@ import numpy as np
 from saltus.branch_tables import branch_tables
 from saltus.checks import as_numbers, check_bounds, check_count, check_step, checked_by
 from saltus.errors import ParameterError, shown
-from saltus.flow import check_device, on_device, state_names
+from saltus.flow import (
+    Functions,
+    Quantity,
+    check_device,
+    check_new_names,
+    on_device,
+    own_quantities,
+    state_names,
+    unit_of,
+)
 from saltus.orbits import STEP, Branch, PeriodicOrbit, closing_rows
 from saltus.progress import Progress, growing, part_of, silent
 from saltus.result import provenance
@@ -24,7 +33,8 @@ from saltus.studies.diagram.diagram_search import DiagramSearch
 from saltus.studies.diagram.diagram_work import DiagramWork, diagram_plan, diagram_work
 from saltus.studies.diagram.effort import CHAOS, EFFORTS, check_diagram, read_effort
 from saltus.studies.diagram.simulated import BranchAssignment
-from saltus.systems import Box, System, check_window
+from saltus.studies.motion_quantities import quantities_of_motions
+from saltus.systems import Box, System, check_window, driven_displacements
 from saltus.theory import amplitude_limits
 
 if TYPE_CHECKING:
@@ -43,7 +53,9 @@ class ConfirmationSettings:
 CONFIRMATION = ConfirmationSettings()
 
 
-def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
+def diagram_tree(
+    search: DiagramSearch, functions: Functions | None = None, **facts: Any
+) -> xarray.DataTree:
     """The DataTree that `bifurcation_diagram` returns; `facts` are further attributes."""
     import xarray
 
@@ -59,6 +71,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         seed=search.seed,
         path=path,
         coordinate=" ".join(system.model.coordinates),
+        shown=" ".join(driven_displacements(system)),
         bounds=list(bounds),
         limits=_limits(system, path, bounds),
         window=np.ravel(search.window).tolist(),
@@ -78,7 +91,7 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
     )
     nodes = {
         "/": xarray.Dataset(attrs=attributes),
-        **branch_tables(confirmed([branches[i] for i in order], search.work)),
+        **branch_tables(confirmed([branches[i] for i in order], search.work, functions)),
     }
     chaos = search.chaos
     bands = (
@@ -86,7 +99,8 @@ def diagram_tree(search: DiagramSearch, **facts: Any) -> xarray.DataTree:
         if chaos is None
         else explained(system, chaos, branches).to_datasets()
     )
-    found = {"attractors": _attractors(search), "unplaced": _unplaced(search)}
+    own = own_quantities(system, functions)
+    found = {"attractors": _attractors(search, own), "unplaced": _unplaced(search, own)}
     return ResultTree.from_dict({**nodes, **found, **bands, "search": _searched(search)})
 
 
@@ -111,14 +125,16 @@ def _limits(system: System, path: str, bounds: tuple[float, float]) -> list[floa
     return low if low == high else []
 
 
-def confirmed(branches: list[Branch], work: DiagramWork) -> list[xarray.Dataset]:
+def confirmed(
+    branches: list[Branch], work: DiagramWork, functions: Functions | None = None
+) -> list[xarray.Dataset]:
     """The datasets of branches, with the distance by which simulated orbits miss themselves:
     `defect` after one period, `kept` after 20 periods, for stable orbits.
 
     An orbit with stable multipliers whose motion does not stay on it is not called stable;
     `unconfirmed` counts these.
     """
-    found = [branch.to_xarray() for branch in branches]
+    found = [branch.to_xarray(functions) for branch in branches]
     ends = np.cumsum([0, *(len(branch.orbits) for branch in branches)])
     orbits = [orbit for branch in branches for orbit in branch.orbits]
     stable = np.flatnonzero(
@@ -153,13 +169,13 @@ def _distances(orbits: list[PeriodicOrbit], rounds: int, work: DiagramWork) -> n
     return work.distances(closing_rows(orbits, rounds)) if orbits else np.empty(0)
 
 
-def _attractors(search: DiagramSearch) -> xarray.Dataset:
+def _attractors(search: DiagramSearch, own: Sequence[Quantity]) -> xarray.Dataset:
     """The attractors on which motions settled at the values of the grid, a dot each, without those
     of long periods that are not followed."""
     found = search.found
     left = np.isin(found.assignment[found.rows], (BranchAssignment.LONGER, BranchAssignment.RARE))
     shown = np.isin(found.motions.value[found.rows], search.grid) & ~left
-    data = _dots(search, found.rows[shown])
+    data = _dots(search, found.rows[shown], own)
     data["starts"] = (
         "dot",
         found.starts[shown],
@@ -173,10 +189,10 @@ def _attractors(search: DiagramSearch) -> xarray.Dataset:
     return data
 
 
-def _unplaced(search: DiagramSearch) -> xarray.Dataset:
+def _unplaced(search: DiagramSearch, own: Sequence[Quantity]) -> xarray.Dataset:
     """The attractors that lie on no branch, at all values, with the reason."""
     rows = search.found.unplaced
-    data = _dots(search, rows)
+    data = _dots(search, rows, own)
     places = search.found.assignment[rows]
     data["reason"] = (
         "dot",
@@ -186,13 +202,13 @@ def _unplaced(search: DiagramSearch) -> xarray.Dataset:
     return data
 
 
-def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
+def _dots(search: DiagramSearch, rows: np.ndarray, own: Sequence[Quantity]) -> xarray.Dataset:
     """Simulated motions that repeat themselves."""
     import xarray
 
     motions = search.found.motions.only(rows)
     model = search.system.model
-    angle = {"units": model.unit_of(model.coordinates[0])}
+    angle = {"units": unit_of(search.system, driven_displacements(search.system)[0])}
     columns: dict[str, tuple[np.ndarray, dict[str, str]]] = {
         "parameter": (motions.value, {"long_name": search.path}),
         "amplitude": (motions.amplitude, angle),
@@ -206,6 +222,9 @@ def _dots(search: DiagramSearch, rows: np.ndarray) -> xarray.Dataset:
             motions.slowest,
             angle | {"long_name": "least speed of an impact, 0 without impacts"},
         )
+    check_new_names(own, (*columns, *state_names(model.coordinates)))
+    values = {search.path: motions.value}
+    columns |= quantities_of_motions(search.system, values, motions.last, motions.period, own)
     for i, name in enumerate(state_names(model.coordinates)):
         columns[name] = motions.last[:, i], angle | {"long_name": f"{name} at phase 0"}
     return xarray.Dataset({name: ("dot", *column) for name, column in columns.items()})
@@ -263,9 +282,11 @@ def _check(
     workers: int | None,
     scheduler: str | None,
     device: Any,
+    functions: Any,
     progress: object,
     **counts: int,
 ) -> None:
+    own_quantities(system, functions)
     check_device(device, system, workers, scheduler)
     bounds = check_diagram(system, path, bounds, **counts)
     read_effort(effort)
@@ -302,6 +323,7 @@ def bifurcation_diagram(
     workers: int | None = None,
     scheduler: str | None = None,
     device: str = "cpu",
+    functions: Functions | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """All branches of periodic orbits along a parameter that a simulation finds, and bands of chaos
@@ -340,6 +362,9 @@ def bifurcation_diagram(
     store
         Folder in which all that takes long is kept, so that a search that was stopped goes on, and
         one with more values or starts computes only what is new.
+    functions
+        Further quantities of the motions by name, as `frequency_sweep` takes them: columns of
+        `points`, `special`, `attractors` and `unplaced`.
     workers, scheduler, device, progress
         Who computes, where motions are followed (as for `simulate_many`), and how progress is
         reported, see `saltus.sweep.run`.
@@ -387,6 +412,7 @@ def bifurcation_diagram(
         _search(search, repelling, bands, values is None, progress)
         tree = diagram_tree(
             search,
+            functions,
             kind="bifurcation_diagram",
             effort=str(read_effort(effort)),
             max_period=max_period,
@@ -427,6 +453,7 @@ def response_spectrum(
     workers: int | None = None,
     scheduler: str | None = None,
     device: str = "cpu",
+    functions: Functions | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """`bifurcation_diagram` along the forcing frequency (the paper's Figs. 9 and 10).
@@ -439,7 +466,7 @@ def response_spectrum(
         The dotted path of the frequency, its lowest and its highest value.
     effort, max_period, values, starts, window, seed, repelling, switch, step, bands
         As for `bifurcation_diagram`.
-    store, workers, scheduler, device, progress
+    store, workers, scheduler, device, functions, progress
         As for `bifurcation_diagram`.
 
     Examples
@@ -467,6 +494,7 @@ def response_spectrum(
         workers=workers,
         scheduler=scheduler,
         device=device,
+        functions=functions,
         progress=progress,
     )
     tree.attrs["kind"] = "response_spectrum"
