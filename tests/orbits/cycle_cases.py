@@ -85,6 +85,25 @@ class Clock(ContactModel):
 
 @saltus.register
 @dataclass(frozen=True, kw_only=True)
+class Squealing(ContactModel):
+    """x'' + 0.1 x' + x = mu(u), u = abs(x' - speed), mu = 0.2 + 0.3 exp(-u / 0.5)."""
+
+    speed: float = 0.3
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def frictions(self):
+        falling = {"kinetic": 0.2, "static": 0.5, "stribeck_speed": 0.5}
+        return (Friction(name="disc", coordinate="x", ground_speed=self.speed, **falling),)
+
+    def force(self, t, x, velocity, load):
+        return -x - 0.1 * velocity
+
+
+@saltus.register
+@dataclass(frozen=True, kw_only=True)
 class Coupled(ContactModel):
     """Van der Pol's oscillator with a damped mass on it."""
 

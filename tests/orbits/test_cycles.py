@@ -10,6 +10,7 @@ from orbits.cycle_cases import (
     Lorenz,
     Piecewise,
     Roessler,
+    Squealing,
     StoppedVanDerPol,
     VanDerPol,
     along_branch,
@@ -206,6 +207,42 @@ def test_a_grazing_of_a_cycle_lies_where_the_free_one_touches(van_der_pol):
     assert grazing.parameter == pytest.approx(van_der_pol.highest, abs=1e-9)
     assert branch.orbits[-1].impact_count == 0
     assert branch.orbits[-1].period == pytest.approx(van_der_pol.period, abs=1e-10)
+
+
+def falling_friction(speed):
+    """mu(u) of `Squealing`."""
+    return 0.2 + 0.3 * np.exp(-speed / 0.5)
+
+
+def test_a_branch_ends_at_the_equilibrium_of_which_its_cycles_are_born():
+    """Where the damping equals the fall of the friction, c = 0.6 exp(-w / 0.5): a Hopf point."""
+    orbit = saltus.find_orbit(System(model=Squealing(speed=1.1)), x=2.0)
+    branch = saltus.continue_orbit(orbit, "model.speed", (1.0, 1.5))
+    (change,) = branch.special
+    assert str(change.kind) == "GS"
+    slip = branch.at(1.2)[-1]
+    branch = saltus.continue_orbit(slip, "model.speed", (0.5, 1.5))
+    reasons = [str(end.reason) for end in branch.ends]
+    born = next(end for end in branch.ends if end.reason is saltus.orbits.OrbitEnd.EQUILIBRIUM)
+    assert born.parameter == pytest.approx(0.5 * math.log(6.0), abs=1e-8), reasons
+    assert branch.missed == ()
+
+    # the cycle that only slips touches the belt's speed where it gains a stick: from where static
+    # friction lets go, it comes back to that speed just at that place
+    def excess(speed):
+        run = solve_ivp(
+            lambda _, y: [y[1], -y[0] - 0.1 * y[1] + falling_friction(abs(speed - y[1]))],
+            (0.0, 7.0),
+            [0.5 - 0.1 * speed, speed - 1e-12],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-13,
+            dense_output=True,
+        )
+        return float(run.sol(np.linspace(5.0, 7.0, 4001))[1].max()) - speed
+
+    assert excess(change.parameter + 1e-5) < -1e-7
+    assert excess(change.parameter - 1e-5) > 1e-7
 
 
 def test_periods_double_where_a_multiplier_is_minus_1():

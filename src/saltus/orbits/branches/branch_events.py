@@ -25,7 +25,6 @@ from saltus.errors import SaltusError
 from saltus.flow import simulate
 from saltus.orbits.branches.orbit_curve import (
     FLIP,
-    SHRUNK_TO_REST,
     STEEPEST,
     OrbitPoint,
     Test,
@@ -105,12 +104,17 @@ class OrbitEvents(Events):
     def ended(self, run: Run, ahead: OrbitPoint, cut: Cut | None) -> End | None:
         """The end of an orbit that has shrunk to rest, or that grows without end."""
         size = ahead.orbit.size
-        length = ahead.orbit.equations.natural.length
+        equations = ahead.orbit.equations
+        length = equations.natural.length
         if size > SETTINGS.largest * max(length, run.points[0].orbit.size):
             return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{size:.3g}")
-        if size >= SHRUNK_TO_REST * length:
+        if not _has_shrunk(ahead):
             return None
-        lost = ahead.orbit.equations.lost_ahead(ahead)
+        born = equations.birth(run.points)
+        if born is not None:  # a branch turns back there, which is no fold
+            _forget_where_it_turns(run, born)
+            return End(OrbitEnd.EQUILIBRIUM, born)
+        lost = equations.lost_ahead(ahead)
         if lost is None:
             return End(OrbitEnd.SHRINKS, ahead.parameter)
         inside = all(
@@ -129,6 +133,28 @@ class OrbitEvents(Events):
         """
         found: OrbitPoint = first.curve.equations.at_section_of(first, ahead)
         return found
+
+
+# orbits before one that has shrunk, among which a change of stability is its birth
+LAST_ORBITS = 6
+
+
+def _forget_where_it_turns(run: Run, born: float) -> None:
+    """Drop what was found where a branch turns back at an equilibrium, at the parameter `born`:
+    beyond it its orbits are the same once more.
+    """
+    run.special[:] = [zero for zero in run.special if not _has_shrunk(zero.point)]
+    near = max(abs(point.parameter - born) for point in run.points[-LAST_ORBITS:])
+    run.missed[:] = [
+        missed
+        for missed in run.missed
+        if max(abs(missed.first[-1] - born), abs(missed.last[-1] - born)) > near
+    ]
+
+
+def _has_shrunk(point: OrbitPoint) -> bool:
+    equations = point.orbit.equations
+    return equations.size_of(point.orbit) < equations.least_size * equations.natural.length
 
 
 @dataclass

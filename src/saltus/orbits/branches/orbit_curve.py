@@ -33,8 +33,6 @@ from saltus.orbits.orbit import PeriodicOrbit
 # With a multiplier above this, neighbouring motions separate so fast that an orbit cannot be solved
 # for.
 STEEPEST = 1e8
-# An orbit of an amplitude below this, in natural units, has shrunk to rest.
-SHRUNK_TO_REST = 1e-7
 
 
 @dataclass(frozen=True, eq=False)

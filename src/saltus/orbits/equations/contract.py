@@ -479,6 +479,19 @@ class OrbitEquations(ABC):
         """A further special point at a cut, from the first point beyond; None if there is none."""
         return None
 
+    def size_of(self, orbit: Any) -> float:
+        """How large an orbit is: 0 where it has shrunk to rest."""
+        return float(orbit.size)
+
+    # an orbit of a smaller size, in natural units, has shrunk to rest
+    least_size: float = 1e-7
+
+    def birth(self, points: list[Any]) -> float | None:
+        """The parameter at which the orbits of a branch, which has shrunk, are born of an
+        equilibrium; None if they are not.
+        """
+        return None
+
     def lost_ahead(self, point: Any) -> Zero | None:
         """The special point ahead at which an orbit that has nearly shrunk to rest is lost; None if
         it shrinks without one.

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation import Units
+from saltus.continuation import Units, Zero
 from saltus.errors import MotionError
 from saltus.flow import Motion, state_rates
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, Solution
@@ -180,6 +180,26 @@ class CycleEquations(WholeMotionEquations):
 
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
         return None if self.signature.period % 2 else super().halves(solution, False)
+
+    least_size = 1e-3  # the parameter of its birth is extrapolated from larger ones
+
+    def size_of(self, orbit: Any) -> float:
+        """The largest way of a coordinate, from its least to its largest value."""
+        ways = np.ptp(orbit.followed.extrema, axis=1)
+        return float((ways / self.natural.lengths).max() * self.natural.length)
+
+    def birth(self, points: list[Any]) -> float | None:
+        """The square of the size grows with the distance from it."""
+        known = [(self.size_of(point.orbit) ** 2, point.parameter) for point in points[-6:]]
+        least = (self.least_size * self.natural.length) ** 2
+        larger = [pair for pair in known if pair[0] > least][-2:]
+        if len(larger) < 2 or larger[0][0] == larger[1][0]:
+            return float(points[-1].parameter)
+        (far, there), (near, here) = larger
+        return float(here - near * (there - here) / (far - near))
+
+    def lost_ahead(self, point: Any) -> Zero | None:
+        return None
 
     def segments_to_prove(self, solution: Solution) -> OrbitSegments | CannotProve:
         return CannotProve("cycles without a load, whose period is an unknown, are not proved yet")
