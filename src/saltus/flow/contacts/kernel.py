@@ -396,7 +396,7 @@ def first_guard(motion, h, whole):
 
 # The share of a step up to which guards are looked at once more for earlier zeros: in units of what
 # a gap is there, the rounding of the whole step's series is the inverse square of it.
-SMALL_SHARE = 0.125
+SMALL_SHARE = 2.0**-5
 EARLIER = 1.0 - 2.0**-20  # A zero before this share of the shorter step is another instant.
 
 
