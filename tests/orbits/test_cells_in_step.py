@@ -162,6 +162,27 @@ def test_rounding_makes_no_special_points_along_their_branch(
 
 
 @pytest.mark.thorough
+def test_eight_cells_in_step_have_the_branch_of_one() -> None:
+    """Sixteen coordinates: 272 impacts a period, many of them at one instant."""
+    chain = cells(saltus.CellChain, cells=8, coupling=3.28)
+    names = chain.model.coordinates
+    angles = {name: 0.11 if name.startswith("lower") else -0.055 for name in names}
+    angles["lower_8"] = 0.12
+    orbit = saltus.find_orbit(chain, **angles, velocity=(0.0,) * len(names))
+    one = saltus.find_orbit(
+        cells(saltus.TwoLayer), theta_1=0.11, theta_2=-0.055, velocity=(0.0, 0.0)
+    )
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.999, 1.01))
+    assert not branch.special
+    assert [str(end) for end in branch.ends] == ["bound 0.999", "bound 1.01"]
+    times = np.linspace(5.1, 11.0, 50)
+    together = orbit.motion().at(times)[0]
+    lower, upper = one.motion().at(times)[0]
+    np.testing.assert_allclose(together[0::2], np.tile(lower, (8, 1)), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(together[1::2], np.tile(upper, (8, 1)), rtol=0, atol=1e-9)
+
+
+@pytest.mark.thorough
 def test_the_order_of_events_in_cells_that_do_not_act_on_one_another_makes_no_special_points(
     chain: saltus.System,
 ) -> None:

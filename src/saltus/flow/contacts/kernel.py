@@ -402,21 +402,25 @@ EARLIER = 1.0 - 2.0**-20  # A zero before this share of the shorter step is anot
 
 @lean_jit
 def earlier_guard(motion, h, hit, rubs, first):
-    """The contact, the friction and the share of the step of the first event, where a guard reaches
-    0 before the event that the step's whole length has shown.
+    """The contact, the friction and the share of the step of the first event, where another gap
+    reaches 0 before the event that the step's whole length has shown.
 
     A gap of a bounce that is far shorter than the step reaches 0 and rises again within the
     rounding of a series that is scaled to the step.
     """
-    for _ in range(motion.contacts.shape[0]):
-        if not 0.0 < first < SMALL_SHARE:
-            break
-        nearer, share, _ = first_guard(motion, first * h, False)
-        if nearer < 0 or nearer == hit or not share < EARLIER:
-            break
-        hit = nearer
-        rubs = -1
-        first *= share
+    for i in range(motion.contacts.shape[0]):
+        open_beside = i != hit and motion.contacts[i, ContactColumn.CLOSED] == 0
+        if not open_beside or not 0.0 < first < SMALL_SHARE:
+            continue
+        open_gap_series(motion, i, motion.order, motion.gap_series)
+        skip = motion.contacts[i, ContactColumn.SKIP]
+        kind, share, _ = contact_root(
+            motion.gap_series, skip, motion.order, first * h, motion.polynomial
+        )
+        if kind == SIMPLE and share < EARLIER:
+            hit = i
+            rubs = -1
+            first *= share
     return hit, rubs, first
 
 
