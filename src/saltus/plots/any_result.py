@@ -425,6 +425,30 @@ def _place_of_legend(legend: Any) -> str | None:
 LEAST_PANEL = 12.0  # mm: labels of an axis overlap on a lower or narrower panel
 
 
+LEAST_PANEL = 34.0  # mm, the height of a panel that a legend below it leaves
+
+
+def _give_panels_height(figure: Any, axes: Any) -> None:
+    """Make a figure higher until each of its panels has a height in which it can be read, at most
+    0.6 of its width."""
+    panels = [ax for ax in np.ravel(axes) if ax.get_subplotspec() is not None]
+    rows = max((ax.get_subplotspec().get_gridspec().nrows for ax in panels), default=1)
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    for _ in range(3):  # the layout divides what is added between the panels in its own way
+        engine.execute(figure)
+        size = 25.4 * figure.get_size_inches()
+        places = [ax.get_position() for ax in panels]
+        lacking = max(
+            (min(LEAST_PANEL, 0.6 * at.width * size[0]) - at.height * size[1] for at in places),
+            default=0.0,
+        )
+        if lacking <= 0.5:
+            return
+        figure.set_figheight((size[1] + rows * lacking) / 25.4)
+
+
 def _notice_narrow_panels(figure: Any, size: tuple[float, float]) -> None:
     """Warn where a size leaves the panels no room, as legends and labels keep theirs."""
     with warnings.catch_warnings():
@@ -532,7 +556,11 @@ def _draw(result: Any, options: dict[str, Any], size: Any) -> Any:
         return draw(data, width=width, **options)
     height = max(0.75 * LOOK.single_column, 0.63 * width)
     with look():
-        return draw(data, figure=new_figure(width, height), **options)
+        figure = new_figure(width, height)
+        axes = draw(data, figure=figure, **options)
+        if isinstance(size, str):  # which is a width: the height is what its panels need
+            _give_panels_height(figure, axes)
+        return axes
 
 
 def _dataset_of(result: Any, options: dict[str, Any]) -> Any:

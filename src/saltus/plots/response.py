@@ -127,24 +127,23 @@ SHORTEST_MARKED = 1.2
 
 
 def draw_special(ax: Any, spectrum: Any, quantity: str = "amplitude", scale: float = 1.0) -> None:
-    """Small marks by kind at the special points inside the axes, the closest ones thinned out;
-    none on branches that are shorter than a mark.
+    """Small marks by kind at the special points inside the axes, the closest ones of a kind thinned
+    out; none on branches that are shorter than a mark.
     """
     box = ax.get_window_extent()
     unit = np.array([box.width, box.height]) / ax.figure.dpi * 25.4
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
-    kept: list[np.ndarray] = []
     spectrum = _marked(spectrum, quantity, scale, unit / (high - low))
     for kind, style in MARKS.items():
         places = special_places(spectrum, kind, quantity) / np.array([1.0, scale])
-        first = len(kept)
+        kept: list[np.ndarray] = []
         inside = ((places >= low) & (places <= high)).all(axis=1)
         for place in places[inside]:
             # mm
             if all(np.linalg.norm((place - other) / (high - low) * unit) > 1.7 for other in kept):
                 kept.append(place)
-        if len(kept) > first:
-            ax.plot(*np.array(kept[first:]).T, linestyle="none", zorder=5, **_mark(style))
+        if kept:
+            ax.plot(*np.array(kept).T, linestyle="none", zorder=5, **_mark(style))
 
 
 def _marked(spectrum: Any, quantity: str, scale: float, unit: np.ndarray) -> Any:
@@ -327,17 +326,19 @@ def line_handles(branches: list[Any]) -> tuple[list[Any], list[str], dict[Any, A
 
 
 def line_labels(branches: list[Any]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """The labels of the lines of branches, with the styles of stable and unstable motions; by
-    validity if there are margins.
+    """The labels of the lines of branches, with the styles of stable and unstable motions, as far
+    as there are such; by validity if there are margins.
     """
     names = {
         kind: sorted({name for branch in branches for name in margins_of(branch, kind)})
         for kind in ModelValidity
     }
     if not any(names.values()):
+        drawn = {bool(each) for branch in branches for each in np.unique(branch["stable"].values)}
         return [
-            (name, [line_style(name == "stable", ModelValidity.HOLDS)])
-            for name in ("stable", "unstable")
+            (name, [line_style(stable, ModelValidity.HOLDS)])
+            for name, stable in (("stable", True), ("unstable", False))
+            if stable in drawn
         ]
     found = {validity for branch in branches for validity in validity_of(branch)}
     meaning = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import UserDict, defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, TypeVar
 
@@ -123,6 +123,31 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
             {str(path).partition(".")[0]: parts[str(path).partition(".")[0]] for path in changes},
         )
         raise (refused.inside(where[:-1]) if where else refused) from error
+
+
+def differ_in_numbers(one: Any, other: Any, changes: Iterable[str]) -> bool:
+    """Whether two parts of systems, of which one is a copy of the other with parts at these dotted
+    paths replaced, differ in floating-point numbers alone, so that they have the same structure.
+    """
+    if type(one) is not type(other):
+        return False
+    mine, others = children(one), children(other)
+    if mine.keys() != others.keys():
+        return False
+    below = defaultdict[str, list[str]](list)
+    for path in changes:
+        head, _, rest = str(path).partition(".")
+        below[head].append(rest)
+    return all(
+        part is others[name]
+        or (type(part) is float and type(others[name]) is float)
+        or (
+            name in below
+            and bool(children(part))
+            and differ_in_numbers(part, others[name], below[name])
+        )
+        for name, part in mine.items()
+    )
 
 
 # what the checks of a user's own class raise where a number has no meaning

@@ -23,8 +23,18 @@ from saltus.systems.load import DeclaredLoad, Load
 from saltus.systems.mirror import mirror_of
 from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_traces, check_works
-from saltus.systems.serial import children, from_dict, is_fixed, numbers, replace, to_dict
+from saltus.systems.serial import (
+    children,
+    differ_in_numbers,
+    from_dict,
+    is_fixed,
+    numbers,
+    replace,
+    to_dict,
+)
 from saltus.systems.system_units import units_of_gaps
+
+PARTS = ("model", "load", "impact")  # of a system, in the order of its numbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,7 +147,39 @@ class System:
                     str(path),
                 )
         system: System = replace(self, given)
+        self._hand_over(system, given)
         return system
+
+    def _hand_over(self, other: System, changes: Mapping[str, Any]) -> None:
+        """Let a copy in which numbers alone are others remember what does not depend on them: the
+        key of its structure, and the numbers of the parts that it shares. In a loop over numbers
+        these take longer than a short motion.
+        """
+        memory = vars(self).get("_memory")
+        if isinstance(memory, dict) and differ_in_numbers(self, other, changes):
+            kept = {name: memory[name] for name in ("structure",) if name in memory}
+            if "numbers" in memory:
+                kept["shared numbers"] = {
+                    name: memory["numbers"][name]
+                    for name in PARTS
+                    if getattr(self, name) is getattr(other, name)
+                }
+            vars(other)["_memory"] = kept
+
+    @property
+    def numbers_in_order(self) -> list[float]:
+        """Every number of the system, in the order of `parameters`, with those that follow from
+        others."""
+        found = self._remembered("numbers", self._numbers_by_part)
+        return [value for name in PARTS for value in found[name]]
+
+    def _numbers_by_part(self) -> dict[str, tuple[float, ...]]:
+        memory = vars(self).get("_memory")
+        known = memory.get("shared numbers", {}) if isinstance(memory, dict) else {}
+        return {
+            name: known.get(name) or tuple(value for _, value in numbers(getattr(self, name)))
+            for name in PARTS
+        }
 
     def get(self, path: str) -> Any:
         """The part at a dotted path; a constant channel is its number.

@@ -35,7 +35,7 @@ from saltus.flow.kernel.memory import (
     behind_parameters,
 )
 from saltus.flow.one_contact import impacts, kernel
-from saltus.systems import System, numbers
+from saltus.systems import System
 from saltus.taylor import (
     Case,
     Expr,
@@ -544,7 +544,7 @@ def _made(
         traced = trace(system, *asked[1:])
         _structures[asked] = traced, load_structure(traced)
     traced, structure = _structures[asked]
-    parameters = np.array([value for _, value in numbers(system)])
+    parameters = np.array(system.numbers_in_order, dtype=float)
     model: Any = system.in_gap_coordinates.model
     data = model.records.array if traced.modes is not None else ()
     other = traced.modes is None or traced.margins or model.frictions
