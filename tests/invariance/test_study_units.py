@@ -211,6 +211,31 @@ def test_charts(make: Any, length: float, time: float) -> None:
     assert other["amplitude"].values / length == pytest.approx(one["amplitude"].values, rel=1e-8)
 
 
+@pytest.mark.parametrize("time", [2.0**-10, 1e-6, 1e6])
+def test_a_chart_of_two_stops_whose_neighbours_lend_their_motions(time: float) -> None:
+    """Steps of states were compared with amplitudes, their speeds too: in short units of time a
+    motion of period 3 was found from a neighbour, in long ones not."""
+
+    def made(time: float = 1.0) -> Any:
+        model = saltus.TwoStops(
+            stiffness=0.107889 / time**2, damping=0.06645 / time, left=-1.144242, right=0.820196
+        )
+        load = saltus.Load(frequency=1.38854 / time, force=saltus.Harmonic(0.550498 / time**2))
+        return saltus.stability_chart(
+            saltus.System(model=model, load=load, impact=saltus.NewtonImpact(e=0.6992)),
+            horizontal=1.38854 * np.linspace(0.8, 1.3, 4) / time,
+            vertical=0.550498 * np.linspace(0.6, 1.2, 3) / time**2,
+            paths=("load.frequency", "load.force.amplitude"),
+            starts=6,
+        )
+
+    one, other = made(), made(time)
+    for name in ("count", "outcome", "rest", "unsettled", "period"):
+        assert other[name].values.tolist() == one[name].values.tolist(), name
+    speeds = one["motion_slowest"].values / time
+    assert other["motion_slowest"].values == pytest.approx(speeds, nan_ok=True, rel=1e-6)
+
+
 @units
 @pytest.mark.parametrize("make", [wall, stops])
 def test_attractors_along_a_parameter(make: Any, length: float, time: float) -> None:

@@ -245,7 +245,7 @@ def test_motions_that_come_together_go_on_as_one_that_stands_for_all():
     moving = np.zeros(5, motion_type(2))
     moving["cell"], moving["starts"], moving["amplitude"] = [3, 1, 3, 3, 1], [1, 2, 3, 4, 5], 0.5
     moving["state"] = [[0.5, 0.0], [0.5, 0.0], [0.5002, 0.0], [0.5004, 0.0], [0.6, 0.0]]
-    left = joined(moving)
+    left = joined(forced(), moving)
     assert left["cell"].tolist() == [1, 1, 3]
     assert left["starts"].tolist() == [2, 5, 8]
     moving["amplitude"] = 1e-3  # for small motions that is far

@@ -28,6 +28,7 @@ from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import (
     ALIKE,
     SIDES,
+    distance,
     distinct,
     has_alike,
     is_alike,
@@ -37,7 +38,14 @@ from saltus.studies.chart.motions import (
     outcomes,
     table,
 )
-from saltus.systems import System, Window, initial_states, rest_state, states_beside
+from saltus.systems import (
+    System,
+    Window,
+    initial_states,
+    natural_units,
+    rest_state,
+    states_beside,
+)
 from saltus.theory import amplitude_limits
 
 ASKED = 3  # motions of a cell that have not settled, from which the judgement starts at most
@@ -248,7 +256,8 @@ def computed(request: ChartRequest) -> tuple[dict[str, np.ndarray], np.ndarray]:
     `motion_type`.
     """
     settled, judged, motions = stable_motions(request)
-    columns = table(motions, len(settled.captured), request.variables, request.told_by_speed) | {
+    time = natural_units(request.system).time if request.told_by_speed else None
+    columns = table(motions, len(settled.captured), request.variables, time) | {
         "rest": settled.captured > 0,
         "tiny": settled.tiny,
         **_verdicts(settled, judged),
@@ -373,9 +382,9 @@ def settle(
         small = ~rests & (size < least * np.where(settled, 1.0, CELLS.negligible))
         found.append(moving[settled & ~small])
         _count(tiny, moving[small])
-        moving = joined(moving[~rests & ~settled & ~small])
+        moving = joined(request.system, moving[~rests & ~settled & ~small])
         if known is not None:
-            moving = moving[~_arrived(moving, known)]
+            moving = moving[~_arrived(request.system, moving, known)]
     small = moving["amplitude"] < least
     _count(tiny, moving[small])
     unfinished = np.concatenate([*left, moving[~small]])
@@ -421,7 +430,7 @@ def _fading(ends: Recurrence, amplitude: np.ndarray) -> np.ndarray:
     return np.where(last < CELLS.fading * before, last, amplitude)
 
 
-def joined(motions: np.ndarray) -> np.ndarray:
+def joined(system: System, motions: np.ndarray) -> np.ndarray:
     """The motions, of which those that have come together are joined to one: motions of one cell
     whose states at phase 0 are near to one another relative to their size."""
     motions = motions[np.argsort(motions["cell"], kind="stable")]
@@ -431,7 +440,7 @@ def joined(motions: np.ndarray) -> np.ndarray:
     into = np.arange(len(motions))
     for step in range(1, int(np.bincount(cell).max(initial=0))):
         near = _is_near(
-            state[step:], state[:-step], np.minimum(amplitude[step:], amplitude[:-step])
+            system, state[step:], state[:-step], np.minimum(amplitude[step:], amplitude[:-step])
         )
         near &= cell[step:] == cell[:-step]
         into[step:] = np.where(near, np.minimum(into[step:], into[:-step]), into[step:])
@@ -444,21 +453,22 @@ def joined(motions: np.ndarray) -> np.ndarray:
     return np.asarray(motions[kept])
 
 
-def _is_near(one: np.ndarray, other: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+def _is_near(
+    system: System, one: np.ndarray, other: np.ndarray, amplitude: np.ndarray
+) -> np.ndarray:
     """Whether states at the same phase are so near to one another that the motions end on the same
     motion.
     """
-    return np.asarray(np.abs(one - other).max(axis=1) <= ALIKE.joined * amplitude)
+    return np.asarray(distance(system, one - other) <= ALIKE.joined * amplitude)
 
 
-def _arrived(motions: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _arrived(system: System, motions: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Which motions have reached a motion that their cell has already."""
     result = np.zeros(len(motions), dtype=bool)
     for there, index in motions_in(known, motions["cell"]):
         other = known[index]
-        result |= there & _is_near(
-            motions["state"], other["state"], np.minimum(motions["amplitude"], other["amplitude"])
-        )
+        least = np.minimum(motions["amplitude"], other["amplitude"])
+        result |= there & _is_near(system, motions["state"], other["state"], least)
     return result
 
 
@@ -481,14 +491,16 @@ def seeds(
         source = motions[ahead]
         new = ~has_alike(known, source["cell"] + step, source, ALIKE.alike)
         source, behind = source[new], behind[ahead][new]
-        steps = _heading(source, known, np.where(behind, source["cell"] - step, -1))
+        steps = _heading(system, source, known, np.where(behind, source["cell"] - step, -1))
         found.append((source["cell"] + step, states_beside(system, source["state"], steps)))
     return np.concatenate([cell for cell, _ in found]), np.concatenate(
         [states for _, states in found]
     )
 
 
-def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.ndarray:
+def _heading(
+    system: System, motions: np.ndarray, known: np.ndarray, behind: np.ndarray
+) -> np.ndarray:
     """The steps from the states of motions to those expected a cell further on, (n, d): the
     differences to similar motions in the cells behind, or 0 if there are none."""
     ahead = np.zeros_like(motions["state"])
@@ -497,6 +509,6 @@ def _heading(motions: np.ndarray, known: np.ndarray, behind: np.ndarray) -> np.n
         like = there & is_alike(other, motions, ALIKE.alike)
         step = motions["state"] - other["state"]
         # else it is in another of its forcing periods
-        like &= np.abs(step).max(axis=1) <= ALIKE.alike * motions["amplitude"]
+        like &= distance(system, step) <= ALIKE.alike * motions["amplitude"]
         ahead[like] = step[like]
     return ahead

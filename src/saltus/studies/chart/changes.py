@@ -21,6 +21,7 @@ from saltus.flow import captured_between
 from saltus.studies.chart.motions import (
     ALIKE,
     SIDES,
+    distance,
     motion_type,
     motions_in,
     motions_later,
@@ -385,7 +386,7 @@ def _heading(system: System, last: np.ndarray, before: np.ndarray, share: np.nda
     """
     step = last["state"] - before["state"]
     gone = last["share"] - before["share"]
-    usable = (gone > 0.0) & (np.abs(step).max(axis=1) <= ALIKE.alike * last["amplitude"])
+    usable = (gone > 0.0) & (distance(system, step) <= ALIKE.alike * last["amplitude"])
     with np.errstate(divide="ignore", invalid="ignore"):
         ahead = np.where(usable, (share - last["share"]) / gone, 0.0)
     return states_beside(system, last["state"], ahead[:, None] * step)

@@ -36,8 +36,9 @@ def motion_type(dimension: int) -> np.dtype[Any]:
             # the extremum on the other side, counted positive there; the amplitude if the motion is
             # symmetric
             ("other", float),
-            # The least speed of an impact for models with several contacts, else 0: between two
-            # stops all motions have the same extrema.
+            # The least speed of an impact for models with several contacts, times the natural time
+            # so that it is compared with lengths, else 0: between two stops all motions have the
+            # same extrema.
             ("slowest", float),
             ("state", float, (dimension,)),  # coordinates and velocities at phase 0
         ]
@@ -122,10 +123,17 @@ def motions_later(
     later["state"] = np.where(ends.unsettled[:, None], ahead, ends.last)
     later["period"] = seen.period
     later["impact_count"] = seen.impact_count
-    later["slowest"] = seen.slowest
+    later["slowest"] = seen.slowest * units.time
     later["amplitude"] = np.maximum(high, low)
     later["other"] = np.minimum(high, low)
     return later, ends
+
+
+def distance(system: System, steps: np.ndarray) -> np.ndarray:
+    """How large steps between states (n, d) are, (n,), as lengths: of speeds it is the way in the
+    natural time."""
+    units = natural_units(system)
+    return np.asarray(np.abs(steps / units.state).max(axis=1) * units.length)
 
 
 def motions_in(motions: np.ndarray, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -187,12 +195,12 @@ def by_cell(motions: np.ndarray) -> np.ndarray:
 
 
 def table(
-    motions: np.ndarray, size: int, names: Sequence[str], speeds: bool = False
+    motions: np.ndarray, size: int, names: Sequence[str], time: float | None = None
 ) -> dict[str, np.ndarray]:
     """The variables of a chart of `size` cells that follow from its motions, which are given by
     cell and falling amplitude.
 
-    `names` are those of the state variables; `speeds` says whether there is a variable for the
+    `names` are those of the state variables; with the natural `time` there is a variable for the
     least speed of an impact.
     """
     number = np.bincount(motions["cell"], minlength=size)
@@ -200,13 +208,15 @@ def table(
     kept = rank < KEPT
     place = motions["cell"][kept], rank[kept]
     fields = {"amplitude": np.nan, "other": np.nan, "period": 0, "impact_count": 0}
-    fields |= {"slowest": np.nan} if speeds else {}
+    fields |= {} if time is None else {"slowest": np.nan}
     columns = {
         name: np.full((size, KEPT), empty)
         for name, empty in (fields | dict.fromkeys(names, np.nan)).items()
     }
     for name in fields:
         columns[name][place] = motions[name][kept]
+    if time is not None:
+        columns["slowest"] /= time
     for i, name in enumerate(names):
         columns[name][place] = motions["state"][kept, i]
     smallest = np.full(size, np.nan)
@@ -243,6 +253,8 @@ def read_motions(chart: xarray.Dataset) -> np.ndarray:
     motions["cell"] = np.ravel_multi_index(at[:2], shape[:2]) if len(at[0]) else 0
     for name in names:
         motions[name] = columns[name][at]
+    if "slowest" in names:
+        motions["slowest"] *= natural_units(System.from_json(chart.attrs["system"])).time
     motions["state"] = np.stack([columns[name][at] for name in variables], axis=1)
     return motions
 
