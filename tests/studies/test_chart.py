@@ -249,7 +249,7 @@ def test_motions_that_come_together_go_on_as_one_that_stands_for_all():
     assert left["cell"].tolist() == [1, 1, 3]
     assert left["starts"].tolist() == [2, 5, 8]
     moving["amplitude"] = 1e-3  # for small motions that is far
-    assert len(joined(moving)) == 5
+    assert len(joined(forced(), moving)) == 5
 
 
 def test_starts_fill_the_window_and_what_is_close_to_the_contact():
