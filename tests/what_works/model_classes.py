@@ -341,6 +341,13 @@ CLASSES = (
     ),
     ModelClass("belt", "`BeltOscillator`", _belt, {"x": 0.0, "velocity": 0.05}),
     ModelClass(
+        "belt, no load",
+        "`BeltOscillator` without a load",
+        lambda: System(model=saltus.BeltOscillator()),
+        {"x": 0.0, "velocity": 0.05},
+        "model.belt_speed",
+    ),
+    ModelClass(
         "structure with a contact",
         "`Structure` with a contact",
         _structure,

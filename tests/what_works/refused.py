@@ -11,6 +11,9 @@ FIRST_ORDER = "a page cannot show coordinates of first order yet"
 EXTREMA = "give system.in_gap_coordinates"
 MANY = "lyapunov_many works on models with one coordinate"
 
+SWEEP = "a sweep needs a load with a frequency"
+DIAGRAM = "a diagram is not drawn for a load without a frequency"
+
 SEVERAL_COORDINATES = (
     "smooth",
     "smooth, square wave",
@@ -35,6 +38,8 @@ REFUSED = {
     ("own, with surfaces", "page"): SURFACES,
     ("own, friction in a contact", "page"): RUBBING,
     ("own, first order", "page"): FIRST_ORDER,
+    ("belt, no load", "sweep"): SWEEP,
+    ("belt, no load", "diagram"): DIAGRAM,
 }
 REASONS = {
     SUMS: (
@@ -48,4 +53,6 @@ REASONS = {
     ),
     MANY: "`lyapunov_many` is for models with one coordinate; `lyapunov_spectrum` takes any.",
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
+    SWEEP: "A sweep needs a load with a frequency; `continue_orbit` follows a cycle without one.",
+    DIAGRAM: "A diagram needs a load with a frequency; `continue_orbit` follows cycles without one.",
 }

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from test_agreement import NODE, in_node
 from what_works.model_classes import ModelClass, model_class, system_of
 
@@ -36,11 +37,28 @@ class Tried:
         self.start = self.model_class.whole_start
         self.coordinates = self.system.model.coordinates
         self.frequency = self.system.load.frequency
+        # of a cycle without a load, about as long as one round
+        self.round = self.system.load.period or 2.0 * math.pi
+        forced = self.frequency is not None
+        self.path = FREQUENCY if forced else self.model_class.parameter
+        self.parameter = self.system.parameters[self.path]
         self.observed = self.model_class.observed
+
+    def lasting(self, rounds: float) -> dict[str, Any]:
+        """The arguments of a motion over so many forcing periods, or as long without a load."""
+        if self.frequency is None:
+            return {"duration": rounds * self.round}
+        return {"periods": rounds}
+
+    @property
+    def largest_exponent(self) -> float:
+        """That of the orbit's multipliers; along a cycle it is 0."""
+        largest = max([*abs(self.orbit.multipliers), float(self.frequency is None)])
+        return math.log(largest) / self.orbit.duration if largest > 0.0 else -math.inf
 
     @cached_property
     def motion(self) -> saltus.Motion:
-        return saltus.simulate(self.system, **self.start, periods=3)
+        return saltus.simulate(self.system, **self.start, **self.lasting(3))
 
     @cached_property
     def orbit(self) -> saltus.PeriodicOrbit:
@@ -48,8 +66,8 @@ class Tried:
 
     @cached_property
     def branch(self) -> saltus.Branch:
-        near = (0.99 * self.frequency, 1.01 * self.frequency)
-        return saltus.continue_orbit(self.orbit, FREQUENCY, near, step=0.5)
+        near = (0.99 * self.parameter, 1.01 * self.parameter)
+        return saltus.continue_orbit(self.orbit, self.path, near, step=0.5)
 
     @cached_property
     def attractors(self) -> Any:
@@ -68,8 +86,8 @@ def simulate(tried: Tried, folder: Path) -> None:
     """A motion goes on from its own end as if it had not been stopped."""
     motion = tried.motion
     assert motion.stop == "horizon"
-    assert motion.time == 3 * tried.system.load.period
-    first = saltus.simulate(tried.system, **tried.start, periods=3, tol=1e-10)
+    assert motion.time == 3 * tried.round
+    first = saltus.simulate(tried.system, **tried.start, **tried.lasting(3), tol=1e-10)
     np.testing.assert_allclose(first.final_state, motion.final_state, atol=1e-6)
     assert np.all(np.isfinite(motion.final_state))
     assert abs(tried.value(motion.at([0.0])[0])[0] - tried.start[tried.observed]) < 1e-14
@@ -77,14 +95,14 @@ def simulate(tried: Tried, folder: Path) -> None:
 
 def many(tried: Tried, folder: Path) -> None:
     """Motions of an ensemble are those that are followed one by one."""
-    ends = saltus.simulate_many(tried.system, **tried.start, periods=3)
+    ends = saltus.simulate_many(tried.system, **tried.start, **tried.lasting(3))
     assert abs(float(ends[tried.observed]) - tried.value(tried.motion.position)) < 1e-8
 
 
 def many_extremes(tried: Tried, folder: Path) -> None:
     """The least and the largest value of a motion of an ensemble are those of the motion alone."""
     ends = saltus.simulate_many(
-        tried.system, **tried.start, periods=3, sample=("extrema",), last="all"
+        tried.system, **tried.start, **tried.lasting(3), sample=("extrema",), last="all"
     )
     name = tried.observed if len(tried.coordinates) == 1 else "coordinate"
     extrema = np.asarray(tried.motion.extrema)
@@ -95,15 +113,13 @@ def many_extremes(tried: Tried, folder: Path) -> None:
 def many_exponents(tried: Tried, folder: Path) -> None:
     """The largest exponent of each motion of an ensemble is that of the orbit's multipliers."""
     found = saltus.lyapunov_many(tried.system, **tried.start, periods=64, transient=40)
-    length = tried.orbit.period * tried.system.load.period
-    expected = math.log(max(abs(tried.orbit.multipliers))) / length
-    assert abs(float(np.ravel(found.exponent)[0]) - expected) < 0.05
+    assert abs(float(np.ravel(found.exponent)[0]) - tried.largest_exponent) < 0.05
 
 
 def sensitivities(tried: Tried, folder: Path) -> None:
     """A derivative to a number of the model is the quotient of differences."""
     path = tried.model_class.parameter
-    asked = {**tried.start, "periods": 1.4}
+    asked = {**tried.start, **tried.lasting(1.4)}
     found = saltus.sensitivities(tried.system, parameters=(path,), **asked)
     value, change = tried.system.parameters[path], 1e-6
     ends = [
@@ -119,9 +135,9 @@ def sensitivities(tried: Tried, folder: Path) -> None:
 
 def orbit(tried: Tried, folder: Path) -> None:
     """An orbit repeats itself; between its events, as states jump there."""
-    found, length = tried.orbit, tried.system.load.period
-    motion = saltus.simulate(found.system, **found.start(), periods=found.period + 1)
-    times = motion.time - np.array([0.37, 0.37 + found.period]) * length
+    found, length = tried.orbit, tried.round
+    motion = saltus.simulate(found.system, **found.start(), duration=found.duration + length)
+    times = motion.time - np.array([0.37 * length, 0.37 * length + found.duration])
     for part in motion.at(times)[:2]:
         one, other = np.moveaxis(np.asarray(part), -1, 0)
         np.testing.assert_allclose(other, one, atol=1e-7)
@@ -130,17 +146,17 @@ def orbit(tried: Tried, folder: Path) -> None:
 def branch(tried: Tried, folder: Path) -> None:
     """A branch goes through the orbit from which it began, and to both of its bounds."""
     points = tried.branch.to_xarray()
-    frequencies, amplitudes = points.parameter.values, points.amplitude.values
+    values, amplitudes = points.parameter.values, points.amplitude.values
     assert np.isfinite(amplitudes).all()
-    here = np.argmin(abs(frequencies - tried.frequency))
+    here = np.argmin(abs(values - tried.parameter))
     assert abs(amplitudes[here] - tried.orbit.amplitude) < 1e-8
-    assert math.isclose(frequencies.min(), 0.99 * tried.frequency)
-    assert math.isclose(frequencies.max(), 1.01 * tried.frequency)
+    assert math.isclose(values.min(), 0.99 * tried.parameter)
+    assert math.isclose(values.max(), 1.01 * tried.parameter)
 
 
 def sweep(tried: Tried, folder: Path) -> None:
     """A sweep has the amplitude of the stable orbit on which the motion settles."""
-    values = [tried.frequency, 1.001 * tried.frequency]
+    values = [tried.parameter, 1.001 * tried.parameter]
     found = saltus.frequency_sweep(tried.system, values, periods=400, **tried.start)
     up = found.amplitude.values[0]
     assert np.isfinite(found.amplitude).all()
@@ -152,7 +168,7 @@ def classify(tried: Tried, folder: Path) -> None:
     """The motion is periodic, with the period of the orbit that is found."""
     verdict = saltus.classify(tried.system, periods=200, transient=50, **tried.start)
     assert str(verdict.kind) == "periodic"
-    assert verdict.period == tried.orbit.period
+    assert verdict.period == pytest.approx(tried.orbit.period, rel=1e-12)
 
 
 def attractors(tried: Tried, folder: Path) -> None:
@@ -177,13 +193,13 @@ def basins(tried: Tried, folder: Path) -> None:
 
 def spectrum(tried: Tried, folder: Path) -> None:
     """A diagram has the branch that is followed from the orbit."""
-    near = (0.99 * tried.frequency, 1.01 * tried.frequency)
+    near = (0.99 * tried.parameter, 1.01 * tried.parameter)
     found = saltus.response_spectrum(
         tried.system,
         bounds=near,
         effort="quick",
-        values=[tried.frequency],
-        max_period=max(tried.orbit.period, 1),
+        values=[tried.parameter],
+        max_period=max(tried.orbit.signature.period, 1),
         starts=4,
         window=tried_window(tried),
         bands=False,
@@ -191,7 +207,7 @@ def spectrum(tried: Tried, folder: Path) -> None:
         switch=False,
     )
     points = found["points"]
-    here = np.argmin(abs(points.parameter.values - tried.frequency))
+    here = np.argmin(abs(points.parameter.values - tried.parameter))
     assert abs(points.amplitude.values[here] - tried.orbit.amplitude) < 1e-2 * tried.orbit.amplitude
 
 
@@ -207,9 +223,7 @@ def exponents(tried: Tried, folder: Path) -> None:
     found = saltus.lyapunov_spectrum(
         tried.system, periods=64, transient=40, two_trajectories=False, **tried.start
     )
-    largest = max(abs(tried.orbit.multipliers))
-    length = tried.orbit.period * tried.system.load.period
-    expected = math.log(largest) / length if largest > 0 else -math.inf
+    expected = tried.largest_exponent
     assert abs(found.values[0] - expected) < 0.05 or found.values[0] == expected
 
 
@@ -217,7 +231,7 @@ def fit(tried: Tried, folder: Path) -> None:
     """A number is found again from samples of the motion."""
     path = tried.model_class.parameter
     true = tried.system.parameters[path]
-    times = np.linspace(0.2, 1.9, 12) * tried.system.load.period
+    times = np.linspace(0.2, 1.9, 12) * tried.round
     samples = tried.value(tried.motion.at(times)[0])
     start = {name: tried.start[name] for name in tried.coordinates}
     if "velocity" in tried.start:
@@ -246,9 +260,9 @@ def page(tried: Tried, folder: Path) -> None:
         f"{name}_velocity": float(speed)
         for name, speed in zip(tried.coordinates, speeds, strict=True)
     }
-    asked = {"values": tried.system.parameters, "start": start, "periods": 1, "at": [0.5]}
+    asked = {"values": tried.system.parameters, "start": start, "at": [0.5]} | tried.lasting(1)
     ((found,),) = in_node([{"wasm": wasm, "description": description, "motions": [asked]}], folder)
-    expected = saltus.simulate(tried.system, **tried.start, periods=1)
+    expected = saltus.simulate(tried.system, **tried.start, **tried.lasting(1))
     np.testing.assert_allclose(found["end"], expected.final_state, atol=1e-9)
     assert len(found["events"]) == len(expected.events)
 

@@ -23,7 +23,8 @@ def check_diagram(
     check_system(system, "a diagram", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError(
-            "a load without a frequency has no periodic orbits to draw; give the Load a frequency",
+            "a diagram is not drawn for a load without a frequency; give the Load one, or follow a"
+            " cycle with find_orbit and continue_orbit",
             "load.frequency",
         )
     low, high = check_bounds(bounds)
