@@ -133,6 +133,22 @@ class StoppedCoupled(Coupled):
 
 @saltus.register
 @dataclass(frozen=True, kw_only=True)
+class TwoDuffing(ContactModel):
+    """Two masses on springs that harden, without loss, coupled by a spring k."""
+
+    k: float = 0.1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ()
+
+    def force(self, t, q, velocity, load):
+        x, y = q
+        pull = self.k * (x - y)
+        return -x - x**3 - pull, -y - y**3 + pull
+
+
+@saltus.register
+@dataclass(frozen=True, kw_only=True)
 class TwoOnBelt(ContactModel):
     """Two masses on a belt, a spring between them."""
 

@@ -12,11 +12,13 @@ from orbits.cycle_cases import (
     Roessler,
     Squealing,
     StoppedVanDerPol,
+    TwoDuffing,
     VanDerPol,
     along_branch,
     difference_multipliers,
 )
 from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 
 import saltus
 from saltus import BeltOscillator, NewtonImpact, System
@@ -288,6 +290,59 @@ def test_a_lossless_motion_between_stops_has_its_closed_form(speed):
     assert not orbit.isolated
     with pytest.raises(saltus.ParameterError, match="not isolated"):
         saltus.continue_orbit(orbit, "model.place", (0.9, 1.1))
+
+
+def test_the_family_of_a_lossless_motion_between_stops_has_its_closed_form():
+    system = System(model=Clock(push=0.0), impact=NewtonImpact(1.0))
+    orbit = saltus.find_orbit(system, x=0.2, velocity=1.9)
+    branch = saltus.continue_orbit(orbit, "period", (1.0, 4.0))
+    assert [end.parameter for end in branch.ends] == [1.0, 4.0]
+    for found in branch.orbits:
+        radius = math.hypot(0.8, max(found.speeds))  # the fastest impact is at the left stop
+        arcs = [math.asin(place / radius) for place in (1.0, 0.8)]
+        assert found.period == pytest.approx(2.0 * sum(arcs), abs=1e-11)
+    forced = System(
+        model=saltus.WallOscillator(damping=0.1, wall=9.0),
+        load=saltus.Load(frequency=2.0, force=saltus.Harmonic(1.0)),
+    )
+    with pytest.raises(saltus.ParameterError, match="that of its load"):
+        saltus.continue_orbit(saltus.find_orbit(forced, x=0.1), "period", (0.5, 2.0))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_families_of_two_coupled_masses_are_elliptic_functions(sign):
+    """x'' = -w^2 x - x^3 of both masses in step, w = 1, and in turn, w^2 = 1 + 2 k: the period is
+    4 K(m) / sqrt(w^2 + A^2) with m = A^2 / 2 / (w^2 + A^2)."""
+    system = System(model=TwoDuffing())
+    square = 1.0 if sign == 1 else 1.2
+    orbit = saltus.find_orbit(system, x=0.5, y=0.5 * sign, settle=0.0)
+    branch = saltus.continue_orbit(orbit, "period", (3.0, 7.0))
+    for found in branch.orbits:
+        total = square + found.highest**2
+        period = 4.0 * ellipk(found.highest**2 / (2.0 * total)) / math.sqrt(total)
+        # the equations become singular at the branch point and at amplitude 0
+        if found.highest > 1e-2:
+            assert found.period == pytest.approx(period, abs=1e-10)
+            assert np.prod(found.multipliers) == pytest.approx(1.0, abs=1e-8)
+    # at amplitude 0 the linear mode
+    assert branch.ends[1].reason is saltus.orbits.OrbitEnd.EQUILIBRIUM
+    assert branch.ends[1].parameter == pytest.approx(2.0 * math.pi / math.sqrt(square), abs=1e-8)
+    # in turn the masses lose their symmetry where A^2 = 4 k / 3: there cn^2 - c solves Lame's
+    # equation of a mass's difference from it
+    special = [(str(point.kind), point.orbit.highest) for point in branch.special]
+    assert [kind for kind, _ in special] == ([] if sign == 1 else ["BPC"])
+    for _, highest in special:
+        assert highest == pytest.approx(math.sqrt(4.0 * 0.1 / 3.0), abs=1e-9)
+
+
+def test_a_family_is_read_back_and_others_have_none(van_der_pol):
+    system = System(model=TwoDuffing())
+    orbit = saltus.find_orbit(system, x=0.5, y=0.5, settle=0.0)
+    branch = saltus.continue_orbit(orbit, "period", (5.7, 5.8))
+    back = saltus.orbits.orbits_of(branch.to_xarray())
+    assert [found.period for found in back] == branch.parameters.tolist()
+    with pytest.raises(saltus.ParameterError, match="no others beside it with other periods"):
+        saltus.continue_orbit(van_der_pol, "period", (6.0, 7.0))
 
 
 def test_the_energies_of_cycles_close(belt, van_der_pol):

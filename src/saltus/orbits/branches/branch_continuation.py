@@ -27,6 +27,7 @@ from saltus.orbits.branches.orbit_curve import OrbitPoint, start
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
 from saltus.orbits.branches.symmetry import divide, full_period, half, keeps_symmetry
 from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.equations.cycles import PERIOD
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
@@ -65,7 +66,8 @@ def continue_orbit(
     orbit
         Where to begin, as from `find_orbit`.
     path
-        Dotted path of the parameter, such as "load.frequency".
+        Dotted path of the parameter, such as "load.frequency"; or "period" for the family of cycles
+        of a system without loss and without a load.
     bounds
         The least and the largest value of the parameter.
     functions
@@ -101,8 +103,14 @@ def continue_orbit(
                 f"functions must be functions of an orbit, and {name!r} is {shown(function)}",
                 "functions",
             )
-    low, high = _checked(orbit, path, bounds)
-    first = start(*along(orbit, path), scale=(high - low) / 3.0)
+    if path == PERIOD:
+        begun = _of_family(orbit)
+        low, high = check_bounds(bounds)
+        _check_inside(path, begun.duration / begun.signature.period, low, high)
+        first = start(begun, False, scale=(high - low) / 3.0)
+    else:
+        low, high = _checked(orbit, path, bounds)
+        first = start(*along(orbit, path), scale=(high - low) / 3.0)
     steps = replace(STEPS, longest=step)
     events = partial(BranchEvents, while_stable=while_stable)
     show = growing or _unseen
@@ -172,15 +180,34 @@ def _checked(orbit: PeriodicOrbit, path: str, bounds: Any) -> tuple[float, float
     """Bounds of a parameter that the system allows and between which the orbit lies."""
     low, high = check_bounds(bounds)
     check_path(orbit.system, path)
-    value = orbit.system.get(path)
+    _check_inside(path, orbit.system.get(path), low, high)
+    check_along(orbit.system, path, (low, high), "bounds")
+    return low, high
+
+
+def _check_inside(path: str, value: float, low: float, high: float) -> None:
     if not low <= value <= high:
         raise ParameterError(
             f"the orbit has {path} = {value:g}, which is outside ({low:g}, {high:g}); widen the"
             " range",
             "bounds",
         )
-    check_along(orbit.system, path, (low, high), "bounds")
-    return low, high
+
+
+def _of_family(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """A cycle of a system without loss as one of its family, along the period."""
+    found = PeriodicOrbit.near(*orbit.equations.family(orbit.solution))
+    if orbit.isolated and orbit.equations.paths != (PERIOD,):
+        raise ParameterError(
+            "the cycle has no others beside it with other periods, as its system has a loss or"
+            " gains energy; follow it along a parameter of the model",
+            "path",
+        )
+    if found is None:
+        raise ParameterError(
+            "the orbit does not satisfy the equations of its family; find it again", "orbit"
+        )
+    return found
 
 
 def along(orbit: PeriodicOrbit, path: str) -> tuple[PeriodicOrbit, bool]:

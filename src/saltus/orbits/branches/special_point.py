@@ -132,7 +132,7 @@ class OrbitEnd(EndReason):
     FIRST = "the first {kind}"
     UNSTABLE = "is no longer stable"
     SHRINKS = "shrinks to rest"
-    EQUILIBRIUM = "shrinks to an equilibrium at {parameter:.9g}, of which it is born (Hopf)"
+    EQUILIBRIUM = "shrinks to an equilibrium at {parameter:.9g}, of which it is born"
     GROWS = (
         "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance"
         " without damping"

@@ -610,6 +610,11 @@ class OrbitEquations(ABC):
         return self._values[self._places]
 
     @property
+    def model_paths(self) -> tuple[str, ...]:
+        """The paths that lead to numbers of the system."""
+        return self.paths
+
+    @property
     def own(self) -> int:
         """Degrees of freedom."""
         return self._follower.own
@@ -656,6 +661,20 @@ class OrbitEquations(ABC):
     def lasting(self, solution: Solution, rounds: float) -> dict[str, Any]:
         """The arguments of `simulate` for a motion of so many rounds, the forcing periods."""
         return {"periods": rounds}
+
+    def family(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray, np.ndarray]:
+        """The equations of the orbits of all energies along their period, with the unknowns and the
+        period of one of them.
+
+        Raises
+        ------
+        ParameterError
+            The period is that of the load.
+        """
+        raise ParameterError(
+            'the period of a forced orbit is that of its load: follow it along "load.frequency"',
+            "path",
+        )
 
     @property
     def multiplier_count(self) -> int:

@@ -11,16 +11,21 @@ multipliers are those of the return map of the section.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from saltus.continuation import Units, Zero
-from saltus.errors import MotionError
-from saltus.flow import Motion, state_rates
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, Solution
+from saltus.errors import MotionError, ParameterError
+from saltus.flow import Motion, MotionRequest, state_rates
+from saltus.orbits.equations.contract import (
+    ORBIT_TOLERANCE,
+    MotionToRead,
+    OrbitEquations,
+    Solution,
+)
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
 from saltus.orbits.equations.event_sequence import EventSequence, section_time
 from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
@@ -38,6 +43,8 @@ WITHIN = 1e-12
 # The least cosine of the angle, in natural units, between the flow and the normal of its section: at
 # a right angle of the two, where a branch would turn back, there is no return map.
 LEAST_STRAIGHT = 0.5
+# the least ratio of the squares of sizes by which two orbits count as two
+APART = 1.1
 
 
 class CycleEquations(WholeMotionEquations):
@@ -153,20 +160,35 @@ class CycleEquations(WholeMotionEquations):
 
     def stretch(self, solution: Solution) -> float:
         """Also of coordinates of first order, by their rates."""
-        own = 2 * self.own
-        evaluation: Any = solution.evaluation
-        rates = evaluation.here[0, :own, own] / self.signature.span
+        rates = self._flow(solution.evaluation) / self.signature.span
         largest = np.abs(rates * self.natural.time / self.natural.state)[: self.own].max()
         return max(super().stretch(solution), float(largest))
 
     def _middle(self, state: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
         return np.append(state, unknowns[-1])
 
+    def _flow(self, evaluation: Any) -> np.ndarray:
+        """The derivatives of the state after the motion to the time of a round."""
+        n = 2 * self.own
+        return np.asarray(evaluation.here[0, :n, n])
+
+    def family(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray, np.ndarray]:
+        """The equations of the cycles of all energies along their period, with the unknowns and the
+        period of one of them.
+        """
+        if self.system.dependent:
+            raise ParameterError(
+                "families of a system with more gaps than coordinates are not followed yet", "orbit"
+            )
+        equations = FamilyEquations(self.given, self.signature, (PERIOD,), self.tol)
+        return equations, np.append(solution.unknowns[:-1], 0.0), solution.unknowns[-1:]
+
     def return_map(self, evaluation: Any) -> np.ndarray:
         n = 2 * self.own
         normal = self._plane[1]
         matrix = evaluation.here[0]
-        flow = matrix[:n, n] / (normal @ matrix[:n, n])
+        flow = self._flow(evaluation)
+        flow = flow / (normal @ flow)
         back = matrix[:n, :n] - np.outer(flow, normal @ matrix[:n, :n])
         kept = np.delete(np.arange(n), self.following)
         units = self.natural.state[kept]
@@ -189,14 +211,23 @@ class CycleEquations(WholeMotionEquations):
         return float((ways / self.natural.lengths).max() * self.natural.length)
 
     def birth(self, points: list[Any]) -> float | None:
-        """The square of the size grows with the distance from it."""
-        known = [(self.size_of(point.orbit) ** 2, point.parameter) for point in points[-6:]]
+        """A parabola in the square of the size, through three orbits: smaller ones have an error of
+        rounding by their size.
+        """
+        known = {self.size_of(point.orbit) ** 2: point.parameter for point in points[-8:]}
         least = (self.least_size * self.natural.length) ** 2
-        larger = [pair for pair in known if pair[0] > least][-2:]
-        if len(larger) < 2 or larger[0][0] == larger[1][0]:
+        squares: list[float] = []
+        for square in sorted(known):  # one orbit may be there at two sections
+            if square > max([least, *(APART * other for other in squares)]) and len(squares) < 3:
+                squares.append(square)
+        if len(squares) < 3:
             return float(points[-1].parameter)
-        (far, there), (near, here) = larger
-        return float(here - near * (there - here) / (far - near))
+        value = 0.0
+        for square in squares:
+            others = [other for other in squares if other != square]
+            weight = math.prod(other / (other - square) for other in others)
+            value += known[square] * weight
+        return value
 
     def lost_ahead(self, point: Any) -> Zero | None:
         return None
@@ -223,6 +254,106 @@ class CycleEquations(WholeMotionEquations):
         states[:, self.following] = 0.0
         apart = np.abs((states - near[:-1]) / self.natural.state).max(axis=1)
         return np.append(states[apart.argmin()], unknowns[-1])
+
+
+PERIOD = "period"  # the path of a family's parameter
+
+
+@dataclass(frozen=True)
+class FamilyEvaluation(WholeMotionEvaluation):
+    """The equations of a family at one point, with the flow through its section."""
+
+    flow: np.ndarray  # (n,): the derivatives of the residual to the period
+
+    def jacobian(self, closing: float = 1.0) -> np.ndarray:
+        """Perturbations that change their sign each round may move along the flow."""
+        matrix = super().jacobian(closing)
+        if closing < 0.0:
+            matrix[: len(self.flow), -1] = self.flow
+        return matrix
+
+
+class FamilyEquations(CycleEquations):
+    """The cycles of a system without loss, of which there is one for each energy, along their
+    period: x = Phi(x, T) + d w, with T as the parameter and the unknowns x and d.
+
+    As energy is kept one of the equations follows from the others. The number d in its place is 0:
+    a push w along the gradient of the energy would change the energy in each round.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        signature: Signature,
+        paths: tuple[str, ...] = (PERIOD,),
+        tol: float = ORBIT_TOLERANCE,
+    ) -> None:
+        super().__init__(system, signature, (), tol)
+        self.paths = paths
+
+    @classmethod
+    def solves(cls, system: System, signature: Signature) -> bool:
+        return False  # they are those of a path alone
+
+    @property
+    def model_paths(self) -> tuple[str, ...]:
+        return ()
+
+    def given_at(self, values: np.ndarray) -> System:
+        return self.given
+
+    @cached_property
+    def units(self) -> Units:
+        state = self.natural.state
+        return Units(np.append(state, 1.0), np.append(state, 1.0), self.is_phase)
+
+    @cached_property
+    def _push(self) -> np.ndarray:
+        """w: (-a, v) at the section in natural units, along which an energy v^2 / 2 + V grows."""
+        units = self.natural.state
+        flow = self._plane[1] * units
+        return np.asarray(np.append(-flow[self.own :], flow[: self.own]) * units)
+
+    def frequency_of(self, solution: Solution) -> float:
+        return 2.0 * math.pi / float(solution.values[-1])
+
+    def period_of(self, solution: Solution) -> float:
+        return self.signature.period * float(solution.values[-1])
+
+    def lasting(self, solution: Solution, rounds: float) -> dict[str, Any]:
+        return {"duration": rounds * float(solution.values[-1])}
+
+    def _may_solve(self, unknowns: np.ndarray, values: np.ndarray) -> bool:
+        return super()._may_solve(np.append(unknowns, values), values)
+
+    def _request(
+        self,
+        system: System,
+        unknowns: np.ndarray,
+        values: np.ndarray,
+        paths: tuple[str, ...] | None,
+    ) -> tuple[MotionRequest, Any]:
+        with_period = np.append(unknowns[:-1], values[-1])
+        return super()._request(system, with_period, values[:0], paths)
+
+    def _apart(self, after: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        return super()._apart(after + unknowns[-1] * self._push, unknowns)
+
+    def _evaluation(
+        self, motion: Motion, after: np.ndarray, unknowns: np.ndarray, slopes: np.ndarray
+    ) -> WholeMotionEvaluation:
+        found = super()._evaluation(motion, after, unknowns, slopes)
+        n = len(after)
+        by_period = found.here[0, :, n].copy()
+        found.here[0, :n, n] = self._push
+        known = {each.name: getattr(found, each.name) for each in fields(found)}
+        return FamilyEvaluation(**known | {"parameters": by_period[:, None]}, flow=by_period[:n])
+
+    def _flow(self, evaluation: Any) -> np.ndarray:
+        return np.asarray(evaluation.flow)
+
+    def family(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray, np.ndarray]:
+        return self, solution.unknowns, solution.values
 
 
 def _section_along(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from saltus.orbits.equations.contacts import ContactsEquations
 from saltus.orbits.equations.contract import ORBIT_TOLERANCE, OrbitEquations
-from saltus.orbits.equations.cycles import CycleEquations
+from saltus.orbits.equations.cycles import PERIOD, CycleEquations, FamilyEquations
 from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.equations.whole_motion import WholeMotionEquations
 from saltus.orbits.signature import Signature
@@ -31,6 +31,8 @@ def equations_of(
     system: System, signature: Signature, paths: tuple[str, ...] = (), tol: float = ORBIT_TOLERANCE
 ) -> OrbitEquations:
     """The equations of the orbits of a signature, along the parameters at `paths`."""
+    if PERIOD in paths:
+        return FamilyEquations(system, signature, paths, tol)
     return next(kind for kind in KINDS if kind.solves(system, signature))(
         system, signature, paths, tol
     )

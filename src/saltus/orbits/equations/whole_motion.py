@@ -404,7 +404,7 @@ class WholeMotionEquations(OrbitEquations):
             return None
         try:
             system = self.system_at(values)
-            found = derivatives_of(*self._request(system, unknowns, values, self.paths))
+            found = derivatives_of(*self._request(system, unknowns, values, self.model_paths))
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion = found.motion
@@ -474,11 +474,11 @@ class WholeMotionEquations(OrbitEquations):
             return frozenset()
         values = self._values.copy()
         values[self._places] = 0.0  # The answer holds for all of them, and is then computed once.
-        return continuous_surfaces(self._run.trace, tuple(values), self.paths)
+        return continuous_surfaces(self._run.trace, tuple(values), self.model_paths)
 
     @cached_property
     def _program(self) -> Any:
-        return program(self.system, sensitivities=self.paths)
+        return program(self.system, sensitivities=self.model_paths)
 
     @cached_property
     def _plain_program(self) -> Any:
