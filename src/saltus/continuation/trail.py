@@ -155,7 +155,8 @@ class Trail:
     def _with_points_beside_events(self, samples: list[TrailPoint]) -> list[TrailPoint]:
         """The points of a step, with a further one beside each end at which an event has no count
         of `Events.outside`, so that what happens up to the event is seen."""
-        first, *_, last = samples
+        first = samples[0]
+        last = samples[-1]
         found = list(samples)
         if last.outside is None and last is not first:
             beside = self._middle(samples[-2], last, 1.0 - SETTINGS.beside_event)
