@@ -19,9 +19,9 @@ SAME = 1e-6
 # frame is measured, by the logarithm of a ratio of lengths over the run, 2 pi 64 / frequency.
 SAME_EXPONENTS = 2e-2
 KINDS = ("wall", "passing", "stops", "block", "chain", "belt", "soft", "lag", "structure")
-# Attractors are looked for from starts that are spread over a window: another coordinate spreads
-# them otherwise, and the default window is around a place that an origin moves.
-OTHERWISE_SPREAD = ("inert coordinate",)
+# Attractors are looked for from starts that are spread over a window: another coordinate and a
+# mirror spread them otherwise, and the default window is around a place that an origin moves.
+OTHERWISE_SPREAD = ("inert coordinate", "mirrored")
 NO_DEFAULT_WINDOW = ("origin", "inert")
 
 
@@ -34,12 +34,17 @@ def in_other_words(recipe: Recipe, rng: np.random.Generator) -> Iterator[Recipe]
     yield recipe.from_origin(rng.uniform(-3.0, 3.0, recipe.size))
     for part in recipe.inert_parts:
         yield recipe.with_inert(part)
+    if recipe.frequency is not None:
+        yield recipe.later(3)
 
 
 def is_asked(verb: str, recipe: Recipe) -> bool:
     """Whether a verb can be asked the same question in other words."""
+    begins_later = recipe.view.begin > 0.0
     if verb == "basins_of_attraction":
-        return recipe.size == 1 and recipe.lag is None
+        return recipe.size == 1 and recipe.lag is None and not begins_later
+    if "attractors" in verb and begins_later:
+        return False
     if "default window" in verb and any(word in recipe.name for word in NO_DEFAULT_WINDOW):
         return False
     return "attractors" not in verb or not any(word in recipe.name for word in OTHERWISE_SPREAD)

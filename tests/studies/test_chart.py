@@ -289,3 +289,21 @@ def test_systems_without_a_chart_are_refused():
     still = type(forced(1.0))(model=forced(1.0).model, load=Load(horizontal=0.1, vertical=-0.5))
     with pytest.raises(ParameterError, match="frequency"):
         stability_chart(still)
+
+
+class Unregistered(TwoStops):
+    """Two stops under a name that no other process knows."""
+
+
+def test_a_model_of_ones_own_is_registered_before_its_chart_is_computed(capfd):
+    """Its chunks failed one by one, twice each."""
+    load = Load(frequency=1.0, force=Harmonic(0.5))
+    system = System(model=Unregistered(), load=load)
+    with pytest.raises(ParameterError, match=r"'Unregistered' is not known.*saltus\.register"):
+        stability_chart(
+            system,
+            horizontal=[0.8, 1.0],
+            vertical=[0.4, 0.5],
+            paths=("load.frequency", "load.force.amplitude"),
+        )
+    assert capfd.readouterr().err == ""

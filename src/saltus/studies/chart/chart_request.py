@@ -175,9 +175,17 @@ class ChartRequest:
         return cls(system=system, paths=paths, window=window, **axes, **numbers)
 
     def plan(self) -> Plan:
-        """The chart as a sweep: chunks of rows, each a call of `cells`."""
+        """The chart as a sweep: chunks of rows, each a call of `cells`.
+
+        Raises
+        ------
+        ParameterError
+            The model is of a user's own class that is not registered, so that no process could make
+            the system from its name.
+        """
         from saltus.sweep import Plan
 
+        System.from_json(self.system.to_json())
         more = {name: getattr(self, name) for name in NUMBERS if name not in ("tol", "seed")}
         more |= {
             "kind": "stability_chart",
