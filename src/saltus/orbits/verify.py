@@ -79,9 +79,12 @@ def defects(orbits: list[PeriodicOrbit], rounds: int = 1, tol: float = 1e-13) ->
 
 
 def closing_rows(orbits: list[PeriodicOrbit], rounds: int = 1) -> np.ndarray:
-    """One row for each orbit, (n, m), as `closing_distances` takes them: the parameter along the
-    common path, if there is one, coordinates and velocities at the start, its time, the speed
-    before the first impact (-1 without), and the forcing periods, or the time of a cycle."""
+    """One row for each orbit, (n, m), as `closing_distances` takes them.
+
+    It has the parameter along the common path, if there is one, then the state at the start and its
+    time. Behind these are the speed before the first impact (-1 without), and the forcing periods,
+    or the time of a cycle.
+    """
     rows = []
     for orbit in orbits:
         start = orbit.start()
