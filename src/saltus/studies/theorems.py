@@ -33,7 +33,7 @@ def _check(
     check_system(system, "prove_orbit_of", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError(
-            "an orbit needs a load with a frequency; give the Load one", "load.frequency"
+            "cycles without a load are not proved yet; give the Load a frequency", "load.frequency"
         )
     if (path is None) != (bounds is None):
         missing = "path" if path is None else "bounds"
@@ -55,8 +55,8 @@ def prove_orbit_of(
     path: str | None = None,
     bounds: tuple[float, float] | None = None,
     velocity: Iterable[float] | float = 0.0,
-    period: int | None = None,
-    settle: int | None = None,
+    period: float | None = None,
+    settle: float | None = None,
     radii: Mapping[str, float] | None = None,
     step: float | None = None,
     order: int | None = None,
