@@ -380,8 +380,8 @@ def draw_diagram(
     2,).
 
     In a figure the states at phase 0 are below the branches; into given axes only the branches are
-    drawn. The `quantity` is the amplitude, the highest or the lowest value of the coordinate (of
-    several, of the one that the load drives), or, with several contacts, the least speed of an
+    drawn. The `quantity` is the amplitude, the highest or the lowest value of the coordinate, of
+    several the one that the load drives. With several contacts it may be the least speed of an
     impact ("slowest", 0 without impacts). With several coordinates there are "largest_x" and
     "smallest_x" of each coordinate and of each named point x, of which "x" alone is the amplitude;
     and there are the diagram's own `functions`. The default is the amplitude, or "slowest" if most

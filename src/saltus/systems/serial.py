@@ -126,8 +126,8 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
 
 
 def differ_in_numbers(one: Any, other: Any, changes: Iterable[str]) -> bool:
-    """Whether two parts of systems, of which one is a copy of the other with parts at these dotted
-    paths replaced, differ in floating-point numbers alone, so that they have the same structure.
+    """Whether two parts of systems differ in floating-point numbers alone, so that they have the
+    same structure. One is a copy of the other with parts at these dotted paths replaced.
     """
     if type(one) is not type(other):
         return False

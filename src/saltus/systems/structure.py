@@ -487,8 +487,8 @@ class Structure(ContactModel):
 
     def shown_coordinate(self, load: Any) -> str | None:
         """The displacement that the load drives most directly, of contacts, surfaces, frictions and
-        points. It is the row of the matrices on which alone the load acts, if none of them is as
-        direct, and the row that it drives most directly where it drives none of them.
+        points. If none of them is as direct, it is the row of the matrices on which alone the load
+        acts. Where the load drives none of them, it is the row that it drives most directly.
 
         Parameters
         ----------
