@@ -425,7 +425,7 @@ def _place_of_legend(legend: Any) -> str | None:
 LEAST_PANEL = 12.0  # mm: labels of an axis overlap on a lower or narrower panel
 
 
-LEAST_PANEL = 34.0  # mm, the height of a panel that a legend below it leaves
+PANEL_HEIGHT = 34.0  # mm, the height of a panel that a legend below it leaves
 
 
 def _give_panels_height(figure: Any, axes: Any) -> None:
@@ -441,7 +441,7 @@ def _give_panels_height(figure: Any, axes: Any) -> None:
         size = 25.4 * figure.get_size_inches()
         places = [ax.get_position() for ax in panels]
         lacking = max(
-            (min(LEAST_PANEL, 0.6 * at.width * size[0]) - at.height * size[1] for at in places),
+            (min(PANEL_HEIGHT, 0.6 * at.width * size[0]) - at.height * size[1] for at in places),
             default=0.0,
         )
         if lacking <= 0.5:

@@ -4,6 +4,7 @@ borders over it.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -16,12 +17,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import MaxNLocator
 
 from saltus.plots.branch_cuts import border_curves
 from saltus.plots.conventions import (
     LOOK,
     axes_or_new,
     cell_edges,
+    chosen_quantity,
     drawing,
     is_flat,
     legend_of,
@@ -83,11 +86,17 @@ CLOSED_FORM: dict[str, Any] = {"linestyle": "none", "marker": "o", "mfc": "white
 
 
 @drawing
-def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
+def draw_stability_chart(data: Any, quantity: str | None = None, *, ax: Axes | None = None) -> Axes:
     """Draw the Dataset of a chart, or the DataTree of a chart and its borders, with a colour bar
     and a legend; returns `ax`.
+
+    The colours are those of the largest `quantity` of the motions in a cell: by default of the
+    amplitude, of several coordinates of the one that the load drives; or of the amplitude of
+    another coordinate or named point, by its name, or of one of the chart's own `functions`.
     """
-    chart = data["chart"].to_dataset() if getattr(data, "children", None) else data
+    bordered = bool(getattr(data, "children", None))
+    chart = data["chart"].to_dataset() if bordered else data
+    chart, said = _of_quantity(chart, quantity)
     own, ax = ax is None, axes_or_new(ax, 1.2 * LOOK.single_column, 98.0)
     cells = draw_chart(ax, chart)
     path = list(chart.attrs.get("path", ("horizontal", "vertical")))
@@ -97,12 +106,14 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
         name = (
             "least speed of an impact"
             if has_speeds(chart)
-            else f"largest amplitude ${peak(chart.attrs['coordinate'])}$"
+            else f"largest amplitude ${peak(said)}$"
+            if said in str(chart.attrs["coordinate"]) or f"motion_largest_{said}" in chart
+            else f"largest {said}"
         )
         label = f"{name}{unit_in_brackets(chart['amplitude'])}"
         ax.figure.colorbar(cells, ax=ax, label=label, ticks=cells.norm.boundaries, format="%g")
     handles = _cell_handles(chart)
-    if chart is not data:
+    if bordered:
         dots = draw_lines(ax, data)
         handles += _line_handles(
             border_curves(data), "static" in data.children, bool(_resting(chart).any())
@@ -111,6 +122,40 @@ def draw_stability_chart(data: Any, *, ax: Axes | None = None) -> Axes:
     if handles:
         legend_of(ax, own, handles, ncols=2, columnspacing=1.4, handletextpad=0.6)
     return ax
+
+
+def _of_quantity(chart: Any, quantity: str | None) -> tuple[Any, str]:
+    """The chart whose `amplitude` is that of a quantity, the largest of the motions in a cell, and
+    the coordinates or the name of the quantity."""
+    shown = str(chart.attrs.get("shown", ""))
+    named = [
+        str(name).removeprefix("motion_largest_")
+        for name in chart.data_vars
+        if str(name).startswith("motion_largest_")
+    ]
+    own = [
+        str(name).removeprefix("motion_")
+        for name, part in chart.data_vars.items()
+        if str(name).startswith("motion_") and part.attrs.get("long_name") == str(name)[7:]
+    ]
+    usual = shown if shown and set(shown.split()) <= {*named} else "amplitude"
+    which = chosen_quantity(quantity, ["amplitude", *named, *own], usual)
+    which = usual if which == "amplitude" else which
+    if quantity is not None:  # which is drawn even where it is the same everywhere
+        chart = chart.drop_vars("motion_slowest", errors="ignore")
+    if which == "amplitude":
+        return chart, str(chart.attrs["coordinate"])
+    if which in own:
+        values = chart[f"motion_{which}"]
+    else:
+        ends = [
+            chart[f"motion_{end}_{x}"] for x in which.split() for end in ("largest", "smallest")
+        ]
+        values = functools.reduce(np.fmax, map(abs, ends))
+        values.attrs = ends[0].attrs
+    largest = values.max("motion").transpose(*chart["amplitude"].dims)
+    largest.attrs = {**chart["amplitude"].attrs, **values.attrs}
+    return chart.assign(amplitude=largest), which
 
 
 def draw_lines(ax: Any, tree: Any) -> int:
@@ -264,7 +309,11 @@ def _amplitudes(
     """The cells in the colours of their amplitudes; None without any."""
     if not np.isfinite(amplitude).any():
         return None
-    levels = LEVELS * _round(float(np.nanmax(amplitude)) if top is None else top)
+    levels: Any
+    if np.nanmin(amplitude) < 0.0 or np.nanmax(amplitude) == 0.0:  # of a function of one's own
+        levels = MaxNLocator(nbins=12).tick_values(np.nanmin(amplitude), np.nanmax(amplitude))
+    else:
+        levels = LEVELS * _round(float(np.nanmax(amplitude)) if top is None else top)
     norm = mpl.colors.BoundaryNorm(levels, 256)
     return ax.pcolormesh(*edges, amplitude, cmap=COLOURS, norm=norm, rasterized=True, zorder=1)
 

@@ -3,7 +3,7 @@ and checks of charts by other means."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,14 @@ import numpy as np
 
 from saltus.attractors import share_interval
 from saltus.checks import answered, check_count, check_dataset, checked_by
-from saltus.flow import check_device, on_device
+from saltus.flow import (
+    Functions,
+    Quantity,
+    check_device,
+    check_new_names,
+    on_device,
+    own_quantities,
+)
 from saltus.progress import Progress, part_of, silent
 from saltus.studies.chart.border_work import explained, special_point, unseen_folds
 from saltus.studies.chart.borders import Borders, with_borders
@@ -27,7 +34,8 @@ from saltus.studies.chart.changes import (
 )
 from saltus.studies.chart.chart_request import ChartRequest
 from saltus.studies.chart.motions import ALIKE, KEPT, CellOutcome, has_alike, read_motions
-from saltus.systems import Box, System, check_system
+from saltus.studies.motion_quantities import DRIVEN, quantities_of_motions
+from saltus.systems import Box, System, check_system, driven_displacements
 from saltus.theory import quasi_static_border
 
 if TYPE_CHECKING:
@@ -301,9 +309,12 @@ def _check(
     scheduler: object,
     device: Any,
     progress: object,
+    functions: Any = None,
     **options: Any,
 ) -> None:
     from saltus.sweep import check_store
+
+    own_quantities(system, functions)
 
     check_device(device, system, workers, scheduler)
     plan = ChartRequest(system=system, **options).plan()
@@ -331,6 +342,7 @@ def stability_chart(
     workers: int | None = None,
     scheduler: str | None = None,
     device: str = "cpu",
+    functions: Functions | None = None,
     progress: Progress = silent,
 ) -> xarray.Dataset:
     """The largest amplitude of the stable motions beside rest, and their number, over the plane of
@@ -371,6 +383,8 @@ def stability_chart(
         Where the chunks are kept and who computes them, see `saltus.sweep.run`.
     device
         Where the motions are followed, as for `simulate_many`.
+    functions
+        Further quantities of the motions by name, as `frequency_sweep` takes them: `motion_...`.
 
     Returns
     -------
@@ -401,7 +415,32 @@ def stability_chart(
     }
     axes: dict[str, Any] = {"horizontal": horizontal, "vertical": vertical, "paths": paths}
     request = ChartRequest(system=system, **axes, **numbers, tol=tol, seed=seed)
-    return run(request.plan(), store, workers=workers, scheduler=scheduler, progress=progress)
+    chart = run(request.plan(), store, workers=workers, scheduler=scheduler, progress=progress)
+    return _with_quantities(system, chart, paths, own_quantities(system, functions))
+
+
+def _with_quantities(
+    system: System, chart: xarray.Dataset, paths: Sequence[str], own: Sequence[Quantity]
+) -> xarray.Dataset:
+    """The chart with the extrema of each coordinate and each point, of a model with several, and
+    with the user's own quantities, of the motions that it keeps: `motion_...`."""
+    dims = ("vertical", "horizontal", "motion")
+    motions = read_motions(chart)
+    at = np.nonzero(np.isfinite(chart["motion_amplitude"].transpose(*dims).values))
+    values = {
+        path: chart[axis].values[at[place]]
+        for path, axis, place in zip(paths, ("horizontal", "vertical"), (1, 0), strict=True)
+    }
+    columns = quantities_of_motions(system, values, motions["state"], motions["period"], own)
+    check_new_names(own, (name.removeprefix("motion_") for name in map(str, chart)))
+    for name, (found, attrs) in columns.items():
+        if name not in DRIVEN:
+            table = np.full(tuple(chart.sizes[dim] for dim in dims), np.nan)
+            table[at] = found
+            chart[f"motion_{name}"] = (dims, table, attrs)
+    if columns:
+        chart.attrs["shown"] = " ".join(driven_displacements(system))
+    return chart
 
 
 def _check_bordered(system: System, curves: int, progress: object, **options: Any) -> None:
@@ -431,6 +470,7 @@ def bordered_chart(
     workers: int | None = None,
     scheduler: str | None = None,
     device: str = "cpu",
+    functions: Functions | None = None,
     progress: Progress = silent,
 ) -> xarray.DataTree:
     """`stability_chart` with the exact borders of its motions (Figs. 14, 15).
@@ -443,7 +483,7 @@ def bordered_chart(
         The largest number of curves that are followed on which motions end, see `with_borders`.
     horizontal, vertical, paths, max_period, starts, window, least, periods, tol, seed, rows
         As for `stability_chart`.
-    store, workers, scheduler, device
+    store, workers, scheduler, device, functions
         As for `stability_chart`.
     progress
         Called with the fraction done and what is being done, first when all arguments have been
@@ -488,6 +528,7 @@ def bordered_chart(
         workers=workers,
         scheduler=scheduler,
         device=device,
+        functions=functions,
         progress=part_of(progress, 0.0, 0.5),
     )
     rest = part_of(progress, 0.5, 1.0)
