@@ -126,6 +126,12 @@ def test_a_branch_of_cycles_is_kept_and_read_back(van_der_pol):
     assert saltus.orbits.defects(branch.orbits[:3]).max() < 1e-10
 
 
+def test_pages_of_cycles_branches_are_refused_in_a_sentence(belt, tmp_path):
+    branch = saltus.continue_orbit(belt, "model.belt_speed", (0.095, 0.105), step=0.5)
+    with pytest.raises(saltus.ParameterError, match="a page cannot show branches of cycles"):
+        saltus.page(belt.system, branch, path=tmp_path / "page.html", x=0.1)
+
+
 def test_what_is_no_cycle_is_refused_in_a_sentence():
     with pytest.raises(saltus.MotionError, match="comes to an equilibrium, which is no cycle"):
         saltus.find_orbit(System(model=VanDerPol(mu=-0.5)), x=0.5)

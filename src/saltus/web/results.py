@@ -161,6 +161,8 @@ def _branch(branch: Any) -> dict[str, Any]:
     evidence.
     """
     orbits = orbits_of(branch)
+    if orbits[0].signature.through:
+        raise ParameterError("a page cannot show branches of cycles without a load yet", "results")
     starts = [orbit.start() for orbit in orbits]
     coordinates = orbits[0].system.model.coordinates
     defects = branch["defect"].values if "defect" in branch.variables else [None] * len(orbits)
