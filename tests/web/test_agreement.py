@@ -427,6 +427,25 @@ def test_a_ramp_far_from_0_and_short_pushes_with_its_amplitude(tmp_path):
     np.testing.assert_allclose(speeds, expected, rtol=1e-12)
 
 
+def test_a_friction_without_force_has_no_events_on_a_page(tmp_path):
+    """It had slips and turns there, which Python's motion has not."""
+    load = Load(frequency=1.1, force=Harmonic(0.8))
+    system = System(model=saltus.BeltOscillator(kinetic=0.2, static=0.3), load=load)
+    idle = {"model.kinetic": 0.0, "model.static": 0.0}
+    wasm, description = page_parts(system)
+    motions = [
+        {"values": values, "start": {"x": 0.0, "x_velocity": 0.4}, "periods": 6, "at": AT}
+        for values in (idle, {})
+    ]
+    ((without, rubbed),) = in_node(
+        [{"wasm": wasm, "description": description, "motions": motions}], tmp_path
+    )
+    assert without["events"] == []
+    assert len(rubbed["events"]) > 5
+    motion = saltus.simulate(system.with_(idle), x=0.0, velocity=0.4, periods=6)
+    np.testing.assert_allclose(without["end"], [motion.position, motion.velocity], atol=1e-11)
+
+
 def test_motions_of_the_page_are_those_of_python(tmp_path):
     """Both kernels, and two systems of each kind."""
     counts, whole = check(1, 2, KINDS, tmp_path)

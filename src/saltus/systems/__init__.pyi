@@ -92,3 +92,4 @@ from .system_units import slowest_own_time as slowest_own_time
 from .system_units import time_without_period as time_without_period
 from .system_units import units_of_gaps as units_of_gaps
 from .without_force import inert_frictions as inert_frictions
+from .without_force import where_inert as where_inert

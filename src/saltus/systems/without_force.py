@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, SaltusError
 from saltus.systems.gap_places import has_no_force
-from saltus.systems.serial import replace
+from saltus.systems.serial import numbers, replace
 
 if TYPE_CHECKING:
     from saltus.systems.system import System
@@ -39,6 +39,35 @@ def inert_frictions(system: System, varied: Mapping[str, Iterable[float]]) -> tu
         moved = [_moved(system, path, value) for value in _values_of(system, path, varied[path])]
         inert = tuple(k for k in inert if all(other is not None and k in other for other in moved))
     return inert
+
+
+def where_inert(system: System) -> list[dict[str, list[str]]]:
+    """For each friction the paths of the numbers by which a page sees that it has no force.
+
+    It has none where one of `any` is 0, or all of `all` are. A friction that never has a force has
+    an empty list there, and one that always has a force has none.
+    """
+    frictions: Any = getattr(system.model, "frictions", ())
+    found: list[dict[str, list[str]]] = [{"any": []} for _ in frictions]
+    paths = [path for path, _ in numbers(system.model, "model")] if frictions else []
+    moving: list[list[str]] = [[] for _ in frictions]
+    for path in paths:
+        own = float(system.get(path))
+        for value in (0.0, own * (1.0 + MOVED) + MOVED):
+            try:
+                others = replace(system.model, {path.removeprefix("model."): value}).frictions
+            except SaltusError:
+                continue
+            for k, (one, other) in enumerate(zip(frictions, others, strict=True)):
+                if value == 0.0 and has_no_force(other):
+                    found[k]["any"].append(path)
+                if (one.kinetic, one.most) != (other.kinetic, other.most):
+                    moving[k].append(path)
+    for k, friction in enumerate(frictions):
+        found[k]["any"] = [path for path in found[k]["any"] if path in moving[k]]
+        if moving[k] or has_no_force(friction):
+            found[k]["all"] = list(dict.fromkeys(moving[k]))
+    return found
 
 
 def _check_left_out(system: System, varied: Mapping[str, Iterable[float]]) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from saltus.checks import LIMITS
 from saltus.errors import SaltusError
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoPress
 from saltus.flow.kernel import memory
 from saltus.flow.kernel.compiled import (
     HERE,
@@ -33,7 +33,7 @@ from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, 
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.kernel_state import natural_times
 from saltus.flow.motion.simulate import refusal
-from saltus.systems import System, Transient, children, substitute
+from saltus.systems import System, Transient, children, substitute, where_inert
 from saltus.taylor import (
     RECORD_WIDTH,
     Case,
@@ -212,6 +212,8 @@ class PortableMotion:
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
             "friction_coordinates": list(trace.friction_coordinates),
+            "where_inert": where_inert(self.system),
+            "inert": int(NoPress.INERT),
             "positions_at": before,
             "grounds_at": before + len(trace.signs),
             "contact_numbers": len(trace.contact_numbers),

@@ -19,6 +19,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  * @property {number} record_size @property {number} most_size @property {number} most_order @property {Argument[]} arguments @property {boolean} several
  * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} data @property {number[]} modes @property {number[]} signs
  * @property {number[]} contact_coordinates @property {number[]} friction_coordinates
+ * @property {{any: string[], all?: string[]}[]} where_inert @property {number} inert  By which numbers frictions have no force, and the mark of these.
  * @property {number} positions_at @property {number} grounds_at @property {number} contact_numbers
  * @property {{without_period: number|null, slow_time: number|null}} natural
  * @property {string[]} limits @property {import("./load_table.js").Records} records

@@ -139,15 +139,22 @@ export class Run {
       rows[i * width + SKIP] = gap === 0 ? 1n : 0n;
       if (gap === 0) engine.doubles(engine.address("state"), 2 * dof)[place] = positions[i] ?? 0;
     });
-    const { COORDINATE: OF = 0, SLIDES = 0 } = layout.FrictionColumn;
+    const { COORDINATE: OF = 0, SLIDES = 0, PRESSED = 0 } = layout.FrictionColumn;
     const grounds = this.system.geometry.subarray(layout.grounds_at);
     layout.friction_coordinates.forEach((place, i) => {
       const row = (i + layout.contact_coordinates.length) * width;
       rows[row + OF] = BigInt(place);
       rows[row + SLIDES] = BigInt(Math.sign((this.speeds[place] ?? 0) - (grounds[i] ?? 0)));
+      if (this.isInert(layout.where_inert[i])) rows[row + PRESSED] = BigInt(layout.inert);
     });
     engine.longs(engine.address("rows"), rows.length).set(rows);
     return { mode: layout.Mode.CONTACT ?? 0, side: 0, leave_by: 1 }; // no release is recorded at the start
+  }
+
+  /** Whether a friction has no force: Python's `inert_frictions`. @param {{any: string[], all?: string[]} | undefined} where */
+  isInert(where) {
+    const isZero = (/** @type {string} */ path) => this.system.values[path] === 0;
+    return where !== undefined && (where.any.some(isZero) || (where.all?.every(isZero) ?? false));
   }
 
   /** The gap of a contact and its rate at the start. @param {number} place @param {number} sign @param {number} position @param {string} contact */
