@@ -112,11 +112,15 @@ def test_a_model_of_ones_own_names_the_margin_that_ends_it_and_passes_others(tmp
     assert ends["model.restitution"] == (0.0, 1.0)
 
 
+def span_of(name):
+    """How long the motion of a class is: a forcing period, where there is one."""
+    return {"duration": 6.0} if system_of(name).load.period is None else {"periods": 1}
+
+
 @pytest.fixture(scope="module")
 def pages_of_all_classes(tmp_path_factory):
     tasks = [
-        (system_of(name), model_class(name).whole_start, {"periods": 1}, None)
-        for name in WITH_PAGES
+        (system_of(name), model_class(name).whole_start, span_of(name), None) for name in WITH_PAGES
     ]
     return dict(zip(WITH_PAGES, words(tasks, tmp_path_factory.mktemp("pages")), strict=True))
 
@@ -135,7 +139,7 @@ def test_sliders_are_the_numbers_of_the_system_within_what_it_takes(name, pages_
 
 @pytest.mark.parametrize("name", WITH_PAGES)
 def test_a_page_says_how_many_impacts_there_are(name, pages_of_all_classes):
-    motion = saltus.simulate(system_of(name), **model_class(name).whole_start, periods=1)
+    motion = saltus.simulate(system_of(name), **model_class(name).whole_start, **span_of(name))
     counted = sum(str(event.kind) == "impact" for event in motion.events)
     said = pages_of_all_classes[name]["summary"]
     assert said.startswith(f"{counted} impact{'' if counted == 1 else 's'} up to time ")
