@@ -58,9 +58,14 @@ def natural_time(system: System, length: float, run: Program) -> float:
     A frequency that acts on nothing is none, and one that is much slower than what moves by itself
     gives no scale.
     """
-    of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
-    time = min(of_load, longest_time(system, length, run))
-    return time if time < math.inf else 0.0
+
+    def found() -> float:
+        of_load = length / (2.0 * math.pi) if length > 0.0 else math.inf
+        time = min(of_load, longest_time(system, length, run))
+        return time if time < math.inf else 0.0
+
+    time: float = system._remembered((natural_time, length), found)
+    return time
 
 
 def longest_time(system: System, length: float = math.inf, run: Program | None = None) -> float:
