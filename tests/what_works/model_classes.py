@@ -127,6 +127,47 @@ class CurvedGround(saltus.ContactModel):
 
 @saltus.register
 @dataclass(frozen=True, kw_only=True)
+class RockingTable(saltus.ContactModel):
+    """A table on a shaken floor, with two feet that hit and rub: contacts of distances."""
+
+    friction: float = 0.3
+    damping: float = 0.1
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "tilt")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        Contact(name="left", distance="left"),
+        Contact(name="right", distance="right"),
+    )
+
+    @property
+    def frictions(self):
+        return tuple(
+            Friction(name=f"{side} foot", rate=f"{side}_slip", contact=side, kinetic=self.friction)
+            for side in ("left", "right")
+        )
+
+    def left(self, t, q, load):
+        return q[1] - 0.5 * np.sin(q[2]) - 0.8 * np.cos(q[2])
+
+    def right(self, t, q, load):
+        return q[1] + 0.5 * np.sin(q[2]) - 0.8 * np.cos(q[2])
+
+    def left_slip(self, t, q, velocity, load):
+        return velocity[0] + velocity[2] * (0.8 * np.cos(q[2]) + 0.5 * np.sin(q[2]))
+
+    def right_slip(self, t, q, velocity, load):
+        return velocity[0] + velocity[2] * (0.8 * np.cos(q[2]) - 0.5 * np.sin(q[2]))
+
+    def mass_matrix(self, q):
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.3]]
+
+    def force(self, t, q, velocity, load):
+        return load.force(t) - self.damping * velocity[0], -1.0, 0.0
+
+
+@saltus.register
+@dataclass(frozen=True, kw_only=True)
 class Harvester(saltus.ContactModel):
     """A mass before a stop with a voltage, which is a coordinate of first order."""
 
@@ -283,6 +324,10 @@ def _curved() -> System:
     return System(model=CurvedGround(), load=_pushed(0.5), impact=NewtonImpact(0.5))
 
 
+def _rocking_table() -> System:
+    return System(model=RockingTable(), load=_pushed(0.5), impact=NewtonImpact(0.3))
+
+
 def _harvester() -> System:
     return System(model=Harvester(), load=_pushed(), impact=NewtonImpact(0.6))
 
@@ -387,6 +432,12 @@ CLASSES = (
         "your own: a coordinate of first order",
         _harvester,
         {"x": 0.1, "voltage": 0.0},
+    ),
+    ModelClass(
+        "own, two feet that rub",
+        "your own: a contact of a `distance`",
+        _rocking_table,
+        {"x": 0.1, "y": 0.9, "tilt": 0.1},
     ),
 )
 NAMES = tuple(each.name for each in CLASSES)

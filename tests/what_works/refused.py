@@ -14,6 +14,24 @@ MANY = "lyapunov_many works on models with one coordinate"
 SWEEP = "a sweep needs a load with a frequency"
 DIAGRAM = "a diagram is not drawn for a load without a frequency"
 
+DISTANCES = "does not follow contacts of a distance"
+NOT_BESIDE_DISTANCES = (
+    "ensemble",
+    "its extrema",
+    "derivatives",
+    "orbit",
+    "branch",
+    "sweep",
+    "verdict",
+    "attractors",
+    "basins",
+    "diagram",
+    "exponents",
+    "of an ensemble",
+    "fit",
+    "energies",
+    "page",
+)
 SEVERAL_COORDINATES = (
     "smooth",
     "smooth, square wave",
@@ -40,6 +58,7 @@ REFUSED = {
     ("own, first order", "page"): FIRST_ORDER,
     ("belt, no load", "sweep"): SWEEP,
     ("belt, no load", "diagram"): DIAGRAM,
+    **{("own, two feet that rub", verb): DISTANCES for verb in NOT_BESIDE_DISTANCES},
 }
 REASONS = {
     SUMS: (
@@ -55,4 +74,5 @@ REASONS = {
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
     SWEEP: "A sweep needs a load with a frequency; `continue_orbit` follows a cycle without one.",
     DIAGRAM: "A diagram needs a load with a frequency; `continue_orbit` follows cycles without one.",
+    DISTANCES: "Contacts of a `distance` and frictions of a `rate` are followed by `simulate` so far.",
 }

@@ -20,7 +20,7 @@ from saltus.flow import EventKind, Motion, modes_of
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import result_dataset
-from saltus.systems import ContactModel, Load, System, mass_and_force
+from saltus.systems import ContactModel, Load, System, check_system, mass_and_force
 
 if TYPE_CHECKING:
     import xarray
@@ -280,6 +280,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     True
     """
     course = course_of(of, periods)
+    check_system(course.system, "energies", several_contacts=True)
     _refuse_moving_walls(course.system)
     parts = _parts(course)
     roles, names = zip(*parts, strict=True)

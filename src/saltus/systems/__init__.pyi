@@ -1,7 +1,10 @@
 from .contact_model import ContactModel as ContactModel
 from .contact_model import called_part as called_part
+from .contact_model import eliminated as eliminated
 from .contact_model import mass_and_force as mass_and_force
 from .contact_model import mass_rows as mass_rows
+from .contact_model import normal_forces as normal_forces
+from .contact_model import on_sides as on_sides
 from .contact_model import reactions as reactions
 from .contact_model import solved_motion as solved_motion
 from .contact_model import stick_margins as stick_margins
@@ -11,6 +14,7 @@ from .drawings import stops_of as stops_of
 from .driven import driven_displacement as driven_displacement
 from .driven import driven_displacements as driven_displacements
 from .gap_coordinates import fields_of as fields_of
+from .gap_places import CLOSED_BELOW as CLOSED_BELOW
 from .impact_laws import EnergyRestitution as EnergyRestitution
 from .impact_laws import ImpactLaw as ImpactLaw
 from .impact_laws import VelocityReduction as VelocityReduction

@@ -38,6 +38,9 @@ class Contact:
     may functions h(q) of the coordinates, which are methods of the model: a corner, or a wall that
     is curved.
 
+    Any other gap is a `distance`, a method of the model. A multiplier then holds it at 0, in the
+    model's own coordinates, so that several corners of one body may rub.
+
     Parameters
     ----------
     name
@@ -56,6 +59,9 @@ class Contact:
         (`transfer`).
     restitution
         e of the impacts that close it, in [0, 1]; by default that of the system's impact law.
+    distance
+        In place of a coordinate: the name of the model's method that gives the gap, as
+        `height(t, q, load)`.
 
     Examples
     --------
@@ -67,17 +73,20 @@ class Contact:
     """
 
     name: str
-    coordinate: Any
+    coordinate: Any = None
     sign: int = 1
     position: Number = 0.0
     group: str = ""
     restitution: Number | None = field(
         default=None, metadata=number_range(at_least=0.0, at_most=1.0)
     )
+    distance: str | None = None
 
     def __post_init__(self) -> None:
         if (
-            type(self.position) is float
+            self.distance is None
+            and self.coordinate is not None
+            and type(self.position) is float
             and -LIMITS.value <= self.position <= LIMITS.value
             and self.restitution is None
             and type(self.sign) is int
@@ -88,6 +97,7 @@ class Contact:
         ):
             return  # as nearly always; a model makes its contacts at each call
         _check_texts(self, "name", "group")
+        _check_function(self, "distance", sign=1, position=0.0)
         _check_sign(self)
         _check_numbers(self, "position")
         if self.restitution is not None:
@@ -99,7 +109,7 @@ class Contact:
         Parameters
         ----------
         position
-            The coordinate q.
+            The coordinate q, or the distance.
         """
         return self.sign * (position - self.position)
 
@@ -134,6 +144,9 @@ class Friction:
         The name of the contact whose reaction is N; by default N is given by the model.
     stribeck_speed
         v_s, above 0; by default mu = mu_k at all speeds.
+    rate
+        In place of a coordinate: the name of the model's method that gives the sliding speed, as
+        `slip(t, q, velocity, load)`, in which the velocities are linear.
 
     Examples
     --------
@@ -145,15 +158,17 @@ class Friction:
     """
 
     name: str
-    coordinate: Any
+    coordinate: Any = None
     kinetic: Number = field(metadata=number_range(at_least=0.0))
     static: Number | None = field(default=None, metadata=number_range(at_least="kinetic"))
     ground_speed: Number = 0.0
     contact: str | None = None
     stribeck_speed: Number | None = field(default=None, metadata=number_range(above=0.0))
+    rate: str | None = None
 
     def __post_init__(self) -> None:
         _check_texts(self, "name", *(() if self.contact is None else ("contact",)))
+        _check_function(self, "rate")
         _check_numbers(self, "kinetic", "ground_speed")
         if self.static is not None:
             _check_numbers(self, "static")
@@ -314,6 +329,28 @@ def _check_texts(part: Contact | Friction | Surface, *names: str) -> None:
             raise ParameterError(f"{name} of a {what} must be a text, got {shown(value)}", name)
 
 
+def _check_function(part: Contact | Friction, name: str, **usual: Any) -> None:
+    """Refuse a contact or friction with neither a coordinate nor a function, or with both, and a
+    function beside fields that only a coordinate has."""
+    function = getattr(part, name)
+    if (function is None) == (part.coordinate is None):
+        got = "neither" if function is None else "both"
+        raise ParameterError(
+            f"{called_part(part)} must have a coordinate, or the name of a method of the model as"
+            f" its {name}, got {got}",
+            name,
+        )
+    if function is None:
+        return
+    _check_texts(part, name)
+    for other, value in usual.items():
+        given = getattr(part, other)
+        if type(given) is not type(value) or given != value:
+            raise ParameterError(
+                f"{called_part(part)} has a {name}, which says all: leave its {other} out", other
+            )
+
+
 def _check_sign(part: Contact | Surface) -> None:
     """Refuse a sign that is none."""
     value = part.sign
@@ -332,6 +369,8 @@ def called_part(part: Contact | Friction | Surface) -> str:
 MOST_CONTACTS = np.iinfo(np.int64).bits
 # Which frictions stick, and which way the others slide, is found by trying 3^n choices at worst.
 MOST_FRICTIONS = 6
+# Which contacts of a distance close and act is found by trying 2^n choices.
+MOST_MULTIPLIERS = 8
 
 
 class ContactModel(Model):
@@ -402,7 +441,7 @@ class ContactModel(Model):
         """The limits at which its frictions end a motion: that of one in a contact only where M(q)
         depends on q, as it is else known from the start whether reactions are the only ones."""
         pressed = [friction for friction in self.frictions if friction.contact is not None]
-        if pressed:
+        if pressed and not self.has_multipliers:
             size = len(self.coordinates)
             # any numbers
             one, other = (
@@ -537,7 +576,7 @@ def solved_motion(
 
         D M a - h D g' l = D r,    h g D a + (1 - h) l = h b.
     """
-    load = _on_sides(model, load, slides)
+    load = on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
     late = _add_frictions(
         model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free)
@@ -553,21 +592,7 @@ def solved_motion(
             matrix[j][place] = 0.0 if is_zero(entry) else -matrix[place][j]
         matrix[place][place], right[place] = free[place], held * bend
     order = [*(i for i in range(size) if i not in late and i not in sums), *late, *sums]
-    for number, k in enumerate(order):
-        for i in order[number + 1 :]:
-            if is_zero(matrix[i][k]):
-                continue
-            factor = matrix[i][k] / matrix[k][k]
-            for j in order[number + 1 :]:
-                matrix[i][j] = matrix[i][j] - factor * matrix[k][j]
-            right[i] = right[i] - factor * right[k]
-    solved: list[Any] = [0.0] * size
-    for number, i in reversed([*enumerate(order)]):
-        value = right[i]
-        for j in order[number + 1 :]:
-            if not is_zero(matrix[i][j]):
-                value = value - matrix[i][j] * solved[j]
-        solved[i] = value / matrix[i][i]
+    solved = eliminated(matrix, right, order)
     along = {place: (1.0 - free[place]) * solved[place] for place in sums}
     rows = {
         i: [1.0 if j == i else 0.0 if is_zero(x) else -x for j, x in enumerate(row)]
@@ -576,6 +601,27 @@ def solved_motion(
     return SolvedMotion(
         [free[i] * force[i] if i in sums else x for i, x in enumerate(solved)], along, rows
     )
+
+
+def eliminated(matrix: list[list[Any]], right: list[Any], order: Sequence[int]) -> list[Any]:
+    """The solution of a linear system whose rows are eliminated in an order, without exchanges;
+    both arguments are changed."""
+    for number, k in enumerate(order):
+        for i in order[number + 1 :]:
+            if is_zero(matrix[i][k]):
+                continue
+            factor = matrix[i][k] / matrix[k][k]
+            for j in order[number + 1 :]:
+                matrix[i][j] = matrix[i][j] - factor * matrix[k][j]
+            right[i] = right[i] - factor * right[k]
+    solved: list[Any] = [0.0] * len(right)
+    for number, i in reversed([*enumerate(order)]):
+        value = right[i]
+        for j in order[number + 1 :]:
+            if not is_zero(matrix[i][j]):
+                value = value - matrix[i][j] * solved[j]
+        solved[i] = value / matrix[i][i]
+    return solved
 
 
 def dependent_sums(
@@ -642,7 +688,7 @@ def reactions(
     slides = (
         slides if len(slides) else [np.sign(-friction.ground_speed) for friction in model.frictions]
     )
-    lacking = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along))
+    lacking = _lacking(model, t, q, v, a, (on_sides(model, load, slides), along))
     names = model.coordinates
     found = [contact.sign * lacking[names.index(contact.coordinate)] for contact in model.contacts]
     for friction, normal, s in zip(
@@ -672,7 +718,7 @@ def stick_margins(
     """mu_s N - l and mu_s N + l of each friction, one after the other, with the force l = (M a -
     r)_i that makes it stick.
     """
-    lacking = _lacking(model, t, q, v, a, (_on_sides(model, load, slides), along))
+    lacking = _lacking(model, t, q, v, a, (on_sides(model, load, slides), along))
     margins = []
     for friction, normal in zip(
         model.frictions, _pressing(model, t, q, v, load, lacking), strict=True
@@ -760,7 +806,7 @@ def single_mass(mass: Any) -> Any:
     return mass
 
 
-def _on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
+def on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
     """The load together with the sides of surfaces, if these are given behind the directions of the
     frictions.
     """

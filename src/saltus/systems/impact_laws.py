@@ -416,6 +416,12 @@ def energy_gain(model: ContactModel, impact: ImpactLaw) -> dict[str, float]:
     >>> saltus.energy_gain(heavy, saltus.NewtonImpact(transfer=1.0))["upper"]  # the lower mass is heavier by that share
     0.7
     """
+    if model.has_multipliers:
+        raise ParameterError(
+            f"energy_gain is for contacts of coordinates so far, and {type(model).__name__} has a"
+            " contact of a distance or a friction of a rate",
+            "model",
+        )
     return {
         name: float(share)
         for name, share in energy_gains(in_gap_coordinates(model), impact).items()

@@ -172,6 +172,14 @@ class Model:
         return any(friction.contact is not None for friction in self.frictions)
 
     @property
+    def has_multipliers(self) -> bool:
+        """Whether a contact is a `distance`, or a friction's speed a `rate`, so that multipliers
+        hold its contacts and frictions in its own coordinates."""
+        return any(part.distance is not None for part in self.contacts) or any(
+            part.rate is not None for part in self.frictions
+        )
+
+    @property
     def friction_limits(self) -> tuple[str, ...]:
         """The limits at which its frictions end a motion."""
         return ()

@@ -18,6 +18,7 @@ from saltus.errors import ParameterError, SaltusError, shown
 from saltus.systems.contact_model import (
     MOST_CONTACTS,
     MOST_FRICTIONS,
+    MOST_MULTIPLIERS,
     Contact,
     ContactModel,
     Friction,
@@ -226,7 +227,13 @@ def _check_first_order(model: Model) -> None:
         *model.frictions,
         *model.surfaces,
     )
-    for part in parts:
+    if given and model.has_multipliers:
+        raise ParameterError(
+            f"{kind} has {given[0]}, of first order, beside a distance or a rate: models with these"
+            " have coordinates with velocities of their own so far",
+            "model",
+        )
+    for part in parts if given else ():
         terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
         held = [name for name in terms if name in getattr(model, "own_class", model).first_order]
         if held and not (isinstance(part, Surface) and len(terms) == 1):
@@ -367,6 +374,8 @@ def check_contact_model(model: ContactModel) -> bool:
         )
     rows = len(frictions) + len(model.surfaces)
     most = MOST_FRICTIONS if model.rubs_in_contacts else MOST_CONTACTS - 2 * rows
+    if model.has_multipliers:
+        most = min(most, MOST_MULTIPLIERS)
     given = (("frictions and surfaces", rows, MOST_FRICTIONS), ("contacts", len(contacts), most))
     for what, count, most in given:
         if count > most:
@@ -382,6 +391,9 @@ def check_contact_model(model: ContactModel) -> bool:
             "model",
         )
     for contact in parts:
+        if isinstance(contact, Contact) and contact.distance is not None:
+            _check_method(model, contact, contact.distance, DISTANCE)
+            continue
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
             known = ", ".join(model.coordinates)
             what = _named(contact)
@@ -392,6 +404,7 @@ def check_contact_model(model: ContactModel) -> bool:
         for b in contacts:
             if (
                 a is not b
+                and a.coordinate is not None
                 and a.coordinate == b.coordinate
                 and not (a.sign != b.sign and b.gap(a.position) > 0.0)
             ):
@@ -402,10 +415,56 @@ def check_contact_model(model: ContactModel) -> bool:
                 )
     _check_frictions(model)
     _check_mass(model)
+    if model.has_multipliers:
+        _check_surfaces(model)
+        return False
     sums = any(not isinstance(part.coordinate, str) for part in (*parts, *frictions))
     if model.rubs_in_contacts and not sums:
         check_paradox(model)
     return sums
+
+
+def _check_surfaces(model: ContactModel) -> None:
+    """Refuse surfaces of sums beside distances and rates."""
+    kind = type(model).__name__
+    for surface in model.surfaces:
+        if not isinstance(surface.coordinate, str):
+            raise ParameterError(
+                f"the surface {surface.name!r} of {kind} is of a sum: beside a distance or a rate"
+                " it must be of one coordinate so far",
+                "model",
+            )
+
+
+# The arguments of the methods that a contact's `distance` and a friction's `rate` name.
+DISTANCE = ("t", "q", "load")
+RATE = ("t", "q", "velocity", "load")
+
+
+def _check_method(model: ContactModel, part: Any, name: str, arguments: tuple[str, ...]) -> None:
+    """Refuse a distance or a rate that is no method of the model with its arguments, and one that
+    gives no number."""
+    kind = type(model).__name__
+    method = getattr(model, name, None)
+    takes_them = callable(method) and not hasattr(ContactModel, name)
+    try:
+        inspect.signature(method).bind(*arguments)  # type: ignore[arg-type]
+    except TypeError:
+        takes_them = False
+    if not takes_them:
+        raise ParameterError(
+            f"the {type(part).__name__.lower()} {part.name!r} needs a method"
+            f" {name}({', '.join(arguments)}) of {kind}",
+            "model",
+        )
+    size = len(model.coordinates)
+    t, q, v = PROBE
+    place, speed = (x if size == 1 else tuple(x / (1 + i) for i in range(size)) for x in (q, v))
+    load = DeclaredLoad(Load(frequency=1.0), model)
+    given = {"t": t, "q": place, "velocity": speed, "load": load}
+    found = _asked(model, name, *(given[each] for each in arguments))
+    if found is not None and _is_row(found):
+        raise ParameterError(f"{kind}.{name} must return a number, got {shown(found)}", "model")
 
 
 def _check_frictions(model: ContactModel) -> None:
@@ -420,15 +479,17 @@ def _check_frictions(model: ContactModel) -> None:
     along = [friction.coordinate for friction in placed]
     for friction in placed:
         where = f"the friction {friction.name!r} of {kind}"
-        if isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
+        if friction.coordinate is None:
+            _check_method(model, friction, str(friction.rate), RATE)
+        elif isinstance(friction.coordinate, str) and friction.coordinate not in model.coordinates:
             raise ParameterError(
                 f"{where} acts along {friction.coordinate!r}, which is none of "
                 f"{', '.join(model.coordinates)}",
                 "model",
             )
-        if not isinstance(friction.coordinate, str):
+        elif not isinstance(friction.coordinate, str):
             _check_sum(model, friction)
-        if friction.coordinate in taken:
+        if not model.has_multipliers and friction.coordinate in taken:
             raise ParameterError(
                 f"{where} and another one act along {friction.coordinate}: a coordinate can have "
                 f"one",
@@ -448,7 +509,7 @@ def _check_frictions(model: ContactModel) -> None:
                 "model",
             )
         for other in (c for c in model.contacts if c.name == friction.contact):
-            if other.coordinate in along:
+            if not model.has_multipliers and other.coordinate in along:
                 way = f"along whose coordinate {other.coordinate} a friction acts: take another one"
                 raise ParameterError(f"{where} is in the contact {other.name!r}, {way}", "model")
         if friction.stribeck_speed is not None and not float(friction.stribeck_speed) > 0.0:

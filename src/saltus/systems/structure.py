@@ -909,6 +909,10 @@ def _part(
     where = f"{field}.{part.name}"
     on = part.coordinate
     _check_name(part.name, where)
+    if on is None:
+        raise ParameterError(
+            f"{where}: a Structure has no methods of its own, so the part needs a coordinate", where
+        )
     if isinstance(on, str) and (on in points or on in names):
         coordinate = on
     elif isinstance(on, (str, int, np.integer)):

@@ -502,11 +502,13 @@ def check_system(
     coordinates: int | None = None,
     several_contacts: bool = False,
     sums: bool = True,
+    multipliers: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that
     `asking` is for.
 
-    Without `sums` each contact and surface must be of a single coordinate.
+    Without `sums` each contact and surface must be of a single coordinate; without `multipliers`
+    none may be a `distance`, and no friction a `rate`.
 
     Raises
     ------
@@ -516,6 +518,14 @@ def check_system(
     if not isinstance(system, System):
         raise ParameterError(
             f"{asking} takes a System(model=..., load=..., impact=...), got {shown(system)}",
+            "system",
+        )
+    if not multipliers and system.model.has_multipliers:
+        held = [part.name for part in system.model.contacts if part.distance is not None]
+        held += [part.name for part in system.model.frictions if part.rate is not None]
+        raise ParameterError(
+            f"{asking} does not follow contacts of a distance and frictions of a rate so far, and"
+            f" {type(system.model).__name__} has {', '.join(held)}; simulate does",
             "system",
         )
     if several_contacts and sums and coordinates is None:

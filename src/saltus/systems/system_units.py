@@ -309,6 +309,8 @@ def _places(model: Any, load: Any, instants: np.ndarray) -> Iterator[tuple[np.nd
 
 def _is_sum(part: Any, names: tuple[str, ...]) -> bool:
     """Whether a contact or a surface is of a sum of coordinates, and of ground displacements."""
+    if part.coordinate is None:
+        return False
     terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
     return any(name in names for name in terms) and all(
         name in names or name.startswith("ground") for name in terms

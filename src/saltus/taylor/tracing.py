@@ -18,6 +18,7 @@ from saltus.systems import (
     friction_margins,
     mass_rows,
     numbers,
+    on_sides,
     reactions,
     solved_motion,
     stick_margins,
@@ -49,6 +50,7 @@ from saltus.taylor.memory import (
     mode_block,
     without_modes,
 )
+from saltus.taylor.multipliers import held_motion
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -108,6 +110,10 @@ class Trace:
     reactions: list[Expr] = field(default_factory=list)
     mass: list[Expr] = field(default_factory=list)
     restitution: list[Expr] = field(default_factory=list)
+    # of contacts and frictions, behind them of surfaces, that multipliers hold: the entries and the
+    # drift of each, then the gaps
+    rows: list[Expr] = field(default_factory=list)
+    limits: dict[str, Expr] = field(default_factory=dict)  # margins of these frictions
     positions: list[Expr] = field(default_factory=list)
     # for each contact, the coordinates of first order after an impact on it
     jumps: list[Expr] = field(default_factory=list)
@@ -159,7 +165,7 @@ class Trace:
     @property
     def contact_numbers(self) -> list[Expr]:
         """The mass matrix, E, positions, jumps, coefficients of frictions in contacts, speeds of
-        grounds: what events need.
+        grounds, rows of multipliers: what events need.
         """
         return [
             *self.mass,
@@ -168,7 +174,23 @@ class Trace:
             *self.jumps,
             *self.coefficients,
             *self.ground_speeds,
+            *self.rows,
         ]
+
+    @property
+    def multipliers(self) -> int:
+        """How many rows multipliers may hold, of contacts and frictions; surfaces are among them."""
+        return len(self.signs) + len(self.friction_coordinates) if self.rows else 0
+
+    @property
+    def flags(self) -> int:
+        """How many leaves `free` there are: of coordinates, or of rows that multipliers hold."""
+        return self.multipliers or self.local
+
+    @property
+    def has_fixed_rows(self) -> bool:
+        """Whether the rows that multipliers hold do not change with the time at a fixed state."""
+        return all(self.time_derivative(root) is number(0.0) for root in self.rows)
 
     @property
     def local_rows(self) -> list[int]:
@@ -370,6 +392,8 @@ def _edges(model: Any, contact: Expr | None, coordinates: tuple[Expr, ...]) -> d
     if contact is not None:
         found["the contact"] = coordinates[0], contact
     for part in (*model.contacts, *model.surfaces) if model.holds_coordinates else ():
+        if not isinstance(part.coordinate, str):  # no coordinate has one value there
+            continue
         place = model.coordinates.index(part.coordinate)
         what = f"the {type(part).__name__.lower()} {part.name!r}"
         found[what] = coordinates[place], as_expr(part.position)
@@ -489,28 +513,37 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         [Expr(op, (), i) for i in range(n)]
         for op, n in (("acceleration", local), ("slide", len(parts)))
     )
-    found, along, sums = solved_motion(
-        model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides
-    )
-    holding = [
-        f
-        for forces in (reactions, stick_margins)
-        for f in forces(model, t, q, v, a, load, slides, along)
-    ]
-    result.reactions = [
-        combine("add", r, 0.0) for r in (*holding, *[1.0] * (2 * len(model.surfaces)))
-    ]
+    sums: dict[int, Any] = {}
+    if model.has_multipliers:
+        found, holding = _trace_multipliers(result, model, t, q, v, load)
+    else:
+        found, along, sums = solved_motion(
+            model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides
+        )
+        holding = [
+            f
+            for forces in (reactions, stick_margins)
+            for f in forces(model, t, q, v, a, load, slides, along)
+        ]
+        holding += [1.0] * (2 * len(model.surfaces))
+    result.reactions = [combine("add", r, 0.0) for r in holding]
     if model.rubs_in_contacts:
         given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
         result.coefficients = [combine("add", mu, 0.0) for mu in given]
         presses = {None: -1} | {contact.name: i for i, contact in enumerate(contacts)}
         result.friction_contacts = tuple(presses[getattr(part, "contact", None)] for part in parts)
     speeds = (
-        *(friction.ground_speed for friction in frictions),
+        # in a row the speed of the ground is part of the drift
+        *(0.0 if model.has_multipliers else friction.ground_speed for friction in frictions),
         *(surface.position for surface in model.surfaces),
     )
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
-    places = [model.coordinates.index(part.coordinate) for part in parts]
+    places = [
+        0
+        if model.has_multipliers and k < len(frictions)
+        else model.coordinates.index(part.coordinate)
+        for k, part in enumerate(parts)
+    ]
     result.friction_coordinates = tuple(
         p if k < len(frictions) else -1 - p for k, p in enumerate(places)
     )
@@ -535,7 +568,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     ]
     result.signs = tuple(contact.sign for contact in contacts)
     result.contact_coordinates = tuple(
-        model.coordinates.index(contact.coordinate) for contact in contacts
+        0 if model.has_multipliers else model.coordinates.index(contact.coordinate)
+        for contact in contacts
     )
     if local < result.dof:
         result.modes = mode_block(
@@ -543,6 +577,26 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         )
         found += [Expr("mode", (), i) for i in range(local, result.dof)]
     return found
+
+
+def _trace_multipliers(
+    result: Trace, model: Any, t: LoadTime, q: Any, v: Any, load: Any
+) -> tuple[list[Any], list[Any]]:
+    """Trace the accelerations of a model whose contacts and frictions are rows, and the series that
+    events need: reactions, margins of frictions, gaps, sliding speeds."""
+    surfaces = [number(0.0)] * len(model.surfaces)
+    slides = [Expr("slide", (), k) for k in range(len(model.frictions) + len(surfaces))]
+    held = held_motion(result, model, t, q, v, on_sides(model, load, slides))
+    result.limits = held.limits
+    rows = (*held.contacts, *held.frictions)
+    empty = [number(0.0)] * (result.dof + 1)
+    result.rows = [x for row in rows for x in (*row.entries, row.drift)]
+    result.rows += [x for _ in surfaces for x in empty]
+    result.rows += [row.value for row in held.contacts]
+    gaps = [row.value for row in held.contacts]
+    speeds = [row.value for row in held.frictions]
+    ones = [number(1.0)] * (2 * len(surfaces))
+    return held.accelerations, [*held.reactions, *held.margins, *ones, *gaps, *speeds, *surfaces]
 
 
 @comparing_symbols(refused=True)
@@ -559,7 +613,9 @@ def _trace_margins(
         if stop_at
         else {}
     )
-    if result.several and stop_at:
+    if result.rows:
+        margins |= result.limits
+    elif result.several and stop_at:
         free: list[Any] = [Expr("free", (), i) for i in range(result.local)] + [1.0] * (
             result.dof - result.local
         )

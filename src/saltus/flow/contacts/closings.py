@@ -46,6 +46,14 @@ from saltus.flow.contacts.frictions import (
     rubs_along,
     slides_so,
 )
+from saltus.flow.contacts.held_rows import (
+    all_idle_stay,
+    forget_idle,
+    mark_idle,
+    measure_slides,
+    onto,
+    some_idle,
+)
 from saltus.flow.contacts.impacts import (
     apply_impulses,
     bring_to_rest,
@@ -66,13 +74,17 @@ from saltus.flow.contacts.layout import (
     EQUAL_PUSH,
     LETS_GO,
     MOST_TRIED,
+    ROW_ROUNDING,
+    SAME_MOTION,
     TIED,
     ContactColumn,
     FrictionColumn,
     ImpactDetail,
     contact_position,
     copy_all,
+    restitution,
 )
+from saltus.flow.contacts.rows import gives, pull_of
 from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
 from saltus.flow.contacts.tangent import (
     closing_columns,
@@ -109,6 +121,9 @@ def violated(motion, candidates, zero):
     for i in range(count):
         if not candidates >> i & 1:
             continue
+        if motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1:
+            motion.contacts[i, ContactColumn.SKIP] = 0
+            continue  # see `all_idle_stay`
         known = motion.contacts[i, ContactColumn.RELEASED]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             k = leading(motion.margin_series[i], known, order, zero, press_of(motion, i), 0)
@@ -132,6 +147,8 @@ def set_choice(motion, candidates, still, number):
     `choose_slides`. False if a friction whose contact is open has a digit other than 0.
     """
     count = motion.contacts.shape[0]
+    if motion.multipliers > 0:
+        forget_idle(motion)
     for i in range(count):
         if candidates >> i & 1:
             motion.contacts[i, ContactColumn.CLOSED] = 1
@@ -166,6 +183,8 @@ def first_decide(motion, candidates, still, zero):
     that `violated` and `slides_so` read no later ones.
     """
     count = motion.contacts.shape[0]
+    if motion.multipliers > 0 and some_idle(motion):
+        return False
     for i in range(count):
         if candidates >> i & 1:
             first = abs(motion.margin_series[i, 0])
@@ -173,6 +192,8 @@ def first_decide(motion, candidates, still, zero):
             if motion.contacts[i, ContactColumn.CLOSED] == 0:
                 place = motion.contacts[i, ContactColumn.COORDINATE]
                 first = abs(motion.coordinate_series[place, 2])
+                if motion.multipliers > 0:
+                    first = abs(pull_of(motion, i))
                 size = motion.press
             if motion.contacts[i, ContactColumn.RELEASED] == 1 or not first > zero * size:
                 return False
@@ -184,6 +205,8 @@ def first_decide(motion, candidates, still, zero):
         reached = motion.frictions[k, FrictionColumn.REACHED]
         place = motion.frictions[k, FrictionColumn.COORDINATE]
         first = abs(motion.velocity_series[place, 1])
+        if motion.multipliers > 0:
+            first = abs(pull_of(motion, count + k))
         size = motion.press
         if slides == 0:
             first = min(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
@@ -204,12 +227,16 @@ def is_consistent(motion, candidates, still, held, t, zero):
     count = motion.contacts.shape[0]
     closed = candidates
     least = count + 1
+    if motion.multipliers > 0 and not mark_idle(motion, candidates, still):
+        return False
     for _ in range(count * count if count > MOST_TRIED else 1):
         hold_coordinates(motion)
         hold_frictions(motion)
         expand(motion, t, 1.0, FIRST_TERMS)
         if not first_decide(motion, candidates, still, zero):
             expand(motion, t, 1.0, motion.order)
+        if motion.multipliers > 0 and not all_idle_stay(motion):
+            return False
         wrong = violated(motion, candidates, zero)
         if not wrong:
             return slides_so(motion, count, still, held if motion.leave_by == 0 else 0)
@@ -233,6 +260,32 @@ def push_of(motion):
         for j in range(local - motion.first_order):
             total += a[i, 0] * motion.solver_numbers[local * i + j] * a[j, 0]
     return total
+
+
+@lean_jit
+def note_motion(motion):
+    """Note the accelerations of a choice, for `moves_alike`."""
+    if motion.multipliers > 0:
+        for i in range(motion.local):
+            motion.jump[i] = motion.acceleration_series[i, 0]
+
+
+@lean_jit
+def moves_alike(motion):
+    """Whether the accelerations are those noted, up to rounding."""
+    alike = 0.0
+    least = 0.0
+    for i in range(motion.local):
+        for j in range(motion.local):
+            mass = motion.solver_numbers[motion.local * i + j]
+            one = motion.acceleration_series[i, 0]
+            other = motion.acceleration_series[j, 0]
+            alike += (one - motion.jump[i]) * mass * (other - motion.jump[j])
+            least += one * mass * other + motion.jump[i] * mass * motion.jump[j]
+    # where nothing moves the accelerations are rounding of what presses
+    for i in range(motion.contacts.shape[0]):
+        least += motion.margin_series[i, 0] ** 2 * motion.mobilities[i]
+    return alike <= SAME_MOTION * least
 
 
 @lean_jit
@@ -315,7 +368,10 @@ def choose_closed(motion, candidates, still, held, t, zero):
                 continue
             if single:
                 return True
+            if best >= 0 and motion.multipliers > 0 and moves_alike(motion):
+                continue  # other reactions of the same motion
             push = push_of(motion)
+            note_motion(motion)
             several = several or best >= 0
             if best < 0 or push < least - EQUAL_PUSH * abs(least):
                 alike = False
@@ -339,6 +395,42 @@ def choose_closed(motion, candidates, still, held, t, zero):
 
 
 @lean_jit
+def slides_beside_idle(motion):
+    """Whether a contact is idle while a friction slides in a closed one, so that its force depends
+    on which of them carry."""
+    idle = False
+    slides = False
+    for i in range(motion.contacts.shape[0]):
+        idle = idle or motion.contacts[i, ContactColumn.IDLE] == 1
+    for k in range(motion.frictions.shape[0]):
+        pressed = motion.frictions[k, FrictionColumn.PRESSED] > 0
+        slides = slides or (pressed and abs(motion.frictions[k, FrictionColumn.SLIDES]) == 1)
+    return idle and slides
+
+
+@jit
+def is_undetermined(motion, candidates, still, held, t):
+    """Whether another choice, with reactions on other contacts, gives another motion than the one
+    that has just been made."""
+    if motion.multipliers == 0 or not slides_beside_idle(motion):
+        return False
+    contacts = motion.contacts.copy()
+    frictions = motion.frictions.copy()
+    note_motion(motion)
+    differs = False
+    for number in range(count_choices(motion, candidates, still)):
+        if not set_choice(motion, candidates, still, number):
+            continue
+        consistent = is_consistent(motion, candidates, still, held, t, ZERO)
+        differs = differs or (consistent and not moves_alike(motion))
+    for i in range(motion.contacts.shape[0]):
+        copy_all(contacts[i], motion.contacts[i])
+    for k in range(motion.frictions.shape[0]):
+        copy_all(frictions[k], motion.frictions[k])
+    return differs
+
+
+@lean_jit
 def note_ties(motion, candidates, t):
     """Note for all candidates whose reaction is 0 within rounding that it is known to be 0, as for
     a contact that is released.
@@ -349,6 +441,10 @@ def note_ties(motion, candidates, t):
     for i in range(motion.contacts.shape[0]):
         if candidates >> i & 1:
             motion.contacts[i, ContactColumn.CLOSED] = 1
+    if motion.multipliers > 0:
+        forget_idle(motion)
+        if not mark_idle(motion, candidates, 0):
+            return
     hold_coordinates(motion)
     expand(motion, t, 1.0, 2)
     for i in range(motion.contacts.shape[0]):
@@ -376,6 +472,8 @@ def block_of(motion, hit, backwards):
     grows = True
     block = 0
     fill_contact_matrices(motion)
+    if motion.multipliers > 0:
+        return block_of_rows(motion, hit, backwards)
     while not hit >> start & 1 or (backwards and start < count - 1 and hit >> start + 1):
         start += 1
     joined[motion.contacts[start, ContactColumn.COORDINATE]] = True
@@ -411,6 +509,46 @@ def block_of(motion, hit, backwards):
 
 
 @lean_jit
+def are_coupled(motion, i, j):
+    """Whether an impact on one of two contacts with rows changes the rate of the other's gap, or of
+    its friction."""
+    count = motion.contacts.shape[0]
+    if restitution(motion, i, j) != 0.0 or restitution(motion, j, i) != 0.0:
+        return True
+    for r in range(motion.multipliers):
+        for s in range(motion.multipliers):
+            one = r == i or (
+                r >= count and motion.frictions[r - count, FrictionColumn.PRESSED] == i + 1
+            )
+            other = s == j or (
+                s >= count and motion.frictions[s - count, FrictionColumn.PRESSED] == j + 1
+            )
+            size = math.sqrt(motion.mobilities[r] * motion.mobilities[s])
+            if one and other and abs(gives(motion, r, s)) > ROW_ROUNDING * size:
+                return True
+    return False
+
+
+@lean_jit
+def block_of_rows(motion, hit, backwards):
+    """`block_of` for contacts with rows."""
+    count = motion.contacts.shape[0]
+    start = 0
+    while not hit >> start & 1 or (backwards and start < count - 1 and hit >> start + 1):
+        start += 1
+    block = 1 << start
+    grows = True
+    while grows:
+        grows = False
+        for i in range(count):
+            for j in range(count):
+                if block >> i & 1 and not block >> j & 1 and are_coupled(motion, i, j):
+                    block |= 1 << j
+                    grows = True
+    return block
+
+
+@lean_jit
 def impact_of(motion, t, hit):
     """Apply the impact law to the contacts in `hit` and to those that are closed; an
     `ImpactDetail`, or -1 if it fails.
@@ -421,6 +559,9 @@ def impact_of(motion, t, hit):
     chosen = hit
     for i in range(count):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
+    if motion.multipliers > 0:
+        onto(motion, chosen, 0)
+        regular = fill_contact_matrices(motion)
     if motion.columns > 0:
         detail = int(closing_columns(motion, t, hit))
         note_velocities(motion, 0.0)
@@ -429,7 +570,7 @@ def impact_of(motion, t, hit):
         if hit >> i & 1:
             motion.rates[i] = min(motion.rates[i], 0.0)
         motion.gaps[i] = motion.rates[i]
-    rubs = is_pressed(motion)
+    rubs = is_pressed(motion) or motion.multipliers > 0
     solved = True
     acts = 0
     if not rubs:
@@ -447,6 +588,8 @@ def impact_of(motion, t, hit):
     for i in range(count):
         if chosen >> i & 1:
             settle_contact(motion, i, motion.rates[i])
+    if motion.multipliers > 0:
+        measure_slides(motion)
     if motion.columns > 0 and detail != ImpactDetail.NO_SPEED:
         if not rubs:
             note_velocities(motion, -1.0)
@@ -614,6 +757,8 @@ def rests_in_a_row(motion, t, near, end):
             fill_contact_matrices(motion)
             fill_rubbing(motion)
         bring_to_rest(motion, block)
+        if motion.multipliers > 0:
+            measure_slides(motion)
         if motion.columns > 0:
             rest_columns(motion, block)
         fill_after(motion)

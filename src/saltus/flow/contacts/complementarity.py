@@ -15,14 +15,17 @@ import numpy as np
 
 from saltus.flow.contacts.layout import (
     MOST_TRIED,
+    SPANNED,
     VIOLATED,
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
+    first_flag,
     ground_speed,
     restitution,
     rub_coefficient,
 )
+from saltus.flow.contacts.rows import gives, independence, rate_at
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -212,8 +215,14 @@ def push(motion, a, i):
     """The velocity that an impulse 1 of a contact, with that of its friction if this slides, gives
     to coordinate a.
     """
-    gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
     k = rub_of(motion, i)
+    if motion.multipliers > 0:
+        gain = motion.pushes[a, i]
+        if k >= 0:
+            slips = slip_sign(motion, k) * rub_coefficient(motion, k)
+            gain -= slips * motion.pushes[a, motion.contacts.shape[0] + k]
+        return gain
+    gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
     if k >= 0:
         slips = slip_sign(motion, k) * rub_coefficient(motion, k)
         gain -= slips * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
@@ -226,6 +235,9 @@ def fill_rubbing(motion):
     `COUPLING`: they slide on in their directions, or go on having the speed of the ground."""
     local = motion.local
     inverse = motion.inverse
+    if motion.multipliers > 0:
+        fill_rubbing_rows(motion)
+        return
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.PRESSED] > 0:
             c = motion.frictions[k, FrictionColumn.COORDINATE]
@@ -253,6 +265,58 @@ def fill_rubbing(motion):
 
 
 @lean_jit
+def fill_rubbing_rows(motion):
+    """`fill_rubbing` of frictions with rows: those at rest take what they stop from the pushes of
+    all others."""
+    local = motion.local
+    count = motion.contacts.shape[0]
+    for k in range(motion.frictions.shape[0]):
+        if motion.frictions[k, FrictionColumn.PRESSED] <= 0:
+            continue
+        rate = motion.slide_rates[k]
+        motion.frictions[k, FrictionColumn.STRUCK] = (
+            FrictionImpact.FORWARDS
+            if rate > 0.0
+            else FrictionImpact.BACKWARDS
+            if rate < 0.0
+            else FrictionImpact.STUCK
+        )
+        own = gives(motion, count + k, count + k)
+        if rate != 0.0 or not own > SPANNED * motion.mobilities[count + k]:
+            continue
+        for r in range(motion.multipliers):
+            share = gives(motion, count + k, r) / own if r != count + k else 0.0
+            for a in range(local):
+                motion.pushes[a, r] -= share * motion.pushes[a, count + k]
+        for a in range(local):
+            motion.pushes[a, count + k] = 0.0
+    for i in range(count):
+        for j in range(count):
+            motion.coupling[i, j] = pushed(motion, i, j)
+
+
+@lean_jit
+def pushed(motion, r, j):
+    """The rate that an impulse 1 of a contact, with that of its friction if this slides, gives to a
+    row."""
+    total = gives(motion, r, j)
+    k = rub_of(motion, j)
+    if k >= 0:
+        slips = slip_sign(motion, k) * rub_coefficient(motion, k)
+        total -= slips * gives(motion, r, motion.contacts.shape[0] + k)
+    return total
+
+
+@lean_jit
+def friction_rate(motion, k):
+    """The sliding speed of a friction, exactly 0 at rest."""
+    if motion.multipliers > 0:
+        return motion.slide_rates[k]
+    place = motion.frictions[k, FrictionColumn.COORDINATE]
+    return motion.velocities[place] - ground_speed(motion, k)
+
+
+@lean_jit
 def slides_on(motion, near):
     """Whether the frictions in the contacts in `near` will not change what they do while these
     contacts lose their speeds.
@@ -272,12 +336,18 @@ def slides_on(motion, near):
         if i >= 0 and near >> i & 1:
             c = motion.frictions[k, FrictionColumn.COORDINATE]
             mu = rub_coefficient(motion, k)
-            rate = abs(motion.velocities[c] - ground_speed(motion, k))
+            rate = abs(friction_rate(motion, k))
             across = motion.contacts[i, ContactColumn.COORDINATE]
-            if rate == 0.0:
-                on = on and abs(motion.inverse[c, across]) <= mu * motion.inverse[c, c]
+            if motion.multipliers > 0:
+                own = motion.mobilities[motion.contacts.shape[0] + k]
+                other = gives(motion, motion.contacts.shape[0] + k, i)
             else:
-                on = on and rate * motion.coupling[i, i] > mu * motion.inverse[c, c] * speed
+                own = motion.inverse[c, c]
+                other = motion.inverse[c, across]
+            if rate == 0.0:
+                on = on and abs(other) <= mu * own
+            else:
+                on = on and rate * motion.coupling[i, i] > mu * own * speed
     on = on or speed <= motion.tolerance
     if on and is_pressed(motion):
         fill_rubbing(motion)
@@ -308,16 +378,22 @@ def choose_ways(motion, chosen, acts, number):
 @lean_jit
 def fill_sticking(motion, row, a, acts, last):
     """Fill a row of `block` with what the impulses of the contacts in `acts`, then those of
-    sticking frictions, give to coordinate a; behind them comes `last`."""
+    sticking frictions, give to coordinate a, or to a row that a multiplier holds; behind them comes
+    `last`."""
     column = 0
     block = motion.block
+    in_rows = motion.multipliers > 0
     for j in range(motion.contacts.shape[0]):
         if acts >> j & 1:
-            block[row, column] = push(motion, a, j)
+            block[row, column] = pushed(motion, a, j) if in_rows else push(motion, a, j)
             column += 1
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-            block[row, column] = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+            if in_rows:
+                block[row, column] = gives(motion, a, motion.contacts.shape[0] + k)
+            else:
+                c = motion.frictions[k, FrictionColumn.COORDINATE]
+                block[row, column] = motion.inverse[a, c]
             column += 1
     block[row, column] = last
 
@@ -345,6 +421,9 @@ def struck_velocities(motion, acts, after):
     count = motion.contacts.shape[0]
     row = 0
     size = unknown_impulses(motion, acts)
+    in_rows = motion.multipliers > 0
+    if in_rows and independence(motion, acts, -1) <= SPANNED:
+        return False  # another choice stops the same by fewer
     for a in range(local):
         after[a] = motion.velocities[a]
         for j in range(count):
@@ -352,14 +431,20 @@ def struck_velocities(motion, acts, after):
                 push(motion, a, j) * motion.impulses[j] if motion.impulses[j] != 0.0 else 0.0
             )
     for i in range(count):
-        if acts >> i & 1:
+        if acts >> i & 1 and in_rows:
+            fill_sticking(motion, row, i, acts, -motion.right[i] - rate_at(motion, i, after))
+            row += 1
+        elif acts >> i & 1:
             a = motion.contacts[i, ContactColumn.COORDINATE]
             fill_sticking(motion, row, a, acts, -motion.signs[i] * motion.right[i] - after[a])
             row += 1
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
             a = motion.frictions[k, FrictionColumn.COORDINATE]
-            fill_sticking(motion, row, a, acts, ground_speed(motion, k) - after[a])
+            if in_rows:
+                fill_sticking(motion, row, count + k, acts, -rate_at(motion, count + k, after))
+            else:
+                fill_sticking(motion, row, a, acts, ground_speed(motion, k) - after[a])
             row += 1
     if not eliminate(motion.block, size, size + 1):
         return False
@@ -379,10 +464,11 @@ def add_unknown(motion, acts, after):
                 column += 1
         for k in range(motion.frictions.shape[0]):
             if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-                after[a] += (
-                    motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
-                    * motion.block[column, size]
-                )
+                if motion.multipliers > 0:
+                    gain = motion.pushes[a, motion.contacts.shape[0] + k]
+                else:
+                    gain = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+                after[a] += gain * motion.block[column, size]
                 column += 1
 
 
@@ -394,6 +480,7 @@ def worst_violation(motion, chosen, acts, after):
     count = motion.contacts.shape[0]
     size = unknown_impulses(motion, acts)
     column = 0
+    in_rows = motion.multipliers > 0
     for i in range(count):
         motion.tried[i] = motion.impulses[i]
         if acts >> i & 1:
@@ -401,23 +488,28 @@ def worst_violation(motion, chosen, acts, after):
             motion.tried[i] += motion.block[column, size]
             column += 1
         elif chosen >> i & 1:
-            worst = max(
-                worst,
-                -motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]]
-                - motion.right[i],
-            )
+            if in_rows:
+                rate = rate_at(motion, i, after)
+            else:
+                rate = motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]]
+            worst = max(worst, -rate - motion.right[i])
     for k in range(motion.frictions.shape[0]):
         way = motion.frictions[k, FrictionColumn.STRUCK]
         c = motion.frictions[k, FrictionColumn.COORDINATE]
+        own = motion.mobilities[count + k] if in_rows else motion.inverse[c, c]
         if way == FrictionImpact.STUCK:
             most = (
                 rub_coefficient(motion, k)
                 * motion.tried[motion.frictions[k, FrictionColumn.PRESSED] - 1]
             )
-            worst = max(worst, (abs(motion.block[column, size]) - most) * motion.inverse[c, c])
+            worst = max(worst, (abs(motion.block[column, size]) - most) * own)
             column += 1
         elif way != FrictionImpact.NOT:
-            worst = max(worst, -slip_sign(motion, k) * (after[c] - ground_speed(motion, k)))
+            if in_rows:
+                slides = rate_at(motion, count + k, after)
+            else:
+                slides = after[c] - ground_speed(motion, k)
+            worst = max(worst, -slip_sign(motion, k) * slides)
     return worst
 
 
@@ -426,5 +518,5 @@ def tell_instant(motion):
     """Tell the numbers of events, through `env`, the instant, which are functions of it where walls
     move.
     """
-    first = motion.parameters.size - motion.local - 2
+    first = first_flag(motion) - 2
     motion.parameters[first], motion.parameters[first + 1] = motion.time, motion.origin

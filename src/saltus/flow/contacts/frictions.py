@@ -14,17 +14,20 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 
 from __future__ import annotations
 
-from saltus.flow.contacts.complementarity import eliminate
-from saltus.flow.contacts.impacts import mobility, record_contact_event
+from saltus.flow.contacts.complementarity import eliminate, friction_rate
+from saltus.flow.contacts.held_rows import all_rows_stand, some_idle, stop_row
+from saltus.flow.contacts.impacts import friction_mobility, record_contact_event
 from saltus.flow.contacts.layout import (
     TOGETHER,
     ContactColumn,
     FrictionColumn,
     NoMargin,
     NoPress,
+    first_flag,
     ground_speed,
     is_sum,
 )
+from saltus.flow.contacts.rows import row_series
 from saltus.flow.contacts.tangent import note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
@@ -49,13 +52,18 @@ ALIKE = 1e-12
 def hold_frictions(motion):
     """Tell the model's functions, through `env`, in which direction each friction slides, and that
     sticking coordinates are not free."""
-    first = motion.parameters.size - motion.local
+    first = first_flag(motion)
     for k in range(motion.frictions.shape[0]):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         motion.parameters[first - 2 - motion.frictions.shape[0] + k] = (
             1.0 * slides if slides != 2 else 0.0
         )
-        if slides == 0:
+        if slides == 0 and motion.multipliers > 0:
+            idle = motion.frictions[k, FrictionColumn.IDLE]
+            motion.parameters[first - 2 - motion.frictions.shape[0] + k] = 2.0 * idle
+            if idle == 0:
+                motion.parameters[first + motion.contacts.shape[0] + k] = 0.0
+        elif slides == 0:
             motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 
 
@@ -151,6 +159,8 @@ def sliding_series(motion, k, direction, order, g):
     v = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
     if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
         v = motion.coordinate_series[motion.frictions[k, FrictionColumn.COORDINATE]]
+    elif motion.multipliers > 0:
+        v = motion.margin_series[row_series(motion, motion.contacts.shape[0] + k)]
     for i in range(order + 1):
         g[i] = direction * v[i]
     g[0] -= direction * ground_speed(motion, k)
@@ -159,7 +169,7 @@ def sliding_series(motion, k, direction, order, g):
 @lean_jit
 def margin_size(motion, k):
     """The natural size of a friction's margins."""
-    return motion.press / mobility(motion, motion.frictions[k, FrictionColumn.COORDINATE])
+    return motion.press / friction_mobility(motion, k)
 
 
 @lean_jit
@@ -251,6 +261,9 @@ def reach_ground_speed(motion, count, t, k, which, later):
         move_columns(motion, 1.0)
     if crossed:
         motion.coordinates[rest] = ground_speed(motion, k)
+    elif which == 2 and motion.multipliers > 0:
+        stop_row(motion, count + k)
+        motion.slide_rates[k] = 0.0
     elif which == 2:
         motion.velocities[rest] = ground_speed(motion, k)
     motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 4
@@ -276,14 +289,14 @@ def undecided(motion):
                 motion.frictions[k, FrictionColumn.SLIDES] *= -1
                 motion.frictions[k, FrictionColumn.SKIP] = 1
             continue
-        place = motion.frictions[k, FrictionColumn.COORDINATE]
-        rate = motion.velocities[place] - ground_speed(motion, k)
+        rate = friction_rate(motion, k)
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         if is_lifted(motion, k):
             motion.frictions[k, FrictionColumn.SLIDES] = 2
             motion.frictions[k, FrictionColumn.SKIP] = 0
         elif (
             turns
+            and motion.multipliers == 0  # else their rates are exactly 0 together
             and motion.frictions[k, FrictionColumn.REACHED] == 0
             and abs(slides) == 1
             and abs(rate) <= rounding_of_speed(motion, k)
@@ -303,6 +316,8 @@ def rounding_of_speed(motion, k):
     instant as another one.
     """
     speed = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
+    if motion.multipliers > 0:
+        speed = motion.margin_series[row_series(motion, motion.contacts.shape[0] + k)]
     unit = motion.period_length if motion.period_length > 0.0 else time_scale(motion)
     return TOGETHER * (abs(speed[0]) + abs(ground_speed(motion, k)) + abs(speed[1]) * unit)
 
@@ -333,13 +348,20 @@ def choose_slides(motion, still, choice):
         elif still >> k & 1:
             motion.frictions[k, FrictionColumn.SLIDES] = digit if digit < 2 else -1
         elif motion.frictions[k, FrictionColumn.SLIDES] == 2:
-            rate = motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] - ground_speed(
-                motion, k
-            )
+            rate = friction_rate(motion, k)
             motion.frictions[k, FrictionColumn.SLIDES] = (
                 1 if rate > 0.0 else -1 if rate < 0.0 else 0
             )
     return True
+
+
+@lean_jit
+def any_reached(motion):
+    """Whether the guard of any friction has just reached 0."""
+    found = False
+    for k in range(motion.frictions.shape[0]):
+        found = found or motion.frictions[k, FrictionColumn.REACHED] > 0
+    return found
 
 
 @lean_jit
@@ -349,6 +371,8 @@ def slides_so(motion, count, candidates, held):
     now, and let go at events of their own."""
     order = motion.order
     g = motion.gap_series
+    # at other reactions of the same motion others are at their limits at the same instant
+    shared = motion.multipliers > 0 and some_idle(motion) and any_reached(motion)
     for k in range(motion.frictions.shape[0]):
         if not candidates >> k & 1:
             continue
@@ -362,9 +386,10 @@ def slides_so(motion, count, candidates, held):
             size = margin_size(motion, k)
             for b in range(2):
                 row = motion.margin_series[count + 2 * k + b]
-                known = reached == 1 + b or (reached > 0 and abs(row[0]) <= ALIKE * size)
+                near = (reached > 0 or shared) and abs(row[0]) <= ALIKE * size
+                known = reached == 1 + b or near
                 i = leading(row, 1 if known else 0, order, ZERO, size, 0)
-                if reached == 0 and held >> k & 1 and abs(row[0]) <= ZERO * size:
+                if reached == 0 and not shared and held >> k & 1 and abs(row[0]) <= ZERO * size:
                     continue  # its own event is next if this margin falls
                 if i < order and row[i] < 0.0:
                     return False
@@ -493,7 +518,7 @@ def leans(motion, k):
     """Whether a closed contact holds the coordinate along which a friction acts, so that the
     friction carries what it can.
     """
-    found = False
+    found = motion.multipliers > 0 and motion.frictions[k, FrictionColumn.IDLE] != 0
     for i in range(motion.contacts.shape[0]):
         found = found or (motion.contacts[i, ContactColumn.CLOSED] == 1 and is_along(motion, k, i))
     return found
@@ -502,7 +527,7 @@ def leans(motion, k):
 @lean_jit
 def is_along(motion, k, i):
     """Whether a friction, no surface and not without force, acts along the coordinate of a contact."""
-    along = (
+    along = motion.multipliers == 0 and (
         motion.contacts[i, ContactColumn.COORDINATE]
         == motion.frictions[k, FrictionColumn.COORDINATE]
     )
@@ -532,6 +557,8 @@ def tear_loose(motion, i):
 def all_stand(motion):
     """Whether no coordinate moves: none is free, and all sticking ones do so on ground at rest. As
     many may be free as there are dependent sums."""
+    if motion.multipliers > 0:
+        return all_rows_stand(motion)
     local = motion.local
     free = 0
     moves = motion.local < motion.own

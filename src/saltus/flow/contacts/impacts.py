@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert, push, tell_instant
+from saltus.flow.contacts.held_rows import fill_rows, hold_rows, row_step
 from saltus.flow.contacts.layout import (
     EXCESS,
     FINISHED,
@@ -20,11 +21,14 @@ from saltus.flow.contacts.layout import (
     VANISHED,
     ContactColumn,
     FrictionColumn,
+    NoMargin,
     NoPress,
     contact_position,
+    first_flag,
     jumping,
     restitution,
 )
+from saltus.flow.contacts.rows import pull_of, row_series
 from saltus.flow.kernel.layout import EXACT, LEAST_LOSS, Mode
 from saltus.flow.kernel.steps import column_step, leaps, slow_share, step_size
 from saltus.taylor import lean_jit
@@ -35,7 +39,10 @@ from saltus.taylor import lean_jit
 @lean_jit
 def hold_coordinates(motion):
     """Tell the model's functions, through `env`, which coordinates are free."""
-    first = motion.parameters.size - motion.local
+    if motion.multipliers > 0:
+        hold_rows(motion)
+        return
+    first = first_flag(motion)
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     for i in range(motion.contacts.shape[0]):
@@ -55,6 +62,11 @@ def closed_bits(motion):
 @lean_jit
 def gap_series(motion, i, position, order, g):
     """The Taylor coefficients of a contact's gap."""
+    if motion.multipliers > 0:
+        series = motion.margin_series[row_series(motion, i)]
+        for k in range(order + 1):
+            g[k] = series[k]
+        return
     sign = motion.signs[i]
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     for k in range(order + 1):
@@ -90,7 +102,8 @@ def open_gap_series(motion, i, order, g):
     all of its digits where the position is far from 0.
     """
     gap_series(motion, i, 0.0, order, g)
-    g[0] = motion.open_gaps[i]
+    if motion.multipliers == 0:
+        g[0] = motion.open_gaps[i]
 
 
 @lean_jit
@@ -105,12 +118,15 @@ def contact_step_size(motion, t, target, size, with_columns):
         natural = min(natural, column_step(motion))
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for i in range(motion.contacts.shape[0]):
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        idle = motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1
+        if motion.contacts[i, ContactColumn.CLOSED] == 1 and not idle:
             r = motion.margin_series[i : i + 1]
             reaction = max(press_of(motion, i), abs(r[0, 0]))
             if reaction > 0.0:
                 natural = min(natural, step_size(r, order, reaction, sharp))
     terms = max(motion.press, motion.pull)
+    if motion.multipliers > 0:
+        natural = row_step(motion, natural)
     while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size, terms):
         natural = 0.5 * min(natural, target - t)
     return natural
@@ -120,6 +136,8 @@ def contact_step_size(motion, t, target, size, with_columns):
 def fill_contact_matrices(motion):
     """Fill `NUMBERS`, `INVERSE`, `COUPLING`, `GAPS` and `RATES` of `solver` at the present state;
     False if the mass matrix is singular."""
+    if motion.multipliers > 0:
+        return fill_rows(motion)
     count = motion.contacts.shape[0]
     signs = motion.signs
     tell_instant(motion)
@@ -289,11 +307,14 @@ def settle_contact(motion, i, rate):
     the rate after the impact.
     """
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
-    motion.coordinates[coordinate] = contact_position(motion, i)
-    motion.velocities[coordinate] = motion.signs[i] * rate + 0.0
-    for j in range(motion.contacts.shape[0]):
-        if motion.contacts[j, ContactColumn.COORDINATE] == coordinate:
-            measure_gap(motion, j)
+    if motion.multipliers > 0:  # a closed one is kept at 0 as all that is held
+        motion.contacts[i, ContactColumn.IDLE] = 0
+    else:
+        motion.coordinates[coordinate] = contact_position(motion, i)
+        motion.velocities[coordinate] = motion.signs[i] * rate + 0.0
+        for j in range(motion.contacts.shape[0]):
+            if motion.contacts[j, ContactColumn.COORDINATE] == coordinate:
+                measure_gap(motion, j)
     motion.contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
     motion.contacts[i, ContactColumn.SKIP] = 1
     motion.contacts[i, ContactColumn.RELEASED] = 0
@@ -534,6 +555,25 @@ def lost_share(motion, i):
 
 
 @lean_jit
+def contact_mobility(motion, i):
+    """The acceleration of a contact's gap by a force of 1 on it."""
+    if motion.multipliers > 0:
+        entry = motion.mobilities[i]
+        return entry if entry > 0.0 else 1.0
+    return mobility(motion, motion.contacts[i, ContactColumn.COORDINATE])
+
+
+@lean_jit
+def friction_mobility(motion, k):
+    """The acceleration along a friction or a surface by a force of 1 along it."""
+    row = motion.frictions[k]
+    if motion.multipliers > 0 and row[FrictionColumn.MARGIN] != NoMargin.SURFACE:
+        entry = motion.mobilities[motion.contacts.shape[0] + k]
+        return entry if entry > 0.0 else 1.0
+    return mobility(motion, row[FrictionColumn.COORDINATE])
+
+
+@lean_jit
 def mobility(motion, coordinate):
     """The acceleration of a coordinate by a force of 1 on it, which makes an acceleration of a
     reaction."""
@@ -544,18 +584,21 @@ def mobility(motion, coordinate):
 @lean_jit
 def press_of(motion, i):
     """The natural size of a contact's reaction."""
-    return motion.press / mobility(motion, motion.contacts[i, ContactColumn.COORDINATE])
+    return motion.press / contact_mobility(motion, i)
 
 
 @lean_jit
 def note_press(motion):
     """Note what presses on contacts at the start of a step, for the natural scales."""
     for i in range(motion.contacts.shape[0]):
-        coordinate = motion.contacts[i, ContactColumn.COORDINATE]
-        press = abs(motion.acceleration_series[coordinate, 0])
+        if motion.multipliers > 0:
+            press = abs(pull_of(motion, i))
+        else:
+            coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+            press = abs(motion.acceleration_series[coordinate, 0])
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             reaction = abs(motion.margin_series[i, 0])
-            press = max(press, reaction * mobility(motion, coordinate))
+            press = max(press, reaction * contact_mobility(motion, i))
         motion.press = max(motion.press, press)
 
 
@@ -566,13 +609,19 @@ def note_rubs(motion):
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
             continue
-        coordinate = motion.frictions[k, FrictionColumn.COORDINATE]
-        press = abs(motion.acceleration_series[coordinate, 0])
-        motion.swiftest = max(motion.swiftest, abs(motion.velocities[coordinate]))
+        surface = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
+        if motion.multipliers > 0 and not surface:
+            press = abs(pull_of(motion, motion.contacts.shape[0] + k))
+            speed = abs(motion.slide_rates[k])
+        else:
+            coordinate = motion.frictions[k, FrictionColumn.COORDINATE]
+            press = abs(motion.acceleration_series[coordinate, 0])
+            speed = abs(motion.velocities[coordinate])
+        motion.swiftest = max(motion.swiftest, speed)
         if motion.frictions[k, FrictionColumn.SLIDES] == 0:
             row = motion.contacts.shape[0] + 2 * k
             margin = max(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
-            press = max(press, margin * mobility(motion, coordinate))
+            press = max(press, margin * friction_mobility(motion, k))
         motion.press = max(motion.press, press)
 
 

@@ -25,6 +25,7 @@ from saltus.flow.contacts.closings import (
     block_of,
     choose_closed,
     contact_impact,
+    is_undetermined,
     note_ties,
     rests_in_a_row,
 )
@@ -44,6 +45,13 @@ from saltus.flow.contacts.frictions import (
     sticking,
     tear_loose,
     undecided,
+)
+from saltus.flow.contacts.held_rows import (
+    away_in_rows,
+    end_in_rows,
+    measure_slides,
+    note_terms,
+    onto_rows,
 )
 from saltus.flow.contacts.impacts import (
     closed_bits,
@@ -72,9 +80,11 @@ from saltus.flow.contacts.layout import (
     TRIED_AGAIN,
     ContactColumn,
     FrictionColumn,
+    FrictionImpact,
     NoMargin,
     NoPress,
     contact_position,
+    first_flag,
     ground_speed,
     solver_arrays,
 )
@@ -85,6 +95,7 @@ from saltus.flow.contacts.propagators import (
     columns_from_modes,
     input_step,
 )
+from saltus.flow.contacts.rows import has_speed, largest_pull, limits_begin, row_series
 from saltus.flow.contacts.rubbing import (
     free_pulls,
     frozen_limit,
@@ -100,7 +111,7 @@ from saltus.flow.contacts.tangent import (
     release_columns,
     start_columns,
 )
-from saltus.flow.kernel.layout import ZERO, EventCode, Mode, Status
+from saltus.flow.kernel.layout import PENETRATED, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts
 from saltus.flow.kernel.roots import (
     NEVER,
@@ -215,7 +226,7 @@ def decide_columns(motion, t):
     if motion.columns == 0:
         return
     if motion.leave_by == 1:
-        first = motion.parameters.size - motion.local
+        first = first_flag(motion)
         for i in range(first, motion.parameters.size):
             motion.parameters[i] = 1.0
         start_columns(motion, t, closed_bits(motion))
@@ -271,8 +282,11 @@ def choose_all(motion, candidates, still, held, t):
 def first_press(motion, t):
     """Begin the natural size of what presses, from the accelerations without contacts and their
     first derivatives in the natural time of the load."""
-    first = motion.parameters.size - motion.local
     span = motion.natural_time
+    if motion.multipliers > 0:
+        first_row_press(motion, t, span)
+        return
+    first = first_flag(motion)
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
@@ -288,6 +302,20 @@ def first_press(motion, t):
         a = motion.acceleration_series[place]
         size = max(abs(a[0]), abs(a[1]) * span, 2.0 * abs(a[2]) * span * span)
         motion.press = max(motion.press, size)
+    hold_coordinates(motion)
+    hold_frictions(motion)
+
+
+@lean_jit
+def first_row_press(motion, t, span):
+    """`first_press` where contacts and frictions are rows."""
+    first = first_flag(motion)
+    for r in range(motion.multipliers):
+        motion.parameters[first + r] = 1.0
+    expand(motion, t, 1.0, 4)
+    for r in range(motion.multipliers):
+        if r < motion.contacts.shape[0] or has_speed(motion, r - motion.contacts.shape[0]):
+            motion.press = max(motion.press, largest_pull(motion, r, span))
     hold_coordinates(motion)
     hold_frictions(motion)
 
@@ -322,6 +350,8 @@ def decide_contacts(motion):
     held = sticking(motion, before)
     if not choose_all(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
+    if is_undetermined(motion, candidates, still, held, t):
+        return Status.NOT_UNIQUE
     hold_coordinates(motion)
     hold_frictions(motion)
     opened = candidates & ~closed_bits(motion)
@@ -335,6 +365,10 @@ def decide_contacts(motion):
                     note_shifts(motion, motion.shifts)
     if motion.leave_by == 0:
         record_slides(motion, before, t)
+    if motion.multipliers > 0:
+        for k in range(motion.frictions.shape[0]):
+            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+        onto_rows(motion)
     decide_columns(motion, t)
     motion.leave_by = 0
     motion.rested = 1 if all_stand(motion) else 0
@@ -376,6 +410,8 @@ def first_guard(motion, h, whole):
     for i in range(count):
         skip = motion.contacts[i, ContactColumn.SKIP]
         guard = motion.gap_series
+        if motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1:
+            continue
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
             guard = motion.margin_series[i]
             if skip == 0 and guard[0] < -ZERO * press_of(motion, i):
@@ -458,7 +494,7 @@ def short_order(motion, t):
     accumulations are so close.
     """
     order = motion.order
-    if motion.contacts.shape[0] == 0:
+    if motion.contacts.shape[0] == 0 or motion.multipliers > 0:
         return order
     flight = np.inf
     fast = FAST_IMPACT * natural_speed(motion)
@@ -520,8 +556,7 @@ def seek_event(motion, t, target):
     hit, rubs, first = earlier_guard(motion, h, hit, rubs, first)
     limit = -1
     first_limit = NEVER
-    held = count + 2 * motion.frictions.shape[0]
-    for j in range(held, margins):
+    for j in range(limits_begin(motion), margins):
         u = margin_root(motion.margin_series[j], order, h, motion.polynomial)
         if u < first_limit:
             limit = j
@@ -539,7 +574,7 @@ def seek_event(motion, t, target):
 def keep_gaps(motion, tau):
     """Take the gaps of open contacts that are not at 0 to `tau` within the step."""
     g = motion.gap_series
-    for i in range(motion.contacts.shape[0]):
+    for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
         if contact_position(motion, i) != 0.0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
             open_gap_series(motion, i, motion.order, g)
             motion.open_gaps[i] = horner(g, motion.order, tau)
@@ -548,7 +583,7 @@ def keep_gaps(motion, tau):
 @lean_jit
 def measure_gaps(motion):
     """Set the gaps of contacts that are closed, or at 0, and keep those of the others."""
-    for i in range(motion.contacts.shape[0]):
+    for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
         if contact_position(motion, i) == 0.0 or motion.contacts[i, ContactColumn.CLOSED] == 1:
             measure_gap(motion, i)
         else:
@@ -560,7 +595,15 @@ def note_hit(motion, bits, tau):
     """Note the speeds and the accelerations of the contacts in `bits`, which close at `tau`, for the
     natural scales."""
     for i in range(motion.contacts.shape[0]):
-        if bits >> i & 1:
+        if bits >> i & 1 and motion.multipliers > 0:
+            series = motion.margin_series[row_series(motion, i)]
+            speed = 0.0
+            pull = 0.0
+            for k in range(motion.order, 0, -1):
+                pull = pull * tau + speed
+                speed = speed * tau + k * series[k]
+            note_impact(motion, speed, pull)
+        elif bits >> i & 1:
             place = motion.contacts[i, ContactColumn.COORDINATE]
             speed, pull = value_and_slope(motion.velocity_series[place], motion.order, tau)
             note_impact(motion, speed, pull)
@@ -578,6 +621,8 @@ def passes(motion, bits, rubs, tau):
         place = 0
         position = 0.0
         gap = 0.0
+        if k < 0 and motion.multipliers > 0:
+            continue
         if k < 0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
             place = motion.contacts[i, ContactColumn.COORDINATE]
             position = contact_position(motion, i)
@@ -601,7 +646,7 @@ def contact_arc(motion, target):
     order = motion.order
     t = motion.time
     count = motion.contacts.shape[0]
-    held = count + 2 * motion.frictions.shape[0]
+    held = limits_begin(motion)
     motion.order = short_order(motion, t)
     h, natural, hit, rubs, limit, which, first = seek_event(motion, t, target)
     if motion.order < order and hit < 0:  # the impact does not come as soon as it seemed
@@ -622,6 +667,10 @@ def contact_arc(motion, target):
         settle(motion)
     measure_gaps(motion)
     passed = passes(motion, bits, rubs if which == 2 else -1, tau)
+    if motion.multipliers > 0 and finite:
+        motion.time = t + tau
+        finite = end_in_rows(motion, tau)
+        passed = passed or away_in_rows(motion, bits, tau, PENETRATED + 10.0 * motion.tolerance)
     for i in range(motion.dof):
         for k in range(motion.order + 2, order + 2):
             motion.coordinate_series[i, k] = 0.0
@@ -668,7 +717,10 @@ def contact_arc(motion, target):
 def begin(motion):
     """Fill the memory that depends on the contacts and on the state."""
     fill_contact_matrices(motion)
-    for i in range(motion.contacts.shape[0]):
+    if motion.multipliers > 0:
+        note_terms(motion)
+        measure_slides(motion)
+    for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
         excess = motion.contacts[i, ContactColumn.EXCESS]
         measure_gap(motion, i)
         if excess != 0:
@@ -725,7 +777,14 @@ def parts_of(numbers, state, env, functions, rows, buffers):
     steps = step_arrays(numbers)
     contacts = rows[:count]
     frictions = rows[count:]
-    solver = solver_arrays(numbers.local, count, numbers.columns, frictions, numbers.first_order)
+    solver = solver_arrays(
+        numbers.local,
+        count,
+        numbers.columns,
+        frictions.shape[0],
+        numbers.contact_numbers,
+        numbers.multipliers,
+    )
     modes = mode_arrays(numbers, functions.eigenmodes)
     return ContactsParts(
         state, env, env[0], env[2], functions, contacts, frictions, steps, modes, solver, *buffers

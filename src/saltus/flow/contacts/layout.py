@@ -24,6 +24,8 @@ class ContactColumn(IntEnum):
     # of an open contact, between two calls of the kernel: what its gap has more than the difference
     # of its coordinate and its position, in units of EXCESS times the position
     EXCESS = 5
+    # of a closed contact whose row follows from others that are held: 1, and it carries nothing
+    IDLE = 6
 
 
 class FrictionColumn(IntEnum):
@@ -46,6 +48,9 @@ class FrictionColumn(IntEnum):
     # 1 plus the number of the contact whose reaction presses it, 0 for none; or a `NoPress`
     PRESSED = 5
     STRUCK = 6  # a `FrictionImpact`
+    # of a sticking friction whose row follows from others that are held: +1 or -1, the direction of
+    # its static limit, which it carries; else 0
+    IDLE = 7
 
 
 class FrictionImpact(IntEnum):
@@ -164,6 +169,16 @@ FINISHED = 1e-14
 # would keep the other one going.
 # If n impacts were followed ahead in vain, n / 32 impacts must happen before it is tried again.
 TRIED_AGAIN = 32
+# A rate of a row that is a smaller share of the terms of its sum is rounding.
+ROW_ROUNDING = 2.0**-44
+# A row follows from others if the square of the sine of its angle to them is at most this.
+SPANNED = 1e-13
+# Two choices move alike if the square of their difference, in the metric of M, is a smaller share.
+SAME_MOTION = 1e-20
+# Two impacts are alike if the square of the difference of their velocities is a smaller share.
+SAME_IMPACT = 1e-18
+# An idle row is kept at 0 if its acceleration is smaller, in units of the largest one so far.
+PULLED = 1e-9
 # Reactions smaller than this vanish together, in units of the largest one so far: the rounding of
 # the loads that hold the contacts.
 TIED = 1e-12
@@ -188,16 +203,13 @@ def rows_of_zeros(rows, columns):
 
 
 @jit
-def solver_arrays(local, count, columns, frictions, first_order):
-    """The arrays in which impacts are solved for, for so many columns of a tangent and with the
-    rows of frictions.
+def solver_arrays(local, count, columns, frictions, numbers, multipliers):
+    """The arrays in which impacts are solved for, for so many columns of a tangent, frictions,
+    numbers that `matrices` fills, and rows that multipliers hold.
     """
-    rubs = 0
-    rows = count + frictions.shape[0]
-    for k in range(frictions.shape[0]):
-        rubs = 1 + frictions.shape[0] if frictions[k, FrictionColumn.PRESSED] > 0 else rubs
+    rows = count + frictions
     most = max(2 * local, rows + 1)
-    numbers = local * local + count * count + count * (1 + first_order) + rubs + frictions.shape[0]
+    of_rows = rows_of_zeros(local + 3, multipliers)
     # one piece of memory, as lanes ask for it at every slow impact
     of_contacts = rows_of_zeros(2 * count + 10, count)
     return SolverArrays(
@@ -220,6 +232,10 @@ def solver_arrays(local, count, columns, frictions, first_order):
         zeros(local),
         zeros(columns),
         rows_of_zeros(columns, count),
+        of_rows[:local],
+        of_rows[local],
+        of_rows[local + 1],
+        of_rows[local + 2],
     )
 
 
@@ -270,20 +286,34 @@ def jumping(motion, i):
 
 
 @lean_jit
+def first_row(motion):
+    """The place in `solver_numbers` of the rows that multipliers hold: their end where none are."""
+    size = motion.solver_numbers.size
+    if motion.multipliers == 0:
+        return size
+    return size - motion.multipliers * (motion.local + 1) - motion.contacts.shape[0]
+
+
+@lean_jit
 def ground_speed(motion, k):
-    """The speed of a friction's ground."""
-    return motion.solver_numbers[motion.solver_numbers.size - motion.frictions.shape[0] + k]
+    """The speed of a friction's ground, in a row 0; the position of a surface."""
+    return motion.solver_numbers[first_row(motion) - motion.frictions.shape[0] + k]
 
 
 @lean_jit
 def has_phases(motion):
     """Whether impacts with friction have a phase of compression and one of expansion."""
-    return (
-        motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] - 1] > 0.0
-    )
+    return motion.solver_numbers[first_row(motion) - 2 * motion.frictions.shape[0] - 1] > 0.0
 
 
 @lean_jit
 def rub_coefficient(motion, k):
     """The coefficient of a friction in a contact, at impacts."""
-    return motion.solver_numbers[motion.solver_numbers.size - 2 * motion.frictions.shape[0] + k]
+    return motion.solver_numbers[first_row(motion) - 2 * motion.frictions.shape[0] + k]
+
+
+@lean_jit
+def first_flag(motion):
+    """The place in the parameters of the numbers that say what is free: coordinates, or rows that
+    multipliers hold."""
+    return motion.parameters.size - (motion.multipliers if motion.multipliers > 0 else motion.local)

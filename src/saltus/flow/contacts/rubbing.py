@@ -16,6 +16,7 @@ from saltus.flow.contacts.complementarity import (
     choose_ways,
     eliminate,
     fill_sticking,
+    friction_rate,
     invert,
     is_pressed,
     push,
@@ -28,16 +29,20 @@ from saltus.flow.contacts.complementarity import (
 from saltus.flow.contacts.frictions import rubs_along
 from saltus.flow.contacts.impacts import hold_coordinates, time_to_close
 from saltus.flow.contacts.layout import (
+    SAME_IMPACT,
+    SPANNED,
     VIOLATED,
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
+    first_flag,
     ground_speed,
     has_phases,
     restitution,
     rub_coefficient,
     zeros,
 )
+from saltus.flow.contacts.rows import gives, independence, row_series, told_rate
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     hold_columns,
@@ -50,6 +55,29 @@ from saltus.flow.kernel.steps import change_rate, expand, piece_end
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
+
+
+@lean_jit
+def depends_on_choice(motion, chosen):
+    """Whether the contacts in `chosen`, of which one has a friction, depend on one another, so that
+    the impulses may not be the only ones."""
+    for k in range(motion.frictions.shape[0]):
+        motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+    return is_pressed(motion) and independence(motion, chosen, -1) <= SPANNED
+
+
+@lean_jit
+def differs_by_choice(motion, one, other):
+    """Whether velocities differ by more than rounding, in the metric of M."""
+    apart = 0.0
+    size = 0.0
+    for a in range(motion.local):
+        for b in range(motion.local):
+            mass = motion.solver_numbers[motion.local * a + b]
+            apart += (one[a] - other[a]) * mass * (one[b] - other[b])
+            size += motion.velocities[a] * mass * motion.velocities[b]
+            size += one[a] * mass * one[b]
+    return apart > SAME_IMPACT * size
 
 
 @jit
@@ -71,6 +99,9 @@ def rubbing_phase(motion, chosen, scale):
     found = -1
     ways = 0
     least = np.inf
+    shared = motion.multipliers > 0 and depends_on_choice(motion, chosen)
+    one = np.zeros(local if shared else 0)
+    compares = False
     for number in range((1 << count) * 3**frictions):
         acts = number & ((1 << count) - 1)
         if acts & ~chosen or not choose_ways(motion, chosen, acts, number >> count):
@@ -81,7 +112,13 @@ def rubbing_phase(motion, chosen, scale):
                 found = acts
                 ways = number >> count
                 least = worst
-            if worst <= 0.0:
+            if shared and worst <= VIOLATED * scale:
+                if compares and differs_by_choice(motion, one, after):
+                    return -1  # rigid bodies do not determine it
+                for a in range(local):
+                    one[a] = after[a]
+                compares = True
+            if worst <= 0.0 and not shared:
                 break
     if not least <= VIOLATED * scale:
         return -1
@@ -92,11 +129,11 @@ def rubbing_phase(motion, chosen, scale):
         motion.velocities[a] = after[a]
     for i in range(count):
         motion.impulses[i] = max(motion.tried[i], 0.0)
-        if found >> i & 1:
+        if found >> i & 1 and motion.multipliers == 0:
             motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] = (
                 -motion.signs[i] * motion.right[i] + 0.0
             )
-    for k in range(frictions):
+    for k in range(frictions if motion.multipliers == 0 else 0):
         if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
             motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] = ground_speed(
                 motion, k
@@ -119,13 +156,7 @@ def begin_rubbing(motion, chosen):
                 restitution(motion, i, j) * motion.rates[j] if chosen >> j & 1 else 0.0
             )
     for k in range(motion.frictions.shape[0]):
-        scale = max(
-            scale,
-            abs(
-                motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]]
-                - ground_speed(motion, k)
-            ),
-        )
+        scale = max(scale, abs(friction_rate(motion, k)))
     return scale
 
 
@@ -139,7 +170,11 @@ def has_one_impulse(motion, chosen):
         if i >= 0 and chosen >> i & 1:
             a = motion.contacts[i, ContactColumn.COORDINATE]
             c = motion.frictions[k, FrictionColumn.COORDINATE]
-            if not motion.inverse[a, a] > rub_coefficient(motion, k) * abs(motion.inverse[a, c]):
+            if motion.multipliers > 0:
+                across = abs(gives(motion, i, motion.contacts.shape[0] + k))
+                if not motion.mobilities[i] > rub_coefficient(motion, k) * across:
+                    return False
+            elif not motion.inverse[a, a] > rub_coefficient(motion, k) * abs(motion.inverse[a, c]):
                 return False
     return True
 
@@ -178,7 +213,10 @@ def rubbing_impact(motion, chosen, slopes):
             note_velocities(motion, 0.0)
     for i in range(count):
         motion.impulses[i] += total[i]
-        rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
+        if motion.multipliers > 0:
+            rate = told_rate(motion, i)
+        else:
+            rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
         motion.rates[i] = (
             -motion.right[i] + 0.0 if acts >> i & 1 else max(rate, 0.0) if chosen >> i & 1 else rate
         )
@@ -287,7 +325,10 @@ def free_pulls(motion, t):
     """Fill the second derivatives of the gaps with all contacts open, and in `falling_pulls` the
     relative rates at which they change.
     """
-    first = motion.parameters.size - motion.local
+    if motion.multipliers > 0:
+        free_row_pulls(motion, t)
+        return
+    first = first_flag(motion)
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
@@ -296,6 +337,22 @@ def free_pulls(motion, t):
         motion.pulls[i] = motion.signs[i] * a[0]
         # bodies that fall together do not press on one another, and go on so
         motion.falling_pulls[i] = change_rate(a)
+
+
+@lean_jit
+def free_row_pulls(motion, t):
+    """`free_pulls` of contacts with rows."""
+    first = first_flag(motion)
+    for r in range(motion.multipliers):
+        motion.parameters[first + r] = 1.0
+    expand(motion, t, 1.0, 4)
+    for i in range(motion.contacts.shape[0]):
+        series = motion.margin_series[row_series(motion, i)]
+        motion.polynomial[0] = 2.0 * series[2]
+        motion.polynomial[1] = 6.0 * series[3]
+        motion.polynomial[2] = 12.0 * series[4]
+        motion.pulls[i] = motion.polynomial[0]
+        motion.falling_pulls[i] = change_rate(motion.polynomial)
 
 
 @lean_jit
@@ -354,7 +411,7 @@ def rubbed_accumulation(motion, t, closed, i, limit):
             rate = motion.rates[j] - OTHERS * u
             limit = min(limit, time_to_close(motion.gaps[j], rate, motion.pulls[j]) / OTHERS)
     hold_coordinates(motion)
-    place = motion.parameters.size - motion.local
+    place = first_flag(motion)
     place += k - 2 - motion.frictions.shape[0]
     motion.parameters[place] = motion.signs[i]
     rising = fall_beside(motion, t, i, closed)

@@ -485,7 +485,7 @@ def follow_contact_segments(numbers, env, functions, contacts, request, results)
     record = numbers[0]
     count = contacts.shape[0]
     state = state_arrays(record, np.zeros(2 * record.dof + record.columns))
-    solver = solver_arrays(record.local, count, record.columns, contacts[:0], record.first_order)
+    solver = solver_arrays(record.local, count, record.columns, 0, record.contact_numbers, 0)
     parts = ContactsSegmentParts(
         state,
         env,

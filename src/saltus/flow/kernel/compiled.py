@@ -19,7 +19,9 @@ from saltus.flow.contacts import (
     closings,
     complementarity,
     frictions,
+    held_rows,
     propagators,
+    rows,
     rubbing,
     tangent,
 )
@@ -94,6 +96,9 @@ class Sizes(NamedTuple):
     local: int
     repeats: int  # whether the load's breakpoints return in each forcing period
     corner_column: int  # 1 plus the column along the frequency that moves them, or 0
+    contact_numbers: int  # that events at contacts need
+    multipliers: int  # rows of contacts, frictions and surfaces that multipliers hold; or 0
+    fixed_rows: int  # whether these do not change with the time at a fixed state
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,11 @@ class CompiledStructure:
     signs: tuple[int, ...] = ()  # of the contacts, if there are several
     frictions: int = 0
 
+    @property
+    def flags(self) -> int:
+        """How many numbers say what is free: of coordinates, or of rows of multipliers."""
+        return self.sizes.multipliers or self.sizes.local
+
     def prepare(
         self,
         parameters: np.ndarray,
@@ -124,11 +134,11 @@ class CompiledStructure:
         if len(data):
             constants = np.append(constants, data)
         geometry = np.zeros(3)
-        fill_constants, fill_geometry = _load_fillers()
+        fill_constants, fill_geometry, _ = _load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
             env = (
-                np.append(parameters, behind_parameters(self.frictions, self.sizes.local)),
+                np.append(parameters, behind_parameters(self.frictions, self.flags)),
                 constants,
                 *records,
             )
@@ -153,14 +163,20 @@ def fill_constants(function, parameters, constants):
 @cached_jit(types.void(written_type(GEOMETRY), *GEOMETRY.args))
 def fill_geometry(function, env, geometry):
     function(env, geometry)
+
+
+@cached_jit(types.void(written_type(MATRICES), *MATRICES.args))
+def fill_matrices(function, env, piece, state, numbers):
+    function(env, piece, state, numbers)
 """
 
 
 @cache
-def _load_fillers() -> tuple[Callable[..., None], Callable[..., None]]:
-    """Functions that call a structure's `constants` and `geometry` with arrays."""
+def _load_fillers() -> tuple[Callable[..., None], ...]:
+    """Functions that call a structure's `constants`, `geometry` and `matrices` with arrays."""
     module = load_module("fillers", _SIGNATURES + _FILLERS)
-    return entry_point(module.fill_constants), entry_point(module.fill_geometry)
+    functions = module.fill_constants, module.fill_geometry, module.fill_matrices
+    return tuple(map(entry_point, functions))
 
 
 @cache
@@ -198,7 +214,9 @@ def contacts_text() -> str:
     """The source of the kernel of models with several contacts."""
     parts = (
         contact_layout,
+        rows,
         complementarity,
+        held_rows,
         contact_impacts,
         tangent,
         propagators,
@@ -226,7 +244,15 @@ def load_structure(trace: Trace) -> CompiledStructure:
     first = len(trace.acceleration), stops, 1, trace.side_count, steep, trace.first_order
     return CompiledStructure(
         Sizes(
-            *first, trace.dof, trace.columns, trace.local, int(trace.repeats), trace.corner_column
+            *first,
+            trace.dof,
+            trace.columns,
+            trace.local,
+            int(trace.repeats),
+            trace.corner_column,
+            len(trace.contact_numbers),
+            trace.multipliers,
+            int(trace.has_fixed_rows),
         ),
         max(1, len(constants(trace))),
         tuple(made[name] for name in names),
@@ -564,6 +590,18 @@ def _drives(path: str) -> bool:
     return owner.partition(".")[0] in ("load", "impact") or (
         owner.startswith("model.contacts.") and name == "position"
     )
+
+
+def contact_numbers_at(
+    run: Program, instant: tuple[float, float], piece: int, state: np.ndarray
+) -> np.ndarray:
+    """The numbers that events at contacts need (`Trace.contact_numbers`), at an instant (local time,
+    begin of the forcing period) and a state of the kernel."""
+    numbers = np.zeros(len(run.trace.contact_numbers))
+    first = len(run.env[0]) - run.structure.flags - len(INSTANT)
+    run.env[0][first : first + len(INSTANT)] = instant
+    _load_fillers()[2](run.structure.functions[1], run.env, piece, state, numbers)
+    return numbers
 
 
 _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}

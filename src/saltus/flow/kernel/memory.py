@@ -89,6 +89,13 @@ MOTION = np.dtype(
         ("repeats", _WHOLE),
         # 1 plus the tangent's column along the frequency with which they move, 0 without one
         ("corner_column", _WHOLE),
+        # how many numbers events at contacts need, which `matrices` fills
+        ("contact_numbers", _WHOLE),
+        # how many rows of contacts, frictions and surfaces multipliers may hold, in the place of
+        # coordinates; 0 if none may
+        ("multipliers", _WHOLE),
+        # whether these rows do not change with the time at a fixed state
+        ("fixed_rows", _WHOLE),
     ]
 )
 _NAMES: Any = MOTION.names
@@ -128,11 +135,11 @@ def motion_record(order: int, sizes: tuple[int, ...]) -> tuple[np.ndarray, bytea
 INSTANT = ("time", "origin")  # of an event, behind the parameters of a model with several contacts
 
 
-def behind_parameters(frictions: int, local: int) -> list[float]:
+def behind_parameters(frictions: int, flags: int) -> list[float]:
     """What stands behind the parameters at the start: the slidings, an instant, and that all
-    coordinates are free.
+    coordinates, or rows of multipliers, are free.
     """
-    return [0.0] * (frictions + len(INSTANT)) + [1.0] * local
+    return [0.0] * (frictions + len(INSTANT)) + [1.0] * flags
 
 
 class MotionMemory(NamedTuple):
@@ -307,6 +314,11 @@ class SolverArrays(NamedTuple):
     # by how much an impact, a release or the end of an accumulation moves with each column
     event_shifts: Any
     pull_slopes: Any  # the derivatives of `pulls`, a row for each column
+    # of the rows that multipliers hold: the accelerations by their multipliers, (local, rows)
+    pushes: Any
+    mobilities: Any  # and what each gives to its own row
+    row_terms: Any  # the sizes of the terms of their rates at the end of the last step
+    slide_rates: Any  # of the frictions: their sliding speeds, exactly 0 at rest
 
 
 class ContactsParts(NamedTuple):

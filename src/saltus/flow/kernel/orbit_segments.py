@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts import complementarity, extremes, propagators, tangent
+from saltus.flow.contacts import (
+    complementarity,
+    extremes,
+    held_rows,
+    propagators,
+    rows,
+    tangent,
+)
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import layout as contact_layout
 from saltus.flow.contacts import segments as contact_segments
@@ -38,7 +45,9 @@ def load_contact_segments() -> Callable[..., int]:
     """
     parts = (
         contact_layout,
+        rows,
         complementarity,
+        held_rows,
         contact_impacts,
         tangent,
         extremes,

@@ -11,7 +11,14 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from saltus.flow.contacts import complementarity, lane_handoff, lane_impacts, scalar_impact
+from saltus.flow.contacts import (
+    complementarity,
+    held_rows,
+    lane_handoff,
+    lane_impacts,
+    rows,
+    scalar_impact,
+)
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import lane_step as contacts_step
 from saltus.flow.contacts import layout as contact_layout
@@ -143,7 +150,9 @@ def helpers_text(several: bool) -> str:
         parts += [
             steps,
             contact_layout,
+            rows,
             complementarity,
+            held_rows,
             contact_impacts,
             lane_impacts,
             lane_handoff,
@@ -349,8 +358,8 @@ def _impact(trace: Trace, plan: MemoryPlan, known: dict[Expr, int]) -> WrittenFu
         jump = saltation(trace)
         positions, velocities = positions + jump.coordinate, velocities + jump.velocity
     results: dict[Slot, Expr] = {("m", SLOTS.new_side): trace.next_side}
-    for part, rows in (("after_position", positions), ("after_velocity", velocities)):
-        results |= {plan.slot(part, row): root for row, root in enumerate(rows)}
+    for part, roots_of_part in (("after_position", positions), ("after_velocity", velocities)):
+        results |= {plan.slot(part, row): root for row, root in enumerate(roots_of_part)}
     return _at_new_state("lane_impact", plan, results, known)
 
 

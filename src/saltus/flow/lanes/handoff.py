@@ -142,6 +142,7 @@ def scalar_state(lane):
     motion.first_order = sizes.first_order
     motion.local = sizes.local
     motion.repeats = sizes.repeats
+    motion.contact_numbers = sizes.contact_numbers
     motion.time = lane.now
     motion.chatter_speed = lane.chatter_speed
     motion.pull = lane.pull

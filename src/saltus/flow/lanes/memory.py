@@ -190,6 +190,7 @@ class LaneSizes(NamedTuple):
     contacts: int  # the number of contacts of a model with several
     frictions: int
     repeats: int  # whether the load's breakpoints return in each forcing period
+    contact_numbers: int  # that events of several contacts need
     coordinates: np.ndarray  # of each contact, of each friction, and -1 less that of each surface
     signs: np.ndarray  # of each contact
 

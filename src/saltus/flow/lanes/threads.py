@@ -338,7 +338,7 @@ class Lanes:
         count = len(self.program.trace.signs)
         rows = self._contact_rows()
         solver = solver_arrays(
-            self.plan.local, count, 0, rows[count:], self.program.trace.first_order
+            self.plan.local, count, 0, len(rows) - count, len(self.program.trace.contact_numbers), 0
         )
         return np.zeros(1, dtype=MOTION), np.zeros(2 * own), rows[:count], solver
 
@@ -386,6 +386,7 @@ class Lanes:
             contacts=len(trace.signs),
             frictions=len(trace.friction_coordinates),
             repeats=sizes.repeats,
+            contact_numbers=sizes.contact_numbers,
             coordinates=np.array(
                 [*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64
             ),

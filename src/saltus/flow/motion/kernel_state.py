@@ -17,7 +17,13 @@ import numpy as np
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
-from saltus.flow.kernel.compiled import Program, load_contacts_kernel, load_kernel, taylor_order
+from saltus.flow.kernel.compiled import (
+    Program,
+    contact_numbers_at,
+    load_contacts_kernel,
+    load_kernel,
+    taylor_order,
+)
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
 from saltus.flow.kernel.memory import (
     AT_START,
@@ -31,7 +37,13 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
-from saltus.systems import inert_frictions, slowest_own_time, time_without_period
+from saltus.systems import (
+    CLOSED_BELOW,
+    inert_frictions,
+    slowest_own_time,
+    time_without_period,
+    units_of_gaps,
+)
 
 if TYPE_CHECKING:
     from saltus.flow.motion.simulate import MotionRequest
@@ -141,12 +153,12 @@ class KernelState:
         self.state = _first_state(run, request.start)
         # one record MOTION
         self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)
-        mode, side, leave_by = self._at_contact(request, run)
         piece = 0
         if run.structure.sizes.repeats:
             piece = int((breaks * at.length).searchsorted(at.local, side="right"))
         elif breaks.size:
             piece = int(breaks.searchsorted(request.time, side="right"))
+        mode, side, leave_by = self._at_contact(request, run, piece)
         dense = int(
             request.dense or request.sample_times is not None or _is_nonlinear(request.system)
         )
@@ -170,7 +182,7 @@ class KernelState:
         """Let the kernel record from the beginning of its buffers on."""
         self.array["recorded_steps"] = self.array["recorded_events"] = 0
 
-    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
+    def _at_contact(self, request: MotionRequest, run: Program, piece: int) -> tuple[int, int, int]:
         """The mode and the side at the start, and by which side a motion leaves that is not
         unique.
         """
@@ -320,7 +332,7 @@ class ContactState(KernelState):
     `FrictionColumn`.
     """
 
-    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
+    def _at_contact(self, request: MotionRequest, run: Program, piece: int) -> tuple[int, int, int]:
         """Fill the rows; the kernel first decides which contacts at rest at their positions stay
         closed.
 
@@ -342,7 +354,12 @@ class ContactState(KernelState):
         contacts[:, ContactColumn.COORDINATE] = held + tuple(
             max(place, -1 - place) for place in rubbed
         )
+        rates = None
+        if run.structure.sizes.multipliers:
+            rates = self._close_rows(request, run, piece, own_contacts)
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
+            if rates is not None:
+                break
             place = names.index(contact.coordinate)
             gap = contact.gap(position[place])
             rate = contact.sign * speeds[place]
@@ -361,8 +378,14 @@ class ContactState(KernelState):
             row[ContactColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
                 self.state[place] = float(contact.position)
-        for row, friction in zip(contacts[len(held) :], own_frictions, strict=False):
-            rate = speeds[names.index(friction.coordinate)] - float(friction.ground_speed)
+        for k, (row, friction) in enumerate(
+            zip(contacts[len(held) :], own_frictions, strict=False)
+        ):
+            rate = (
+                speeds[names.index(friction.coordinate)] - float(friction.ground_speed)
+                if rates is None
+                else rates[len(held) + k]
+            )
             row[FrictionColumn.SLIDES] = int(np.sign(rate))
         for k in inert_frictions(request.system, dict.fromkeys(request.sensitivities or (), ())):
             contacts[len(held) + k, FrictionColumn.PRESSED] = NoPress.INERT
@@ -374,6 +397,44 @@ class ContactState(KernelState):
                 np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1
             )
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
+
+    def _close_rows(
+        self, request: MotionRequest, run: Program, piece: int, contacts: Any
+    ) -> np.ndarray:
+        """Fill the rows of contacts whose gaps are functions, and return the rates of these gaps,
+        then of the frictions' sliding speeds. Gaps and rates count as 0 up to the rounding of their
+        terms.
+
+        Raises
+        ------
+        ParameterError
+            The state lies beyond a contact, or moves into a contact that it is at.
+        """
+        at = request.clock
+        own = run.structure.sizes.own
+        count = len(contacts)
+        parts = run.structure.sizes.multipliers
+        numbers = contact_numbers_at(run, (at.local, at.first * at.length), piece, self.state)
+        table = numbers[len(numbers) - count - parts * (own + 1) : len(numbers) - count]
+        rows = table.reshape(parts, own + 1)
+        position, velocity = self.state[:own], self.state[-own:]
+        rates: np.ndarray = rows[:, :own] @ velocity + rows[:, own]
+        speeds = np.abs(rows[:, :own]) @ np.abs(velocity) + np.abs(rows[:, own])
+        rates[np.abs(rates) <= CLOSED_BELOW * speeds] = 0.0
+        length = units_of_gaps(request.system)[0]
+        sizes = np.abs(rows[:count, :own]) @ np.abs(position) + length
+        for i, (contact, gap) in enumerate(zip(contacts, numbers[-count:], strict=True)):
+            touches = abs(gap) <= CLOSED_BELOW * sizes[i]
+            if (gap < 0.0 and not touches) or (touches and rates[i] < 0.0):
+                what = "moves into" if touches else "lies beyond"
+                raise ParameterError(
+                    f"the state at the start {what} the contact {contact.name!r}, whose gap is"
+                    f" {gap:.6g} there and has the rate {rates[i]:.6g}",
+                    contact.name,
+                )
+            self.rows[i, ContactColumn.CLOSED] = int(touches and rates[i] == 0.0)
+            self.rows[i, ContactColumn.SKIP] = int(touches)
+        return rates
 
     def _kernel(self) -> Callable[..., int]:
         return load_contacts_kernel()

@@ -205,9 +205,7 @@ class PortableMotion:
             "constant_count": structure.constant_count + len(self.run.data),
             "data": self.run.data.tolist(),
             "modes": (
-                behind_parameters(structure.frictions, structure.sizes.local)
-                if trace.several
-                else []
+                behind_parameters(structure.frictions, structure.flags) if trace.several else []
             ),
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),

@@ -166,7 +166,7 @@ class MotionRequest:
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
     ) -> None:
-        check_system(system, "simulate", several_contacts=True)
+        check_system(system, "simulate", several_contacts=True, multipliers=sensitivities is None)
         # what a system remembers is forgotten where values that its classes read have changed
         structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
@@ -561,7 +561,8 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     position = now.state[:own]
     velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
-    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT, Status.PASSED):
+    in_rows = system.model.has_multipliers
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT, Status.PASSED) and not in_rows:
         gaps = [
             each.gap(position[system.model.coordinates.index(each.coordinate)])
             for each in system.model.contacts
@@ -577,6 +578,18 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     given as text; else None.
     """
     at = f"at time {time}"
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.has_multipliers:
+        if status == Status.NOT_UNIQUE:
+            return (
+                f"no choice of closed contacts, and of what sticks, is the only consistent one {at}:"
+                " the contacts leave no room, a coefficient of friction is too large (Painleve's"
+                " paradox), or what slides depends on reactions that rigid bodies do not determine;"
+                " give a contact a spring, or a smaller coefficient"
+            )
+        return (
+            f"the impact law has no solution, or several, {at}: a coefficient of friction is too"
+            " large for the masses there (Painleve's paradox), or the mass matrix is singular"
+        )
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and system.model.holds_coordinates:
         choice = "no choice of closed contacts, and of what sticks, is consistent"
         if status == Status.NOT_UNIQUE and system.model.surfaces:

@@ -93,7 +93,7 @@ class Validity:
         The share of the motion's time that is spent beyond each margin.
     gains
         The contacts at which the impact law may raise the kinetic energy, and by what share of it
-        (see `energy_gain`).
+        (see `energy_gain`); not known of contacts of a `distance`.
     ties
         At how many instants several answers of Coulomb's law changed equally little.
     first_tie
@@ -225,9 +225,9 @@ class ValidityCheck:
         shares = {
             name: beyond / duration if duration else 0.0 for name, beyond in self._beyond.items()
         }
-        gains = (
-            energy_gain(self._system.contact_model, self._system.impact) if model.contacts else {}
-        )
+        # where contacts are held by multipliers gains are not known
+        known = model.contacts and not model.has_multipliers
+        gains = energy_gain(self._system.contact_model, self._system.impact) if known else {}
         return Validity(
             dict(self._first),
             shares,
