@@ -51,6 +51,9 @@ def test_where_all_arguments_have_names_none_is_said_to_do_without():
         match=r"^Contact\(\) too many positional arguments; give all arguments by their names$",
     ):
         saltus.Contact("wall", coordinate="x")
+    # a load has any names as channels
+    with pytest.raises(ParameterError, match=r"^Load\(\) too many positional arguments"):
+        saltus.Load(1.2, saltus.Harmonic(0.5))
 
 
 @pytest.mark.parametrize("step", [0, -0.1, float("nan"), 1e4, "long"])

@@ -144,9 +144,9 @@ class Load:
         object.__setattr__(self, "channels", signals)
 
     def __getattr__(self, name: str) -> Channel:
-        if name in OF_RESULTS or name.startswith(
-            "_"
-        ):  # IPython, pickle and copy probe for names like these
+        # IPython, pickle and copy probe for names like these, and a load that was refused has neither
+        # of its fields
+        if name in OF_RESULTS or name in ("channels", "frequency") or name.startswith("_"):
             raise AttributeError(name)
         return Channel(self.channels.get(name), self.frequency)
 

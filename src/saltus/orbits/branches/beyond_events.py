@@ -503,11 +503,10 @@ def _is_discontinuous(point: OrbitPoint, place: np.ndarray, evaluation: Any) -> 
         return False
     way = place - point.place
     size = units.unknowns * np.ones(len(evaluation.residual))
-    largest = max(
-        1.0,
-        float(abs(point.orbit.multipliers[0])),
-        float(np.linalg.norm(evaluation.monodromy() / np.outer(size, 1.0 / size), 2)),
-    )
+    largest = max(1.0, float(abs(point.orbit.multipliers[0])))
+    monodromy = evaluation.monodromy() / np.outer(size, 1.0 / size)
+    if np.isfinite(monodromy).all():  # a motion that passes a grazing has no derivatives
+        largest = max(largest, float(np.linalg.norm(monodromy, 2)))
     if apart <= SETTINGS.stretched * largest * point.curve.norm(way):
         return False
     nearer = point.curve.evaluate(point.place + 0.1 * way, thorough=True)
