@@ -135,6 +135,9 @@ def test_pages_of_cycles_branches_are_refused_in_a_sentence(belt, tmp_path):
 def test_what_is_no_cycle_is_refused_in_a_sentence():
     with pytest.raises(saltus.MotionError, match="comes to an equilibrium, which is no cycle"):
         saltus.find_orbit(System(model=VanDerPol(mu=-0.5)), x=0.5)
+    # nearly no loss: the equilibrium solves the equations with half the natural period
+    with pytest.raises(saltus.MotionError, match="comes to an equilibrium, which is no cycle"):
+        saltus.find_orbit(System(model=VanDerPol(mu=-1e-8)), x=0.5)
     with pytest.raises(saltus.MotionError, match="comes to rest for good, which is no cycle"):
         saltus.find_orbit(System(model=BeltOscillator(belt_speed=0.0)), x=0.5)
     with pytest.raises(saltus.ParameterError, match="period must lie in"):

@@ -165,8 +165,13 @@ def test_a_quantity_that_there_is_not_is_refused_with_those_that_there_are(
         resonance.quantity("w")
     with pytest.raises(saltus.ParameterError, match="largest_between"):
         saltus.plot(resonance, quantity="w")
-    with pytest.raises(saltus.ParameterError, match="another name"):
-        resonance.to_xarray(functions={"amplitude": len})
+    for name in ("amplitude", "point", "multiplier", "unknown", "through"):
+        with pytest.raises(saltus.ParameterError, match="another name"):
+            resonance.to_xarray(functions={name: len})
+    with pytest.raises(saltus.ParameterError, match="words as names"):
+        resonance.to_xarray(functions={"a\nb": len})
+    with pytest.raises(saltus.ParameterError, match="quantity must be a name"):
+        saltus.plot(resonance, quantity=["b"])
     with pytest.raises(saltus.ParameterError, match="must return a number"):
         resonance.to_xarray(functions={"states": lambda motion: motion.position})
 

@@ -567,6 +567,10 @@ def _dataset_of(result: Any, options: dict[str, Any]) -> Any:
     """The dataset of a result, with a quantity that is given as a function of a motion; the option
     then names it."""
     which = options.get("quantity")
+    if which is not None and not isinstance(which, str) and not callable(which):
+        raise ParameterError(
+            f"quantity must be a name, or a function of a motion, got {shown(which)}", "quantity"
+        )
     make = getattr(result, "to_xarray", None)
     takes_functions = make is not None and "functions" in signature(make).parameters
     if not callable(which):

@@ -145,12 +145,16 @@ def own_quantities(system: System, functions: Functions | None) -> tuple[OwnQuan
             "functions",
         )
     for name, function in functions.items():
+        if not isinstance(name, str) or not name.isprintable() or not name.strip():
+            raise ParameterError(
+                f"functions must have words as names, got {shown(name)}", "functions"
+            )
         if not callable(function) and not isinstance(function, str):
             raise ParameterError(
                 f"functions must be functions of a motion, and {name!r} is {shown(function)}",
                 "functions",
             )
-    return tuple(_own(system, str(name), asked) for name, asked in functions.items())
+    return tuple(_own(system, name, asked) for name, asked in functions.items())
 
 
 def _own(system: System, name: str, asked: str | Callable[[Motion], Any]) -> OwnQuantity:

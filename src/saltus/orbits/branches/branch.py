@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from saltus.orbits.branches.special_point import SpecialPoint
 
 START = End(OrbitEnd.START)
+OF_CYCLES = ("rounds", "through")  # names of a table of cycles alone
 
 
 @with_answers
@@ -193,17 +194,18 @@ def branch_dataset(branch: Branch, functions: Functions | None = None) -> xarray
     data: dict[str, Any] = {"parameter": ("point", branch.parameters, {"long_name": branch.path})}
     data |= {name: ("point", values, attrs) for name, values, attrs in _columns(orbits, equations)}
     own = own_quantities(equations.given, functions)
-    check_new_names(own, data)
-    data |= {
-        quantity.name: ("point", values, _attributes(quantity))
-        for quantity, values in zip(own, _values(orbits, own), strict=True)
-    }
     data |= (
         multiplier_columns(orbits)
         | solution_columns(orbits)
         | _special(branch.special, equations, own)
         | _rests(orbits)
     )
+    table = xarray.Dataset(data)
+    check_new_names(own, {*table.variables, *table.dims, *OF_CYCLES})
+    data |= {
+        quantity.name: ("point", values, _attributes(quantity))
+        for quantity, values in zip(own, _values(orbits, own), strict=True)
+    }
     attributes: dict[str, Any] = {
         "kind": "branch",
         "path": branch.path,
@@ -344,8 +346,9 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
     # of cycles, whose period is a time: how often they go round, and their section
     through = [orbit.signature.through for orbit in orbits]
     if any(through):
-        data["rounds"] = ("point", np.array([orbit.signature.period for orbit in orbits]))
-        data["through"] = (("point", "section_number"), np.array(through))
+        rounds, plane = OF_CYCLES
+        data[rounds] = ("point", np.array([orbit.signature.period for orbit in orbits]))
+        data[plane] = (("point", "section_number"), np.array(through))
     return data | {
         "section": ("point", sections),
         "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),

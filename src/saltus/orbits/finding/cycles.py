@@ -118,12 +118,7 @@ def next_return(base: OrbitEquations, state: dict[str, Any], period: float | Non
 def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Return | None:
     """The return of a motion, None if it has none."""
     units = base.natural.state
-    swing = motion.extrema
-    size = float(((swing[:, 1] - swing[:, 0]) / base.natural.lengths).max())
-    if not size > SETTINGS.still:
-        raise MotionError(
-            "the motion comes to an equilibrium, which is no cycle; start farther from it"
-        )
+    size = swing_of(base, motion)
     begin = section_time(motion, 0.5 * (motion.time - motion.start))
     there = states_of(motion, np.array([begin]))[0]
     normal = direction_at(motion, begin, base)
@@ -140,6 +135,22 @@ def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Ret
         near = max(SETTINGS.as_near * float(distance.min()), SETTINGS.returned * size)
         chosen = int(np.argmax(distance <= near))
     return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size)
+
+
+def swing_of(base: OrbitEquations, motion: Motion) -> float:
+    """The largest way of a coordinate, from its least to its largest value, in natural units.
+
+    Raises
+    ------
+    MotionError
+        The motion stands still.
+    """
+    size = float((np.ptp(motion.extrema, axis=1) / base.natural.lengths).max())
+    if not size > SETTINGS.still:
+        raise MotionError(
+            "the motion comes to an equilibrium, which is no cycle; start farther from it"
+        )
+    return size
 
 
 def round_within(orbit: PeriodicOrbit) -> float | None:

@@ -29,7 +29,14 @@ from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_sy
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.event_sequence import STAYS
 from saltus.orbits.equations.kinds import equations_of, kinds_of
-from saltus.orbits.finding.cycles import Return, after, next_return, round_within, settled_return
+from saltus.orbits.finding.cycles import (
+    Return,
+    after,
+    next_return,
+    round_within,
+    settled_return,
+    swing_of,
+)
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
 from saltus.orbits.verify import same_orbit
@@ -202,6 +209,7 @@ def _cycle(
     if orbit is not None and shorter is not None:
         orbit = orbit_from(base, orbit.equations.start(orbit.solution), 1, shorter) or orbit
     if orbit is not None and orbit.admissible:
+        swing_of(base, orbit.followed)  # without loss an equilibrium solves the equations, too
         progress(1.0, "done")
         return orbit
     raise MotionError(
