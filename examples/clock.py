@@ -1,8 +1,8 @@
 """A clock: a pendulum that is pushed along its velocity, between two stops
 ========================================================================
 
-Each impact takes what the pushes have given since the last one. The beat is an unknown; between the
-stops the motion is a growing spiral in closed form, from which the beat follows as one root.
+With x'' - 0.1 x' + x = 0 between x = -1 and x = 1, each impact takes what the pushes have given. The
+beat is an unknown: it follows as one root from the growing spiral between the stops.
 """
 
 from typing import ClassVar
@@ -15,10 +15,7 @@ import saltus
 
 
 class Clock(saltus.ContactModel):
-    """x'' - 0.1 x' + x = 0 between x = -1 and x = 1."""
-
     coordinates: ClassVar = ("x",)
-    channels: ClassVar = ()
     contacts: ClassVar = (
         saltus.Contact(name="tick", coordinate="x", position=1.0, sign=-1),
         saltus.Contact(name="tock", coordinate="x", position=-1.0),

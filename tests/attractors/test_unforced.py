@@ -83,6 +83,9 @@ def test_an_equilibrium_under_a_constant_load_is_found_as_before():
     system = saltus.System(model=model, load=saltus.Load(force=3.0))
     verdict = saltus.classify(system, x=0.1)
     assert verdict.kind is Ending.PERIODIC
+    assert repr(verdict).startswith("Verdict(equilibrium: it comes to the equilibrium at 0.75")
+    (attractor,) = saltus.find_attractors(system, starts=8)
+    assert "1: equilibrium, amplitude=0.75" in repr(attractor)  # F / k
     assert verdict.orbit.highest == pytest.approx(0.75, abs=1e-9)  # 3 / 4
     assert [a.period for a in saltus.find_attractors(system, starts=4)] == [1]
 

@@ -166,6 +166,14 @@ def test_a_picture_is_saved_in_the_format_of_its_suffix(tmp_path, motion, name, 
         )
 
 
+def test_a_system_is_saved_as_a_text_and_loaded_again(tmp_path):
+    path = saltus.save(tmp_path / "system", SYSTEM)
+    assert path.name == "system.json"
+    assert saltus.load(path) == SYSTEM
+    with pytest.raises(ParameterError, match=r"must end in \.json"):
+        saltus.save(tmp_path / "system.nc", SYSTEM)
+
+
 def test_texts_are_saved_as_they_are(tmp_path):
     assert saltus.save(tmp_path / "a.txt", "größe\n").read_text(encoding="utf-8") == "größe\n"
     assert saltus.save(tmp_path / "a.txt", b"\x00").read_bytes() == b"\x00"

@@ -26,6 +26,9 @@ RESULTS = {
     "spectra": lambda: saltus.response_spectrum(
         SYSTEM, bounds=(1.1, 1.3), effort="quick", max_period=1
     ),
+    "special points": lambda: saltus.continue_orbit(
+        saltus.find_orbit(SYSTEM, x=0.0), "load.frequency", (1.1, 1.6)
+    ),
     "sweeps": lambda: saltus.frequency_sweep(SYSTEM, [1.1, 1.2], x=0.0),
     "ensembles": lambda: saltus.simulate_many(SYSTEM, x=np.array([0.0, 0.1]), periods=3),
     "motions": lambda: saltus.simulate(SYSTEM, x=0.0, periods=2),
@@ -44,7 +47,8 @@ def known_columns(kind):
 
 @pytest.mark.parametrize("kind", RESULTS)
 def test_every_column_is_in_the_codebook(kind):
-    columns = [str(name) for name in saltus.to_pandas(RESULTS[kind]()).columns]
+    table = ("special",) if kind == "special points" else ()
+    columns = [str(name) for name in saltus.to_pandas(RESULTS[kind](), *table).columns]
     known = known_columns(kind)
     begins = tuple(name.removesuffix("...") for name in known if name.endswith("..."))
     missing = [

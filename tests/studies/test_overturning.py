@@ -254,9 +254,36 @@ def test_a_factor_of_a_record_is_the_same_in_the_spectrum_in_fragility_and_in_en
     np.testing.assert_allclose(
         again.border_amplitude, borders.border_amplitude.values / 2.0, rtol=1e-12
     )
+    assert borders.amplitude.attrs["long_name"].startswith("factor of the record")
     # borders after many impacts have one row of the legend
     labels = [text.get_text() for text in saltus.plot(borders).figure.legends[0].get_texts()]
     assert len(labels) == len(set(labels)) <= 6
+
+
+def test_a_pulse_of_a_physical_block_has_its_amplitude_over_g_and_its_frequency_over_p():
+    """A point of the map overturns where the motion under the same pulse in SI units does."""
+    body = saltus.PhysicalBlock(half_width=0.2, half_height=0.8)
+
+    def shaken(amplitude, frequency):  # m/s^2, rad/s
+        pulse = saltus.HalfSine(amplitude=amplitude, frequency=frequency, quantity="acceleration")
+        return body.system(Load(ground_horizontal=pulse))
+
+    amplitude, frequency = np.linspace(2.0, 12.0, 6), np.array([4.0, 8.0])
+    data = saltus.overturning_spectrum(
+        shaken(1.0, 4.0),
+        amplitude=amplitude / body.gravity,
+        frequency=frequency / body.frequency,
+        curves=False,
+    )
+    fallen = [
+        [saltus.simulate(shaken(a, w), theta=0.0, duration=60.0).stop == "limit" for a in amplitude]
+        for w in frequency
+    ]
+    np.testing.assert_array_equal(data.overturned.values != 0, fallen)
+    assert 0 < np.count_nonzero(fallen) < data.overturned.size
+    assert "of a PhysicalBlock" in data.frequency.attrs["long_name"]
+    axes = saltus.plot(data)
+    assert axes.get_xlabel().count("/ p") == axes.get_ylabel().count("/ g") == 1
 
 
 def test_fragility_is_the_share_of_loads_with_its_interval():

@@ -384,7 +384,7 @@ CLASSES = (
         {"lower_1": 0.2, "upper_1": 0.0, "lower_2": 0.1, "upper_2": 0.0},
         observed="lower_1",
     ),
-    ModelClass("belt", "`BeltOscillator`", _belt, {"x": 0.0, "velocity": 0.05}),
+    ModelClass("belt", "`BeltOscillator` under a load", _belt, {"x": 0.0, "velocity": 0.05}),
     ModelClass(
         "belt, no load",
         "`BeltOscillator` without a load",

@@ -11,8 +11,8 @@ FIRST_ORDER = "a page cannot show coordinates of first order yet"
 EXTREMA = "give system.in_gap_coordinates"
 MANY = "lyapunov_many works on models with one coordinate"
 
-SWEEP = "a sweep needs a load with a frequency"
-DIAGRAM = "a diagram is not drawn for a load without a frequency"
+SWEEP = "cycles without a load are not swept yet"
+DIAGRAM = "are not drawn in diagrams yet"
 
 DISTANCES = "does not follow contacts of a distance"
 NOT_BESIDE_DISTANCES = (
@@ -72,7 +72,7 @@ REASONS = {
     ),
     MANY: "`lyapunov_many` is for models with one coordinate; `lyapunov_spectrum` takes any.",
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
-    SWEEP: "A sweep needs a load with a frequency; `continue_orbit` follows a cycle without one.",
-    DIAGRAM: "A diagram needs a load with a frequency; `continue_orbit` follows cycles without one.",
+    SWEEP: "Cycles without a load are not swept yet; `continue_orbit` follows them.",
+    DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
     DISTANCES: "Contacts of a `distance` and frictions of a `rate` are followed by `simulate` so far.",
 }

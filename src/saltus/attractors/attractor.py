@@ -231,14 +231,22 @@ class Attractor:
         target = replace(self.target, label=label_of[self.label])
         return replace(self, target=target, mirror=label_of.get(self.mirror, UNDECIDED), **changes)
 
+    def in_words(self) -> str:
+        """Rest, an equilibrium, a period, or the kind of what does not repeat itself."""
+        if self.orbit is None:
+            return str(self.kind)
+        load = self.orbit.system.load
+        # under a constant load the section has a period of its own, see `with_clock`
+        stands = load.period is not None and is_constant(load)
+        return "equilibrium" if stands else f"period {self.period:.9g}"
+
     def __repr__(self) -> str:
-        what = f"period {self.period:.9g}" if self.orbit is not None else self.kind
         share = (
             f", {100 * self.fraction:.3g} +- {100 * self.error:.2g} % of the starts"
             if self.of
             else ""
         )
-        return f"Attractor({self.label}: {what}, amplitude={self.amplitude:.9g}{share})"
+        return f"Attractor({self.label}: {self.in_words()}, amplitude={self.amplitude:.9g}{share})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,9 +342,7 @@ class Attractors(Result):
         members = self.members
         columns = {
             "attractor": [m.label for m in members],
-            "kind": [
-                f"period {m.period:.9g}" if m.orbit is not None else str(m.kind) for m in members
-            ],
+            "kind": [m.in_words() for m in members],
             "amplitude": [m.amplitude for m in members],
             "share of the starts": [
                 f"{100 * m.fraction:.3g} +- {100 * m.error:.2g} %" if m.of else "" for m in members

@@ -152,7 +152,10 @@ class Verdict(Result):
         return html_table(f"Verdict: {self.kind}", known | self.evidence)
 
     def __repr__(self) -> str:
-        return f"Verdict({self.kind}{f' {self.period:.9g}' if self.period else ''}: {self.reason})"
+        what = f"{self.kind}{f' {self.period:.9g}' if self.period else ''}"
+        if self.cause is Reason.EQUILIBRIUM:
+            what = "equilibrium"
+        return f"Verdict({what}: {self.reason})"
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,7 @@ def load(path: str | Path) -> xarray.Dataset | xarray.DataTree | Study | System:
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> _ = Path("system.json").write_text(system.to_json())
+    >>> path = saltus.save("system.json", system)
     >>> saltus.load("system.json") == system
     True
     """
@@ -138,10 +137,10 @@ def save(
     ----------
     path
         The file; that of a result ends in ".nc". If there is no suffix, ".nc" is appended for a
-        result, ".png" for a picture.
+        result, ".json" for a system, ".png" for a picture.
     result
-        A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a Matplotlib
-        figure, or axes, such as `plot` returns; a text, or bytes.
+        A Dataset, a DataTree, a result with `to_xarray`, such as a motion or a branch; a system; a
+        Matplotlib figure, or axes, such as `plot` returns; a text, or bytes.
     title
         The title of a picture in the description of a PDF.
     dpi
@@ -164,6 +163,11 @@ def save(
         raise ParameterError(f"path must name a file, such as branch.nc, got {shown(path)}", "path")
     path = Path(path)
     data = result.to_xarray() if hasattr(result, "to_xarray") else result
+    if isinstance(result, System):
+        path = path if path.suffix else path.with_suffix(".json")
+        if path.suffix != ".json":
+            raise ParameterError(f"{path} must end in .json, as a system becomes a text", "path")
+        data = result.to_json()
     try:
         if isinstance(data, (str, bytes)):
             return files.write_bytes(path, data.encode() if isinstance(data, str) else data)
@@ -182,8 +186,8 @@ def save(
         if figure is None:
             raise ParameterError(
                 (
-                    "result must be a Dataset, a DataTree, a figure, a text or an object with "
-                    f"to_xarray, got {shown(result)}"
+                    "result must be a Dataset, a DataTree, a system, a figure, a text or an object "
+                    f"with to_xarray, got {shown(result)}"
                 ),
                 "result",
             )

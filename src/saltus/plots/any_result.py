@@ -132,21 +132,22 @@ def draw_overturning(
                 **look,
             )
         handles.append(Line2D([], [], label=f"border {IMPACTS[count]}", **look))
-    signal = (
-        json.loads(dataset.attrs.get("system", "{}"))
-        .get("load", {})
-        .get(dataset.attrs["channel"], {})
-    )
+    system = json.loads(dataset.attrs.get("system", "{}"))
+    signal = system.get("load", {}).get(dataset.attrs["channel"], {})
     pulse = signal.get("type", "record") if isinstance(signal, dict) else "record"
+    # a block's time is scaled by p, and the ground's acceleration by the gravity g
+    of_block = system.get("model", {}).get("type") == "RockingBlock"
+    per_p = " / p" if of_block else ""
+    per_g = " / g" if of_block and signal.get("quantity") == "acceleration" else ""
     ax.set_xlim(edges[0][0], edges[0][-1])
     ax.set_ylim(edges[1][0], edges[1][-1])
     ax.set_xlabel(
-        "speed of the record" if pulse == "record" else r"frequency $\omega$ of the pulse"
+        "speed of the record" if pulse == "record" else rf"frequency $\omega{per_p}$ of the pulse"
     )
     ax.set_ylabel(
         "factor of the record"
         if pulse == "record"
-        else f"amplitude of the {signal.get('quantity', 'pulse')}"
+        else f"amplitude of the {signal.get('quantity', 'pulse')}{per_g}"
     )
     legend_of(ax, own, handles, ncols=2)
     return ax

@@ -205,6 +205,10 @@ def overturning_spectrum(
     many times faster than written it is played. Its borders are computed at each frequency of the
     map, by halving the interval between two amplitudes down to rounding.
 
+    Amplitudes and frequencies of a pulse are those of the dimensionless system. In the system of a
+    `PhysicalBlock` called `body` an acceleration is in units of `body.gravity`, and a frequency in
+    units of `body.frequency`: divide m/s^2 and rad/s by these. Factors of a record have no unit.
+
     Parameters
     ----------
     system
@@ -298,6 +302,17 @@ def overturning_spectrum(
         "overturning_spectrum", columns, {"frequency": rates, "amplitude": sizes}, system, **facts
     )
     data["stop"].attrs |= stops
+    texts_of_axes = (
+        ("factor of the speed of the record", "factor of the record, as it is in the system")
+        if isinstance(shaken.signal, Record)
+        else (
+            "frequency of the pulse, dimensionless (of a PhysicalBlock: over its frequency)",
+            f"{getattr(shaken.signal, 'quantity', 'amplitude')} of the pulse, dimensionless (of a"
+            " PhysicalBlock: over its units, such as its gravity)",
+        )
+    )
+    for name, text in zip(("frequency", "amplitude"), texts_of_axes, strict=True):
+        data[name].attrs |= {"units": "1", "long_name": text}
     return data
 
 

@@ -113,7 +113,9 @@ class SweepRequest:
         check_system(self.system, "frequency_sweep", several_contacts=True)
         if self.system.load.frequency is None:
             raise ParameterError(
-                "a sweep needs a load with a frequency; give the Load one", "load.frequency"
+                "cycles without a load are not swept yet; give the Load a frequency, or follow a"
+                " cycle with find_orbit and continue_orbit",
+                "load.frequency",
             )
         check_path(self.system, self.path)
         given = check_axis("values", self.values, either_way=True)

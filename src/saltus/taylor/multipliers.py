@@ -61,8 +61,8 @@ def held_motion(trace: Any, model: Any, t: Any, q: Any, v: Any, load: Any) -> He
     """The equations of a model, with leaves `free` and `slide` for what is held.
 
     `free` is 1 for a contact that is not held, then for a friction, and else 0. `slide` is the
-    direction in which a friction slides, 0 where it has no force or is held, and twice the
-    direction in which it carries its static limit although it does not move.
+    direction in which a friction slides, 0 where it has no force or is held. Where a friction
+    carries its static limit although it does not move, it is twice that direction.
     """
     contacts = [_contact_row(trace, model, part, t, q, load) for part in model.contacts]
     frictions = [_friction_row(trace, model, part, t, q, v, load) for part in model.frictions]

@@ -23,8 +23,8 @@ def check_diagram(
     check_system(system, "a diagram", several_contacts=True)
     if system.load.frequency is None:
         raise ParameterError(
-            "a diagram is not drawn for a load without a frequency; give the Load one, or follow a"
-            " cycle with find_orbit and continue_orbit",
+            "cycles under a load without a frequency are not drawn in diagrams yet; give the Load"
+            " one, or follow a cycle with find_orbit and continue_orbit",
             "load.frequency",
         )
     low, high = check_bounds(bounds)
