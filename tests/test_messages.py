@@ -167,7 +167,7 @@ def test_a_quantity_that_a_branch_does_not_have_is_answered_with_its_own():
     branch = saltus.continue_orbit(
         saltus.find_orbit(WALL, x=0.1), "load.frequency", (2.55, 2.65), step=1.0
     )
-    with pytest.raises(SaltusError, match=r"quantity 'z' is not in this result; .*amplitude"):
+    with pytest.raises(SaltusError, match=r"quantity must be one of amplitude, .*got 'z'"):
         saltus.plot(branch, quantity="z")
 
 
