@@ -60,9 +60,10 @@ class HeldMotion(NamedTuple):
 def held_motion(trace: Any, model: Any, t: Any, q: Any, v: Any, load: Any) -> HeldMotion:
     """The equations of a model, with leaves `free` and `slide` for what is held.
 
-    `free` is 1 for a contact that is not held, then for a friction, and else 0. `slide` is the
-    direction in which a friction slides, 0 where it has no force or is held. Where a friction
-    carries its static limit although it does not move, it is twice that direction.
+    `free` is 1 for a contact that is not held, then for a friction, and else 0.
+
+    `slide` is the direction in which a friction slides, 0 where it has no force or is held. Of a
+    friction that carries its static limit and does not move, it is twice that direction.
     """
     contacts = [_contact_row(trace, model, part, t, q, load) for part in model.contacts]
     frictions = [_friction_row(trace, model, part, t, q, v, load) for part in model.frictions]
