@@ -229,7 +229,7 @@ def test_results_do_not_depend_on_the_run(quasi_periodic_band):
         ({"window": 3}, "window must be"),
         (
             {"system": System(model=forced(1.0).model, load=Load(vertical=-0.5))},
-            "give the Load a frequency",
+            "give the Load one",
         ),
     ],
 )

@@ -225,17 +225,20 @@ def _no_place(part: Part, parts: Sequence[Part], reads: dict[str, tuple[int, ...
     kept = _called(part)
     names = [name for name in terms_of(part) if name in reads]
     what = f"the {type(part).__name__.lower()} {part.name!r} keeps {kept}"
+    function = {Contact: "distance", Friction: "rate"}.get(type(part))
+    instead = f"; or give it a {function}, a method of the model, in place of its sum"
+    instead = "" if function is None else instead
     if names:
         return (
             f"{what}, and needs a coordinate of its own, with a constant coefficient and read by"
             " none of its functions: let it keep a coordinate where its gap is 0, or, if"
             f" {names[0]} is of one coordinate alone, give the model {names[0]}{INVERSE}(value),"
-            f" the coordinate at which {names[0]} has this value"
+            f" the coordinate at which {names[0]} has this value{instead}"
         )
     return (
         f"{what}, which follows from what {others} keep, up to a displacement: beside frictions,"
         " and in a Structure, each sum must be a coordinate of its own; leave one out, or give"
-        " sums that are the same the same coefficients"
+        f" sums that are the same the same coefficients{instead}"
     )
 
 

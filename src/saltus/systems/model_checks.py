@@ -491,8 +491,8 @@ def _check_frictions(model: ContactModel) -> None:
             _check_sum(model, friction)
         if not model.has_multipliers and friction.coordinate in taken:
             raise ParameterError(
-                f"{where} and another one act along {friction.coordinate}: a coordinate can have "
-                f"one",
+                f"{where} and another one act along {friction.coordinate}: a coordinate can have one;"
+                " in place of its coordinate each may have a rate, a method of the model",
                 "model",
             )
         if friction.contact is not None and friction.contact not in [
