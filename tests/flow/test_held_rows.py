@@ -498,7 +498,6 @@ def test_a_block_on_both_feet_slips_where_the_push_is_what_both_can_carry(static
 class Row(saltus.ContactModel):
     """Two balls between walls under a load, with gaps that are sums or distances."""
 
-    distances: ClassVar[bool] = True
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
     channels: ClassVar[tuple[str, ...]] = ("push",)
 
@@ -743,3 +742,44 @@ def test_the_trace_has_a_row_for_each_part():
     traced = trace(block())
     assert traced.multipliers == 4
     assert len(traced.rows) == 4 * 4 + 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slider(saltus.ContactModel):
+    """A mass on a belt with a soft stop: no contact, a friction of a rate, and a surface."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("push",)
+    surfaces: ClassVar[tuple[saltus.Surface, ...]] = (
+        saltus.Surface(name="stop", coordinate="x", position=0.2),
+    )
+    frictions: ClassVar[tuple[Friction, ...]] = (
+        Friction(name="belt", rate="slip", kinetic=0.2, static=0.3, ground_speed=0.2),
+    )
+
+    def slip(self, t, q, velocity, load):
+        return velocity[0]
+
+    def force(self, t, q, velocity, load, sides):
+        push = load.push(t) - q[0] - 2.0 * (1.0 + sides.stop) * (q[0] - 0.2)
+        return push + 0.3 * q[1], -2.0 * q[1] + 0.3 * q[0]
+
+
+class SliderOfCoordinate(Slider):
+    frictions = (Friction(name="belt", coordinate="x", kinetic=0.2, static=0.3, ground_speed=0.2),)
+
+
+def test_a_friction_of_a_rate_beside_a_surface_moves_as_that_of_a_coordinate():
+    load = Load(frequency=0.9, push=Harmonic(0.4))
+    one, other = (
+        saltus.simulate(
+            System(model=kind(), load=load), x=0.1, y=0.0, velocity=(0.0, 0.1), duration=30.0
+        )
+        for kind in (Slider, SliderOfCoordinate)
+    )
+    assert {str(each.kind) for each in one.events} >= {"stick", "slip", "crossing"}
+    assert [each.kind for each in one.events] == [each.kind for each in other.events]
+    np.testing.assert_allclose(
+        [each.time for each in one.events], [each.time for each in other.events], rtol=1e-12
+    )
+    np.testing.assert_allclose(one.position, other.position, atol=1e-12)

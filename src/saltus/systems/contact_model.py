@@ -578,9 +578,11 @@ def solved_motion(
     """
     load = on_sides(model, load, slides)
     mass, force = mass_and_force(model, t, q, v, load)
-    late = _add_frictions(
-        model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free)
-    )
+    late: list[int] = []
+    if not model.has_multipliers:  # whose frictions are rows (`taylor/multipliers.py`)
+        late = _add_frictions(
+            model, v, mass, force, (normal_forces(model, t, q, v, load), slides, free)
+        )
     size = len(force)
     matrix = [[held_entry(mass[i][j], i, j, free) for j in range(size)] for i in range(size)]
     right = [free[i] * force[i] for i in range(size)]

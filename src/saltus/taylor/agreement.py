@@ -71,8 +71,9 @@ def _compare(
     system: System, traced: Trace, leaves: dict[Expr, Any], state: tuple[float, Any, Any, int]
 ) -> None:
     frictions = len(traced.friction_coordinates)
-    # rows of multipliers are compared without friction
-    directions = [0.0 if traced.rows else 1.0 if k % 2 else -1.0 for k in range(frictions)]
+    directions = [1.0 if k % 2 else -1.0 for k in range(frictions)]
+    if traced.rows:  # they are compared without friction
+        directions[: len(system.model.frictions)] = [0.0] * len(system.model.frictions)
     leaves |= {Expr("free", (), i): 1.0 for i in range(traced.flags)}
     leaves |= {Expr("slide", (), k): direction for k, direction in enumerate(directions)}
     for part, own in _own_values(system, traced, state, directions):
@@ -118,9 +119,8 @@ def _own_values(
         with np.errstate(all="ignore"):
             if model.holds_coordinates:
                 free = [1.0] * traced.local
-                ways = () if traced.rows else slides
                 found.append(
-                    ("acceleration", solved_motion(model, time, x, rate, load, free, ways)[0])
+                    ("acceleration", solved_motion(model, time, x, rate, load, free, slides)[0])
                 )
                 rows = mass_rows(model, x, time, load)
                 if not getattr(model, "dependent", 0):

@@ -423,7 +423,9 @@ class ContactState(KernelState):
         rates[np.abs(rates) <= CLOSED_BELOW * speeds] = 0.0
         length = units_of_gaps(request.system)[0]
         sizes = np.abs(rows[:count, :own]) @ np.abs(position) + length
-        for i, (contact, gap) in enumerate(zip(contacts, numbers[-count:], strict=True)):
+        for i, (contact, gap) in enumerate(
+            zip(contacts, numbers[len(numbers) - count :], strict=True)
+        ):
             touches = abs(gap) <= CLOSED_BELOW * sizes[i]
             if (gap < 0.0 and not touches) or (touches and rates[i] < 0.0):
                 what = "moves into" if touches else "lies beyond"
