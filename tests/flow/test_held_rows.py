@@ -582,6 +582,30 @@ def test_a_ball_on_a_shaken_table_leaves_it_where_the_table_falls_as_fast():
     np.testing.assert_allclose(releases[0], math.asin(1.0 / (0.5 * 4.0)) / 2.0, rtol=1e-12)
 
 
+def test_a_ball_flies_far_over_a_shaken_table():
+    """Its own series ends, but that of its distance from the table does not."""
+    shaken = Load(frequency=1.0, ground=Harmonic(1.3))
+    system = System(model=Ball(), load=shaken, impact=NewtonImpact(e=0.9))
+    motion = saltus.simulate(system, y=1.0, velocity=3.0, duration=14.0)
+
+    def distance(t, state):
+        return state[0] - 1.3 * np.sin(t)
+
+    distance.terminal = True
+    distance.direction = -1
+    flight = solve_ivp(
+        lambda t, state: [state[1], -1.0],
+        (0.0, 14.0),
+        [1.0, 3.0],
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-14,
+        max_step=0.5,
+        events=distance,
+    )
+    np.testing.assert_allclose(motion.impacts.time[0], flight.t_events[0][0], rtol=1e-12)
+
+
 # --- rows, and what is refused ---
 
 

@@ -299,9 +299,14 @@ def stop_row(motion, r):
         motion.velocities[a] -= motion.pushes[a, r] * rate / motion.mobilities[r]
 
 
+# Each time the step is found from what a series is along the last one, to within the 10th root.
+STEPS_TRIED = 5
+
+
 @lean_jit
-def row_step(motion, natural):
-    """The step, at most `natural`, that the series of open gaps and of sliding speeds allow."""
+def row_step(motion, natural, longest):
+    """The step, at most `natural`, that the series of open gaps and of sliding speeds allow, where
+    no step is longer than `longest`."""
     count = motion.contacts.shape[0]
     order = motion.order
     for r in range(motion.multipliers):
@@ -312,15 +317,14 @@ def row_step(motion, natural):
             continue
         place = row_series(motion, r)
         series = motion.margin_series[place : place + 1]
-        for _ in range(3):
-            if not natural < math.inf:
-                break
+        for _ in range(STEPS_TRIED):
+            span = min(natural, longest)
             size = abs(series[0, 0])
-            size = max(size, abs(series[0, 1]) * natural, abs(series[0, 2]) * natural * natural)
+            size = max(size, abs(series[0, 1]) * span, abs(series[0, 2]) * span * span)
             if not size > 0.0:
                 break
             shorter = step_size(series, order, size, motion.tolerance)
-            if not shorter < natural:
+            if not shorter < span:
                 break
             natural = shorter
     return natural

@@ -126,7 +126,7 @@ def contact_step_size(motion, t, target, size, with_columns):
                 natural = min(natural, step_size(r, order, reaction, sharp))
     terms = max(motion.press, motion.pull)
     if motion.multipliers > 0:
-        natural = row_step(motion, natural)
+        natural = row_step(motion, natural, target - t)
     while motion.checked > 0 and leaps(motion, t, 1.0, min(natural, target - t), size, terms):
         natural = 0.5 * min(natural, target - t)
     return natural
