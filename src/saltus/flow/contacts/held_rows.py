@@ -7,8 +7,6 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 
 from __future__ import annotations
 
-import math
-
 from saltus.flow.contacts.complementarity import invert, tell_instant
 from saltus.flow.contacts.layout import (
     PULLED,
@@ -299,6 +297,21 @@ def stop_row(motion, r):
         motion.velocities[a] -= motion.pushes[a, r] * rate / motion.mobilities[r]
 
 
+# The coefficients that a series begins with where the first ones are 0, as at a release.
+FIRST_OF_SERIES = 4
+
+
+@lean_jit
+def size_along(series, span, last):
+    """The largest of the first terms of a series at the end of a span."""
+    size = 0.0
+    power = 1.0
+    for k in range(last + 1):
+        size = max(size, abs(series[0, k]) * power)
+        power *= span
+    return size
+
+
 # Each time the step is found from what a series is along the last one, to within the 10th root.
 STEPS_TRIED = 5
 
@@ -319,8 +332,9 @@ def row_step(motion, natural, longest):
         series = motion.margin_series[place : place + 1]
         for _ in range(STEPS_TRIED):
             span = min(natural, longest)
-            size = abs(series[0, 0])
-            size = max(size, abs(series[0, 1]) * span, abs(series[0, 2]) * span * span)
+            size = size_along(series, span, FIRST_OF_SERIES)
+            if not size > 0.0:
+                size = size_along(series, span, order // 2)
             if not size > 0.0:
                 break
             shorter = step_size(series, order, size, motion.tolerance)
