@@ -449,8 +449,9 @@ def draw_sweep(
     where the amplitudes up and down differ by more than a hundredth of the largest one.
 
     The `quantity` is any of its numbers over both directions, such as "impact_count", "largest_x" or
-    "x" (the amplitude) of a coordinate or a named point x, or one of its `functions`. By default it is the amplitude, as in `draw_branch`, or, where most motions have
-    the same, as between two stops, the first of the functions.
+    "x" (the amplitude) of a coordinate or a named point x, or one of its `functions`. By default it
+    is the amplitude, as in `draw_branch`. Where most motions have the same one, as between two
+    stops, it is the first of the functions.
     """
     dataset = with_amplitudes(dataset)
     known = [

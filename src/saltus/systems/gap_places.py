@@ -114,9 +114,12 @@ def _with_left_out(model: Any, found: GapPlaces) -> GapPlaces:
 def _placed(
     model: Any, parts: Sequence[Part], reads: dict[str, tuple[int, ...]], stands: dict[int, str]
 ) -> GapPlaces | str:
-    """The places of the sums of `parts`, or why there are none. Each takes that of the coordinate with the largest
-    coefficient, of several the last, after the elimination of earlier sums, which none of its
-    functions reads and which no part holds alone."""
+    """The places of the sums of `parts`, or why there are none.
+
+    Each sum takes that of the coordinate with the largest coefficient after the elimination of
+    earlier sums, of several the last one. None of its functions reads this coordinate, and no part
+    holds it alone.
+    """
     names = columns_of(model.coordinates, tuple(stands.items()))
     columns = [*names, *(name for name in reads if name not in names)]
     called = list(names)
@@ -225,9 +228,10 @@ def _no_place(part: Part, parts: Sequence[Part], reads: dict[str, tuple[int, ...
     kept = _called(part)
     names = [name for name in terms_of(part) if name in reads]
     what = f"the {type(part).__name__.lower()} {part.name!r} keeps {kept}"
-    function = {Contact: "distance", Friction: "rate"}.get(type(part))
-    instead = f"; or give it a {function}, a method of the model, in place of its sum"
-    instead = "" if function is None else instead
+    instead = ""
+    if not isinstance(part, Surface):
+        function = "distance" if isinstance(part, Contact) else "rate"
+        instead = f"; or give it a {function}, a method of the model, in place of its sum"
     if names:
         return (
             f"{what}, and needs a coordinate of its own, with a constant coefficient and read by"

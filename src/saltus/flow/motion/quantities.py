@@ -265,7 +265,8 @@ def quantity_of(system: System, which: str | Callable[[Motion], Any]) -> Quantit
         )
     kind, _, displacement = which.partition("_")
     if kind not in TEXTS or system.model.weights_of(displacement) is None:
-        kind, displacement = AMPLITUDE, which
+        kind = AMPLITUDE
+        displacement = which
     if system.model.weights_of(displacement) is None:
         known = [*OF_DRIVEN, *displacements_of(system)]
         known += [f"{kind}_{name}" for kind in TEXTS for name in displacements_of(system)]

@@ -101,8 +101,8 @@ def find_orbit(
     velocity, coordinates
         The state at `time`, by the model's names: theta=0.3.
     period
-        The period of the orbit in forcing periods, of a cycle a guess of its time; by default the shortest one, up to `max_period`,
-        after which the motion returns.
+        The period of the orbit in forcing periods, of a cycle a guess of its time; by default the
+        shortest one, up to `max_period`, after which the motion returns.
     settle
         How many forcing periods, or for what time, the motion is followed first; by default until
         it has settled, up to 4960 forcing periods.
