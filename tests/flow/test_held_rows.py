@@ -618,6 +618,69 @@ def test_a_ball_flies_far_over_a_shaken_table():
     np.testing.assert_allclose(motion.impacts.time[0], flight.t_events[0][0], rtol=1e-12)
 
 
+# --- derivatives ---
+
+
+def differences(system, start, path, duration, step=1e-6):
+    """The central difference of the state at the end, along a number of the system."""
+    ends = []
+    for moved in (step, -step):
+        other = system.with_({path: system.get(path) + moved})
+        motion = saltus.simulate(other, **start, duration=duration)
+        ends.append(np.append(motion.position, motion.velocity))
+    return (ends[0] - ends[1]) / (2.0 * step)
+
+
+FEET = block(e=0.0, mu=0.9, shake=1.2, frequency=2.5)
+STATOR = rotor(e=0.0)
+IN_STATOR = {"x": 0.3, "y": 0.2, "velocity": (0.5, -0.4)}
+
+
+@pytest.mark.parametrize("path", ["model.mu", "model.height", "load.push.amplitude"])
+def test_derivatives_of_a_block_are_those_of_differences(path):
+    """Impacts of a corner while the other one is closed, which lets it go, and slips."""
+    start = on_left_corner(FEET, 0.05)
+    found = saltus.sensitivities(FEET, parameters=[path], **start, duration=6.0)
+    assert [str(each.kind) for each in found.motion.events].count("impact") == 3
+    expected = differences(FEET, start, path, 6.0)
+    np.testing.assert_allclose(found.parameters[:, 0], expected, rtol=1e-7, atol=1e-8)
+
+
+@pytest.mark.parametrize("path", ["model.mu", "model.room", "model.surface", "impact.e"])
+def test_derivatives_of_a_rotor_are_those_of_differences(path):
+    """It hits, turns round, sticks, slips and is released, twice."""
+    system = rotor(e=0.5) if path == "impact.e" else STATOR
+    duration = 3.0 if path == "impact.e" else 9.0
+    found = saltus.sensitivities(system, parameters=[path], **IN_STATOR, duration=duration)
+    kinds = {str(each.kind) for each in found.motion.events}
+    assert kinds >= ({"impact"} if path == "impact.e" else {"impact", "stick", "slip", "release"})
+    expected = differences(system, IN_STATOR, path, duration)
+    np.testing.assert_allclose(found.parameters[:, 0], expected, rtol=1e-7, atol=1e-8)
+
+
+def test_derivatives_to_the_state_are_those_of_differences():
+    found = saltus.sensitivities(STATOR, **IN_STATOR, duration=6.0)
+    state = np.array([0.3, 0.2, 0.5, -0.4])
+    for i in range(4):
+        ends = []
+        for step in (1e-6, -1e-6):
+            x, y, u, v = state + step * np.eye(4)[i]
+            motion = saltus.simulate(STATOR, x=x, y=y, velocity=(u, v), duration=6.0)
+            ends.append(np.append(motion.position, motion.velocity))
+        expected = (ends[0] - ends[1]) / 2e-6
+        np.testing.assert_allclose(found.state[:, i], expected, rtol=1e-7, atol=1e-8)
+    # the sticking rotor forgets all but where it is on the stator
+    assert np.linalg.matrix_rank(found.state, tol=1e-9) < 4
+
+
+def test_derivatives_after_an_accumulation_are_not_known():
+    found = saltus.sensitivities(
+        System(model=Ball(), impact=NewtonImpact(e=0.5)), y=1.0, velocity=0.0, duration=9.0
+    )
+    assert np.isnan(found.state).any()
+    assert "derivatives of this time are not known" in found.undefined
+
+
 # --- rows, and what is refused ---
 
 
@@ -701,9 +764,6 @@ def test_other_verbs_refuse_distances_in_one_sentence():
     system = rotor()
     for verb in (
         lambda: saltus.simulate_many(system, x=[0.3], y=[0.2], velocity=(0.0, 0.0), periods=1),
-        lambda: saltus.sensitivities(
-            system, parameters=["model.mu"], x=0.3, y=0.2, velocity=(0.0, 0.0), periods=1
-        ),
         lambda: saltus.find_orbit(system, x=0.3, y=0.2, velocity=(0.0, 0.0), period=1),
         lambda: saltus.page(system, x=0.3, y=0.2, velocity=(0.0, 0.0), path="none.html"),
     ):

@@ -560,7 +560,7 @@ def impact_of(motion, t, hit):
     for i in range(count):
         chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
     if motion.multipliers > 0:
-        onto(motion, chosen, 0)
+        onto(motion, chosen, 0, -1)
         regular = fill_contact_matrices(motion)
     if motion.columns > 0:
         detail = int(closing_columns(motion, t, hit))
@@ -759,6 +759,8 @@ def rests_in_a_row(motion, t, near, end):
         bring_to_rest(motion, block)
         if motion.multipliers > 0:
             measure_slides(motion)
-        if motion.columns > 0:
+        if motion.columns > 0 and motion.multipliers > 0:
+            forget(motion)  # the derivative of the time to rest is not known of rows
+        elif motion.columns > 0:
             rest_columns(motion, block)
         fill_after(motion)

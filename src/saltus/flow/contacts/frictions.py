@@ -15,7 +15,7 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate, friction_rate
-from saltus.flow.contacts.held_rows import all_rows_stand, some_idle, stop_row
+from saltus.flow.contacts.held_rows import all_rows_stand, onto, some_idle, stop_row
 from saltus.flow.contacts.impacts import friction_mobility, record_contact_event
 from saltus.flow.contacts.layout import (
     TOGETHER,
@@ -28,7 +28,7 @@ from saltus.flow.contacts.layout import (
     is_sum,
 )
 from saltus.flow.contacts.rows import row_series
-from saltus.flow.contacts.tangent import note_shifts, slope
+from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
 from saltus.flow.kernel.steps import (
@@ -246,8 +246,13 @@ def reach_ground_speed(motion, count, t, k, which, later):
         if which < 2:
             row = count + 2 * k + which
             columns_at_event(motion, EventCode.RELEASE, row, t, 1.0)
+        elif motion.multipliers > 0 and not crossed:
+            columns_at_event(motion, EventCode.RELEASE, row_series(motion, count + k), t, 1.0)
         for j in range(motion.columns):
             if which < 2:
+                motion.shifts[j] /= -motion.margin_series[row, 1]
+            elif motion.multipliers > 0 and not crossed:
+                row = row_series(motion, count + k)
                 motion.shifts[j] /= -motion.margin_series[row, 1]
             else:
                 moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
@@ -462,6 +467,13 @@ def stick_columns(motion, count):
     own = motion.own
     block = motion.block
     rows = motion.contacts.shape[0] + motion.frictions.shape[0]
+    if motion.multipliers > 0:
+        for j in range(motion.columns):
+            onto(motion, 0, 0, j)
+        fill_slopes(motion)
+        for j in range(motion.columns):
+            onto(motion, 0, 1, j)
+        return
     for j in range(motion.columns):
         size = 0
         for row in range(rows):

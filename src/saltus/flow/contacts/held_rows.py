@@ -16,6 +16,7 @@ from saltus.flow.contacts.layout import (
     FrictionImpact,
     NoMargin,
     first_flag,
+    first_row,
 )
 from saltus.flow.contacts.rows import (
     gives,
@@ -204,10 +205,37 @@ def takes_part(motion, r, bits):
 
 
 @lean_jit
-def onto(motion, bits, level):
+def row_lift(motion, j, r, velocities):
+    """The derivative of a row's rate along a column of the tangent, at some velocities."""
+    first = first_row(motion) + r * (motion.local + 1)
+    place = j * motion.solver_numbers.size + first
+    total = motion.slopes[place + motion.local]
+    for a in range(motion.local):
+        total += motion.slopes[place + a] * velocities[a]
+        total += row_entry(motion, r, a) * motion.velocities[motion.own * (1 + j) + a]
+    return total
+
+
+@lean_jit
+def left_of(motion, r, level, j):
+    """What is to become 0: a gap (level 0) or the rate of a row (1), or with j >= 0 its derivative
+    along a column of the tangent."""
+    size = motion.solver_numbers.size
+    if level == 0 and j < 0:
+        return row_gap(motion, r)
+    if level == 0:
+        return motion.slopes[(j + 1) * size - motion.contacts.shape[0] + r]
+    if j < 0:
+        return rate_at(motion, r, motion.velocities)
+    return row_lift(motion, j, r, motion.velocities)
+
+
+@lean_jit
+def onto(motion, bits, level, j):
     """Take the coordinates (level 0) or the velocities (1) onto what is held, or with `bits` onto
     the gaps of these contacts, by one step of Newton's method in the metric of M. Rows that follow
-    from those before them are left out."""
+    from those before them are left out. With j >= 0 so is a column of the tangent, by the slopes of
+    the numbers."""
     count = motion.contacts.shape[0]
     block = motion.block
     rows = count if level == 0 else motion.multipliers
@@ -223,8 +251,7 @@ def onto(motion, bits, level):
             if takes_part(motion, s, bits):
                 block[row, column] = gives(motion, r, s)
                 column += 1
-        left = row_gap(motion, r) if level == 0 else rate_at(motion, r, motion.velocities)
-        block[row, size] = left
+        block[row, size] = left_of(motion, r, level, j)
         row += 1
     row = 0
     for r in range(rows):
@@ -248,9 +275,9 @@ def onto(motion, bits, level):
         block[row, size] = share
         for a in range(motion.local):
             if level == 0:
-                motion.coordinates[a] -= motion.pushes[a, r] * share
+                motion.coordinates[motion.own * (1 + j) + a] -= motion.pushes[a, r] * share
             else:
-                motion.velocities[a] -= motion.pushes[a, r] * share
+                motion.velocities[motion.own * (1 + j) + a] -= motion.pushes[a, r] * share
 
 
 @lean_jit
@@ -262,9 +289,9 @@ def onto_rows(motion):
         held = held or is_held(motion, r)
     if not held:
         return True
-    onto(motion, 0, 0)
+    onto(motion, 0, 0, -1)
     regular = fill_numbers(motion)
-    onto(motion, 0, 1)
+    onto(motion, 0, 1, -1)
     return regular
 
 

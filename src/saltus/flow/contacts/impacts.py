@@ -28,7 +28,7 @@ from saltus.flow.contacts.layout import (
     jumping,
     restitution,
 )
-from saltus.flow.contacts.rows import pull_of, row_series
+from saltus.flow.contacts.rows import pull_of, row_series, told_rate
 from saltus.flow.kernel.layout import EXACT, LEAST_LOSS, Mode
 from saltus.flow.kernel.steps import column_step, leaps, slow_share, step_size
 from saltus.taylor import lean_jit
@@ -648,7 +648,10 @@ def undecide(motion, opened):
     later.
     """
     for i in range(motion.contacts.shape[0]):
-        if (
+        if opened >> i & 1 and motion.multipliers > 0:
+            if told_rate(motion, i) == 0.0:
+                motion.contacts[i, ContactColumn.CLOSED] = 1
+        elif (
             opened >> i & 1
             and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0
         ):

@@ -210,7 +210,7 @@ def end_accumulation_of(motion, t):
         motion.contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
         return t
     if motion.columns > 0:
-        if turns:
+        if turns or motion.multipliers > 0:
             unknown_shifts(motion)
         else:
             accumulation_shifts(motion, near, t)
@@ -232,8 +232,8 @@ def decide_columns(motion, t):
         start_columns(motion, t, closed_bits(motion))
         hold_coordinates(motion)
         hold_frictions(motion)
-    if motion.frictions.shape[0] > 0:
-        if is_pressed(motion):
+    if motion.frictions.shape[0] > 0 or motion.multipliers > 0:
+        if is_pressed(motion) or motion.multipliers > 0:
             fill_contact_matrices(motion)
         fill_slopes(motion)
         stick_columns(motion, motion.contacts.shape[0])

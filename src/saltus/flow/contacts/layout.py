@@ -209,7 +209,7 @@ def solver_arrays(local, count, columns, frictions, numbers, multipliers):
     """
     rows = count + frictions
     most = max(2 * local, rows + 1)
-    of_rows = rows_of_zeros(local + 3, multipliers)
+    of_rows = rows_of_zeros(local + 4, multipliers)
     # one piece of memory, as lanes ask for it at every slow impact
     of_contacts = rows_of_zeros(2 * count + 10, count)
     return SolverArrays(
@@ -236,6 +236,7 @@ def solver_arrays(local, count, columns, frictions, numbers, multipliers):
         of_rows[local],
         of_rows[local + 1],
         of_rows[local + 2],
+        of_rows[local + 3],
     )
 
 

@@ -27,6 +27,7 @@ from saltus.flow.contacts.complementarity import (
     worst_violation,
 )
 from saltus.flow.contacts.frictions import rubs_along
+from saltus.flow.contacts.held_rows import row_lift
 from saltus.flow.contacts.impacts import hold_coordinates, time_to_close
 from saltus.flow.contacts.layout import (
     SAME_IMPACT,
@@ -36,13 +37,14 @@ from saltus.flow.contacts.layout import (
     FrictionColumn,
     FrictionImpact,
     first_flag,
+    first_row,
     ground_speed,
     has_phases,
     restitution,
     rub_coefficient,
     zeros,
 )
-from saltus.flow.contacts.rows import gives, independence, row_series, told_rate
+from saltus.flow.contacts.rows import gives, independence, row_entry, row_series, told_rate
 from saltus.flow.contacts.tangent import (
     fill_slopes,
     hold_columns,
@@ -125,6 +127,12 @@ def rubbing_phase(motion, chosen, scale):
     choose_ways(motion, chosen, found, ways)
     struck_velocities(motion, found, after)
     worst_violation(motion, chosen, found, after)
+    column = unknown_impulses(motion, found)
+    for k in range(frictions - 1, -1 if motion.multipliers > 0 else frictions - 1, -1):
+        motion.stuck_impulses[k] = 0.0
+        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            column -= 1
+            motion.stuck_impulses[k] = motion.block[column, unknown_impulses(motion, found)]
     for a in range(local):
         motion.velocities[a] = after[a]
     for i in range(count):
@@ -235,6 +243,9 @@ def rubbing_columns(motion, acts, chosen, first):
     own = motion.own
     local = motion.local
     count = motion.contacts.shape[0]
+    if motion.multipliers > 0:
+        rubbing_row_columns(motion, acts, chosen, first)
+        return
     given = np.zeros(local)
     lifts = np.zeros(count)
     fill_slopes(motion)
@@ -280,6 +291,93 @@ def rubbing_columns(motion, acts, chosen, first):
         for i in range(count):
             if acts >> i & 1:
                 motion.pull_slopes[j, i] += motion.block[row, size]
+                row += 1
+        for a in range(local):
+            z[a] = given[a]
+
+
+@jit
+def rubbing_row_columns(motion, acts, chosen, first):
+    """`rubbing_columns` where contacts and frictions have rows, which change too:
+
+    M dv+ = M dv- - dM w + sum (dB N + B dN) + sum (dT' P + T' dP),
+    W dv+ + dW v+ + db = -d(E rates-) of the contacts that act,    T dv+ + dT v+ + dw = 0 of
+    frictions that stick.
+    """
+    own = motion.own
+    local = motion.local
+    count = motion.contacts.shape[0]
+    frictions = motion.frictions.shape[0]
+    size = motion.solver_numbers.size
+    begin = first_row(motion)
+    width = local + 1
+    given = np.zeros(local)
+    turned = np.zeros(local)
+    before = np.zeros(local)
+    after = np.zeros(local)
+    lifts = np.zeros(count)
+    stuck = np.zeros(frictions)
+    fill_slopes(motion)
+    unknown = unknown_impulses(motion, acts)
+    for k in range(frictions):
+        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            stuck[k] = motion.stuck_impulses[k]
+    for a in range(local):
+        after[a] = motion.velocities[a]
+        before[a] = after[a] - motion.jump[a]
+    for j in range(motion.columns):
+        z = motion.velocities[own * (1 + j) : own * (2 + j)]
+        for i in range(count):
+            lifts[i] = row_lift(motion, j, i, before)
+            motion.pull_slopes[j, i] *= restitution(motion, i, i)
+            motion.pull_slopes[j, i] += slope(motion, j, local * local + (count + 1) * i) * first[i]
+        for b in range(local):
+            turned[b] = 0.0
+            for c in range(local):
+                turned[b] -= slope(motion, j, local * b + c) * motion.jump[c]
+            for i in range(count):
+                turned[b] += motion.slopes[j * size + begin + i * width + b] * motion.impulses[i]
+                k = rub_of(motion, i)
+                if k >= 0:
+                    slips = slip_sign(motion, k) * rub_coefficient(motion, k)
+                    entry = motion.slopes[j * size + begin + (count + k) * width + b]
+                    turned[b] -= slips * entry * motion.impulses[i]
+                    moved = slope(motion, j, begin - 2 * frictions + k)
+                    slid = slip_sign(motion, k) * moved * row_entry(motion, count + k, b)
+                    turned[b] -= slid * motion.impulses[i]
+            for k in range(frictions):
+                entry = motion.slopes[j * size + begin + (count + k) * width + b]
+                turned[b] += entry * stuck[k]
+        for a in range(local):
+            given[a] = z[a]
+            for b in range(local):
+                given[a] += motion.inverse[a, b] * turned[b]
+            for i in range(count):
+                given[a] += push(motion, a, i) * motion.pull_slopes[j, i]
+        row = 0
+        for i in range(count):
+            if acts >> i & 1:
+                change = 0.0
+                for k in range(count):
+                    if chosen >> k & 1:
+                        change += restitution(motion, i, k) * lifts[k]
+                        change += slope(motion, j, local * local + count * i + k) * motion.gaps[k]
+                for a in range(local):
+                    z[a] = given[a]
+                fill_sticking(motion, row, i, acts, -change - row_lift(motion, j, i, after))
+                row += 1
+        for k in range(frictions):
+            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+                for a in range(local):
+                    z[a] = given[a]
+                fill_sticking(motion, row, count + k, acts, -row_lift(motion, j, count + k, after))
+                row += 1
+        eliminate(motion.block, unknown, unknown + 1)
+        add_unknown(motion, acts, given)
+        row = 0
+        for i in range(count):
+            if acts >> i & 1:
+                motion.pull_slopes[j, i] += motion.block[row, unknown]
                 row += 1
         for a in range(local):
             z[a] = given[a]

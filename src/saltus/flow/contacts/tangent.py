@@ -26,6 +26,7 @@ from saltus.flow.contacts.complementarity import (
     push,
     tell_instant,
 )
+from saltus.flow.contacts.held_rows import left_of, onto, row_lift
 from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, press_of
 from saltus.flow.contacts.layout import (
     APART,
@@ -59,6 +60,8 @@ def slope(motion, j, place):
 @lean_jit
 def gap_derivative(motion, j, i):
     """The derivative of a contact's gap along column j."""
+    if motion.multipliers > 0:
+        return left_of(motion, i, 0, j)
     own = motion.own
     count = motion.contacts.shape[0]
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
@@ -69,6 +72,8 @@ def gap_derivative(motion, j, i):
 @lean_jit
 def lift_rate(motion, j, i):
     """The derivative of the rate of a contact's gap along column j."""
+    if motion.multipliers > 0:
+        return row_lift(motion, j, i, motion.velocities)
     own = motion.own
     coordinate = motion.contacts[i, ContactColumn.COORDINATE]
     return motion.signs[i] * motion.velocities[own * (1 + j) + coordinate]
@@ -95,6 +100,11 @@ def jump_columns(motion, hit):
 def hold_columns(motion, chosen):
     """Set the columns of coordinates at the contacts in `chosen`: they move with the contact's
     position and, if it is closed, have no velocity."""
+    if motion.multipliers > 0:
+        fill_slopes(motion)
+        for j in range(motion.columns):
+            onto(motion, chosen, 0, j)
+        return
     own = motion.own
     count = motion.contacts.shape[0]
     for j in range(motion.columns):
@@ -410,6 +420,8 @@ def start_columns(motion, t, closed):
     """
     own = motion.own
     count = motion.contacts.shape[0]
+    if motion.multipliers > 0:
+        return  # what is held takes them onto it
     fill_slopes(motion)
     if is_pressed(motion):
         fill_rubbing(motion)

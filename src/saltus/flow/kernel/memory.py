@@ -319,6 +319,7 @@ class SolverArrays(NamedTuple):
     mobilities: Any  # and what each gives to its own row
     row_terms: Any  # the sizes of the terms of their rates at the end of the last step
     slide_rates: Any  # of the frictions: their sliding speeds, exactly 0 at rest
+    stuck_impulses: Any  # and the impulses with which they stuck at the last impact
 
 
 class ContactsParts(NamedTuple):

@@ -60,7 +60,7 @@ _LIMITS = types.Tuple((_f, types.UniTuple(_f, 2), _f, types.UniTuple(_f, 4)))
 _SIZES = named_tuple(LaneSizes, *(27 * (_i,)), _i1, _i1)
 _SETTINGS = named_tuple(LaneSettings, _f, _f, _f, _f, _LIMITS, _LIMITS, _f)
 _WORK = named_tuple(Work, _f2, _records(JOB), _f2, TABLES, _f2, _records(END), _f2, _f3, _i1)
-_SOLVER = named_tuple(SolverArrays, _f1, *4 * (_f2,), *13 * (_f1,), _f2, _f2, *3 * (_f1,))
+_SOLVER = named_tuple(SolverArrays, _f1, *4 * (_f2,), *13 * (_f1,), _f2, _f2, *4 * (_f1,))
 
 
 class LaneTypes(NamedTuple):

@@ -542,7 +542,7 @@ def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
-    check_system(system, "sensitivities", several_contacts=True)
+    check_system(system, "sensitivities", several_contacts=True, multipliers=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 
@@ -590,6 +590,8 @@ def _rates_at(motion: Motion, time: float) -> np.ndarray:
     if side == 0:
         return np.zeros(2 * velocity.size)
     acceleration: Any
+    if system.model.has_multipliers:
+        return _rates_of_series(motion, time)
     if system.model.holds_coordinates:
         held = {
             contact.coordinate for contact in system.model.contacts if contact.name in motion.closed
@@ -616,6 +618,21 @@ def _rates_at(motion: Motion, time: float) -> np.ndarray:
     return np.concatenate([velocity, np.atleast_1d(np.asarray(acceleration, dtype=float))])
 
 
+def _rates_of_series(motion: Motion, time: float) -> np.ndarray:
+    """The same of a motion whose contacts are held by multipliers, from the series of its last
+    step."""
+    dense = motion.dense
+    assert dense is not None
+    if not dense.start.size:
+        return np.full(2 * np.size(motion.velocity), math.nan)
+    series = dense.series[-1]
+    orders = np.arange(series.shape[1])
+    tau = time - dense.start[-1]
+    powers = tau ** np.maximum(orders - 2, 0)
+    acceleration = series[:, 2:] @ (orders * (orders - 1) * powers)[2:]
+    return np.concatenate([np.atleast_1d(motion.velocity), acceleration])
+
+
 def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
     """Why some columns are nan: the last event at which the motion has lost its derivative; None if
     all are finite.
@@ -623,6 +640,11 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
     if np.isfinite(columns).all():
         return None
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
+        if event.kind is EventKind.HELD and motion.system.model.has_multipliers:
+            return (
+                f"impacts on {event.contact} accumulate until time {event.time:.9g}, and where"
+                " contacts are distances derivatives of this time are not known"
+            )
         if (
             event.kind is EventKind.IMPACT
             and motion.system.model.contacts

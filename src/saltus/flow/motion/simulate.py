@@ -166,7 +166,7 @@ class MotionRequest:
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
     ) -> None:
-        check_system(system, "simulate", several_contacts=True, multipliers=sensitivities is None)
+        check_system(system, "simulate", several_contacts=True, multipliers=True)
         # what a system remembers is forgotten where values that its classes read have changed
         structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
