@@ -686,15 +686,15 @@ def test_derivatives_after_an_accumulation_are_not_known():
 
 def test_rows_are_the_derivatives_of_gaps_and_speeds():
     """Entries of the trace beside complex steps of the model's own methods."""
-    from saltus.flow.kernel.compiled import contact_numbers_at, program
+    from saltus.flow.kernel.compiled import contact_rows_at, program
 
     system = rotor()
     model = system.model
     run = program(system, ())
     q, v = np.array([0.3, -0.5]), np.array([0.7, 0.2])
-    numbers = contact_numbers_at(run, (0.3, 0.0), 0, np.concatenate([q, v]))
-    gap = numbers[-1]
-    contact, friction = numbers[-7:-1].reshape(2, 3)
+    entries, drifts, gaps = contact_rows_at(run, 0.3, 0.0, np.concatenate([q, v]))
+    contact, friction = np.column_stack([entries, drifts])
+    (gap,) = gaps
     step = 1e-30j
     for i, e in enumerate(np.eye(2)):
         assert abs(contact[i] - model.clearance(0.3, q + step * e, None).imag / 1e-30) < 1e-15
@@ -758,6 +758,27 @@ def test_three_feet_whose_shares_matter_are_refused():
         system, x=0.0, y=0.0, tilt=0.0, velocity=(0.0, 0.0, 0.0), duration=3.0
     )
     np.testing.assert_allclose(standing.position, 0.0, atol=1e-12)
+
+
+class Pressed(Ball):
+    """A ball between a table that rises and a ceiling."""
+
+    contacts = (
+        Contact(name="table", distance="height"),
+        Contact(name="ceiling", distance="room"),
+    )
+
+    def room(self, t, q, load):
+        return 1.2 - q
+
+
+@pytest.mark.parametrize("e", [0.6, 0.0])
+def test_a_ball_that_a_table_crushes_at_a_ceiling_is_refused_by_name(e):
+    load = Load(frequency=1.0, ground=Harmonic(1.5))
+    system = System(model=Pressed(), load=load, impact=NewtonImpact(e=e))
+    when = f"{math.asin(1.2 / 1.5):.9g}"  # when the table is as high
+    with pytest.raises(MotionError, match=f"'table' and 'ceiling' at time {when}"):
+        saltus.simulate(system, y=0.6, velocity=0.0, duration=3.0)
 
 
 def test_other_verbs_refuse_distances_in_one_sentence():

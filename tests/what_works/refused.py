@@ -18,7 +18,6 @@ DISTANCES = "does not follow contacts of a distance"
 NOT_BESIDE_DISTANCES = (
     "ensemble",
     "its extrema",
-    "derivatives",
     "orbit",
     "branch",
     "sweep",
@@ -74,5 +73,8 @@ REASONS = {
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
     SWEEP: "Cycles without a load are not swept yet; `continue_orbit` follows them.",
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
-    DISTANCES: "Contacts of a `distance` and frictions of a `rate` are followed by `simulate` so far.",
+    DISTANCES: (
+        "Contacts of a `distance` and frictions of a `rate` are followed by `simulate` and"
+        " `sensitivities` so far."
+    ),
 }

@@ -592,16 +592,35 @@ def _drives(path: str) -> bool:
     )
 
 
-def contact_numbers_at(
-    run: Program, instant: tuple[float, float], piece: int, state: np.ndarray
-) -> np.ndarray:
-    """The numbers that events at contacts need (`Trace.contact_numbers`), at an instant (local time,
-    begin of the forcing period) and a state of the kernel."""
-    numbers = np.zeros(len(run.trace.contact_numbers))
-    first = len(run.env[0]) - run.structure.flags - len(INSTANT)
-    run.env[0][first : first + len(INSTANT)] = instant
+class ContactRows(NamedTuple):
+    """The rows of contacts, frictions and surfaces that multipliers hold, at an instant."""
+
+    entries: np.ndarray  # (parts, coordinates)
+    drifts: np.ndarray  # (parts,)
+    gaps: np.ndarray  # (contacts,)
+
+
+def contact_rows_at(run: Program, time: float, length: float, state: np.ndarray) -> ContactRows:
+    """The rows at a time and a state of the kernel, under a load of the period `length`, or 0."""
+    first, local = divmod(time, length) if length else (0.0, time)
+    sizes = run.structure.sizes
+    numbers = np.zeros(sizes.contact_numbers)
+    place = len(run.env[0]) - run.structure.flags - len(INSTANT)
+    run.env[0][place : place + len(INSTANT)] = local, first * length
+    piece = piece_at(run, time, local, length)
     _load_fillers()[2](run.structure.functions[1], run.env, piece, state, numbers)
-    return numbers
+    end = len(numbers) - len(run.trace.signs)
+    table = numbers[end - sizes.multipliers * (sizes.own + 1) : end]
+    table = table.reshape(sizes.multipliers, sizes.own + 1)
+    return ContactRows(table[:, :-1], table[:, -1], numbers[end:])
+
+
+def piece_at(run: Program, time: float, local: float, length: float) -> int:
+    """The piece of the load's records at a time, which is `local` within a period."""
+    breaks: np.ndarray = run.env[2]
+    if run.structure.sizes.repeats:
+        return int((breaks * length).searchsorted(local, side="right"))
+    return int(breaks.searchsorted(time, side="right"))
 
 
 _structures: dict[Any, tuple[Trace, CompiledStructure]] = {}

@@ -19,9 +19,10 @@ from saltus.errors import MotionError, ParameterError
 from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
 from saltus.flow.kernel.compiled import (
     Program,
-    contact_numbers_at,
+    contact_rows_at,
     load_contacts_kernel,
     load_kernel,
+    piece_at,
     taylor_order,
 )
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
@@ -147,18 +148,14 @@ class KernelState:
             The state lies beyond the contact, or the model's gap or reset is impossible.
         """
         at = request.clock
-        breaks = run.env[2]
         self.rows = NO_ROWS  # of several contacts
+        self._count = 0  # of these, of contacts
         # coordinates, velocities, each with its tangent's columns, and shifts
         self.state = _first_state(run, request.start)
         # one record MOTION
         self.array, self._memory = motion_record(taylor_order(request.tol), run.structure.sizes)
-        piece = 0
-        if run.structure.sizes.repeats:
-            piece = int((breaks * at.length).searchsorted(at.local, side="right"))
-        elif breaks.size:
-            piece = int(breaks.searchsorted(request.time, side="right"))
-        mode, side, leave_by = self._at_contact(request, run, piece)
+        mode, side, leave_by = self._at_contact(request, run)
+        piece = piece_at(run, request.time, at.local, at.length)
         dense = int(
             request.dense or request.sample_times is not None or _is_nonlinear(request.system)
         )
@@ -182,7 +179,7 @@ class KernelState:
         """Let the kernel record from the beginning of its buffers on."""
         self.array["recorded_steps"] = self.array["recorded_events"] = 0
 
-    def _at_contact(self, request: MotionRequest, run: Program, piece: int) -> tuple[int, int, int]:
+    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
         """The mode and the side at the start, and by which side a motion leaves that is not
         unique.
         """
@@ -199,6 +196,11 @@ class KernelState:
                 name,
             )
         return mode, side, request.side or 0
+
+    @property
+    def touching(self) -> list[int]:
+        """The contacts that are closed, or have just been, of several."""
+        return []
 
     def _kernel(self) -> Callable[..., int]:
         return load_kernel()
@@ -332,7 +334,7 @@ class ContactState(KernelState):
     `FrictionColumn`.
     """
 
-    def _at_contact(self, request: MotionRequest, run: Program, piece: int) -> tuple[int, int, int]:
+    def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
         """Fill the rows; the kernel first decides which contacts at rest at their positions stay
         closed.
 
@@ -347,6 +349,7 @@ class ContactState(KernelState):
         speeds = numbers[len(names) :]
         own_contacts, own_frictions, surfaces = _parts(request.system)
         held = run.trace.contact_coordinates
+        self._count = len(held)
         rubbed = run.trace.friction_coordinates
         self.rows = contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
         if run.trace.friction_contacts:
@@ -356,7 +359,7 @@ class ContactState(KernelState):
         )
         rates = None
         if run.structure.sizes.multipliers:
-            rates = self._close_rows(request, run, piece, own_contacts)
+            rates = self._close_rows(request, run, own_contacts)
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             if rates is not None:
                 break
@@ -398,9 +401,7 @@ class ContactState(KernelState):
             )
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
-    def _close_rows(
-        self, request: MotionRequest, run: Program, piece: int, contacts: Any
-    ) -> np.ndarray:
+    def _close_rows(self, request: MotionRequest, run: Program, contacts: Any) -> np.ndarray:
         """Fill the rows of contacts whose gaps are functions, and return the rates of these gaps,
         then of the frictions' sliding speeds. Gaps and rates count as 0 up to the rounding of their
         terms.
@@ -410,22 +411,14 @@ class ContactState(KernelState):
         ParameterError
             The state lies beyond a contact, or moves into a contact that it is at.
         """
-        at = request.clock
-        own = run.structure.sizes.own
-        count = len(contacts)
-        parts = run.structure.sizes.multipliers
-        numbers = contact_numbers_at(run, (at.local, at.first * at.length), piece, self.state)
-        table = numbers[len(numbers) - count - parts * (own + 1) : len(numbers) - count]
-        rows = table.reshape(parts, own + 1)
-        position, velocity = self.state[:own], self.state[-own:]
-        rates: np.ndarray = rows[:, :own] @ velocity + rows[:, own]
-        speeds = np.abs(rows[:, :own]) @ np.abs(velocity) + np.abs(rows[:, own])
+        entries, drifts, gaps = contact_rows_at(run, request.time, request.clock.length, self.state)
+        position, velocity = np.split(request.start, 2)
+        rates: np.ndarray = entries @ velocity + drifts
+        speeds = np.abs(entries) @ np.abs(velocity) + np.abs(drifts)
         rates[np.abs(rates) <= CLOSED_BELOW * speeds] = 0.0
         length = units_of_gaps(request.system)[0]
-        sizes = np.abs(rows[:count, :own]) @ np.abs(position) + length
-        for i, (contact, gap) in enumerate(
-            zip(contacts, numbers[len(numbers) - count :], strict=True)
-        ):
+        sizes = np.abs(entries[: len(contacts)]) @ np.abs(position) + length
+        for i, (contact, gap) in enumerate(zip(contacts, gaps, strict=True)):
             touches = abs(gap) <= CLOSED_BELOW * sizes[i]
             if (gap < 0.0 and not touches) or (touches and rates[i] < 0.0):
                 what = "moves into" if touches else "lies beyond"
@@ -437,6 +430,14 @@ class ContactState(KernelState):
             self.rows[i, ContactColumn.CLOSED] = int(touches and rates[i] == 0.0)
             self.rows[i, ContactColumn.SKIP] = int(touches)
         return rates
+
+    @property
+    def touching(self) -> list[int]:
+        """The contacts that are closed, or have just been."""
+        rows = self.rows[: self._count]
+        touches = (rows[:, ContactColumn.CLOSED] == 1) | (rows[:, ContactColumn.SKIP] > 0)
+        found: list[int] = np.flatnonzero(touches).tolist()
+        return found
 
     def _kernel(self) -> Callable[..., int]:
         return load_contacts_kernel()

@@ -562,6 +562,8 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
     in_rows = system.model.has_multipliers
+    if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and in_rows:
+        _refuse_crushed(system, now, now.touching)
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT, Status.PASSED) and not in_rows:
         gaps = [
             each.gap(position[system.model.coordinates.index(each.coordinate)])

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.flow.kernel.compiled import contact_rows_at, program
 from saltus.flow.kernel.layout import LOSSLESS
 from saltus.progress import html_table, rows_table
 from saltus.systems import System, energy_gain, friction_margins
@@ -365,16 +366,43 @@ def crushed(system: System, time: float, state: np.ndarray, chosen: Sequence[int
     words; empty if none do.
     """
     model: Any = system.model
-    if (
-        not system.dependent
-        or len(chosen) < 2
-        or not model.close_in(time, system.load, state, chosen)
-    ):
+    if len(chosen) < 2:
+        return ""
+    if model.has_multipliers:
+        chosen = _closing_in(system, time, state, chosen)
+        if not chosen:
+            return ""
+    elif not system.dependent or not model.close_in(time, system.load, state, chosen):
         return ""
     names = " and ".join(repr(model.contacts[i].name) for i in chosen)
     return (
         f"a body is crushed between the contacts {names} at time {time:.9g}, which leave it no room"
         " there: no motion leads beyond; ask for a shorter time"
+    )
+
+
+# A sum of gaps does not depend on the state up to this share of its terms.
+ROUNDED = 1e-9
+
+
+def _closing_in(system: System, time: float, state: np.ndarray, chosen: Sequence[int]) -> list[int]:
+    """Those of the contacts with rows W of which a sum of gaps with positive weights does not
+    depend on the state, and falls by what moves them."""
+    from scipy.optimize import nnls
+
+    entries, drifts, _ = contact_rows_at(
+        program(system, ()), time, system.load.period or 0.0, state
+    )
+    w = entries[list(chosen)]
+    sizes = np.linalg.norm(w, axis=1)
+    if not sizes.all():
+        return []
+    w = w / sizes[:, None]
+    weights, _ = nnls(np.vstack([w.T, np.ones(len(w))]), np.append(np.zeros(w.shape[1]), 1.0))
+    closed = np.abs(weights @ w).max() < ROUNDED * weights.max(initial=0.0)
+    falls = weights @ (drifts[list(chosen)] / sizes) < 0.0
+    return [i for i, share in zip(chosen, weights, strict=True) if share > ROUNDED] * bool(
+        closed and falls
     )
 
 
