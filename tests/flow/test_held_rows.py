@@ -673,12 +673,39 @@ def test_derivatives_to_the_state_are_those_of_differences():
     assert np.linalg.matrix_rank(found.state, tol=1e-9) < 4
 
 
-def test_derivatives_after_an_accumulation_are_not_known():
-    found = saltus.sensitivities(
-        System(model=Ball(), impact=NewtonImpact(e=0.5)), y=1.0, velocity=0.0, duration=9.0
-    )
-    assert np.isnan(found.state).any()
-    assert "derivatives of this time are not known" in found.undefined
+def test_derivatives_of_the_time_to_rest_are_those_of_its_closed_form():
+    """It is sqrt(2 h) (1 + e) / (1 - e) for a fall from h."""
+    system = System(model=Ball(), impact=NewtonImpact(e=0.5))
+    found = saltus.sensitivities(system, parameters=["impact.e"], y=2.0, velocity=0.0, duration=9.0)
+    rest = [str(each.kind) for each in found.motion.events].index("held")
+    by_height = 0.5 * 3.0  # 3 / sqrt(2 h)
+    by_loss = 2.0 * 2.0 / 0.5**2
+    np.testing.assert_allclose(found.event_times[rest, [0, 2]], [by_height, by_loss], rtol=1e-8)
+    np.testing.assert_allclose(found.state, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "path", "duration"),
+    [
+        (rotor(e=0.3), IN_STATOR, "model.mu", 7.0),
+        (block(e=0.3), on_left_corner(block(e=0.3), 0.05), "model.mu", 3.0),
+        (
+            System(
+                model=Ball(),
+                load=Load(frequency=2.0, ground=Harmonic(0.05)),
+                impact=NewtonImpact(e=0.5),
+            ),
+            {"y": 0.5, "velocity": 0.3},
+            "load.ground.amplitude",
+            9.0,
+        ),
+    ],
+)
+def test_derivatives_through_accumulations_are_those_of_differences(system, start, path, duration):
+    found = saltus.sensitivities(system, parameters=[path], **start, duration=duration)
+    assert "held" in {str(each.kind) for each in found.motion.events}
+    expected = differences(system, start, path, duration)
+    np.testing.assert_allclose(found.parameters[:, 0], expected, rtol=1e-6, atol=1e-8)
 
 
 # --- rows, and what is refused ---

@@ -325,7 +325,7 @@ def _curved() -> System:
 
 
 def _rocking_table() -> System:
-    return System(model=RockingTable(), load=_pushed(0.5), impact=NewtonImpact(0.0))
+    return System(model=RockingTable(), load=_pushed(0.5), impact=NewtonImpact(0.3))
 
 
 def _harvester() -> System:

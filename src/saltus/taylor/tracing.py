@@ -114,6 +114,7 @@ class Trace:
     # drift of each, then the gaps
     rows: list[Expr] = field(default_factory=list)
     limits: dict[str, Expr] = field(default_factory=dict)  # margins of these frictions
+    with_pulls: bool = False  # whether the second derivatives of these gaps are series too
     positions: list[Expr] = field(default_factory=list)
     # for each contact, the coordinates of first order after an impact on it
     jumps: list[Expr] = field(default_factory=list)
@@ -341,6 +342,7 @@ def trace(
         model=type(system.model).__name__, side_count=len(sides), dof=len(inner.coordinates)
     )
     result.first_order, result.dependent = len(inner.first_order), getattr(inner, "dependent", 0)
+    result.with_pulls = paths is not None
     twin = substitute_numbers(system.in_gap_coordinates, result.symbol)
     _name_records(twin.load)
     object.__setattr__(twin, "load", DeclaredLoad(twin.load, twin.model))
@@ -596,7 +598,18 @@ def _trace_multipliers(
     gaps = [row.value for row in held.contacts]
     speeds = [row.value for row in held.frictions]
     ones = [number(1.0)] * (2 * len(surfaces))
-    return held.accelerations, [*held.reactions, *held.margins, *ones, *gaps, *speeds, *surfaces]
+    series = [*held.reactions, *held.margins, *ones, *gaps, *speeds, *surfaces]
+    if result.with_pulls:
+        series += [_pull_of(row) for row in held.contacts]
+    return held.accelerations, series
+
+
+def _pull_of(row: Any) -> Expr:
+    """The second derivative of a gap."""
+    total: Expr = row.bend
+    for i, entry in enumerate(row.entries):
+        total = total + entry * Expr("acceleration", (), i)
+    return total
 
 
 @comparing_symbols(refused=True)

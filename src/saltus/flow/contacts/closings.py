@@ -759,8 +759,6 @@ def rests_in_a_row(motion, t, near, end):
         bring_to_rest(motion, block)
         if motion.multipliers > 0:
             measure_slides(motion)
-        if motion.columns > 0 and motion.multipliers > 0:
-            forget(motion)  # the derivative of the time to rest is not known of rows
-        elif motion.columns > 0:
+        if motion.columns > 0:
             rest_columns(motion, block)
         fill_after(motion)

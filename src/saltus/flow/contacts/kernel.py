@@ -210,7 +210,7 @@ def end_accumulation_of(motion, t):
         motion.contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
         return t
     if motion.columns > 0:
-        if turns or motion.multipliers > 0:
+        if turns:
             unknown_shifts(motion)
         else:
             accumulation_shifts(motion, near, t)

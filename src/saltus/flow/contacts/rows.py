@@ -165,8 +165,10 @@ def row_series(motion, r):
 @lean_jit
 def limits_begin(motion):
     """The place of the first margin at which a motion ends."""
-    count = motion.contacts.shape[0] + 2 * motion.frictions.shape[0]
-    return count + motion.multipliers
+    first = row_series(motion, 0) + motion.multipliers
+    if motion.multipliers > 0 and motion.columns > 0:
+        first += motion.contacts.shape[0]  # the second derivatives of gaps
+    return first
 
 
 @lean_jit

@@ -20,6 +20,7 @@ from saltus.flow.contacts.complementarity import (
     invert,
     is_pressed,
     push,
+    pushed,
     rub_of,
     slip_sign,
     struck_velocities,
@@ -27,7 +28,7 @@ from saltus.flow.contacts.complementarity import (
     worst_violation,
 )
 from saltus.flow.contacts.frictions import rubs_along
-from saltus.flow.contacts.held_rows import row_lift
+from saltus.flow.contacts.held_rows import fill_pushes, row_lift
 from saltus.flow.contacts.impacts import hold_coordinates, time_to_close
 from saltus.flow.contacts.layout import (
     SAME_IMPACT,
@@ -398,6 +399,44 @@ def push_slope(motion, j, a, i):
 
 
 @lean_jit
+def rest_row_columns(motion, near):
+    """`rest_columns` where contacts have rows: the impulses of frictions that stick follow from
+    those of the contacts, as they keep the sliding speeds at 0."""
+    count = motion.contacts.shape[0]
+    frictions = motion.frictions.shape[0]
+    invert(motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse)
+    fill_pushes(motion)
+    size = 0
+    for k in range(frictions):
+        size += 1 if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK else 0
+    row = 0
+    for k in range(frictions):
+        motion.stuck_impulses[k] = 0.0
+        if motion.frictions[k, FrictionColumn.STRUCK] != FrictionImpact.STUCK:
+            continue
+        column = 0
+        left = 0.0
+        for other in range(frictions):
+            if motion.frictions[other, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+                motion.block[row, column] = gives(motion, count + k, count + other)
+                column += 1
+        for i in range(count):
+            left -= pushed(motion, count + k, i) * motion.impulses[i]
+        motion.block[row, size] = left
+        row += 1
+    if eliminate(motion.block, size, size + 1):
+        row = 0
+        for k in range(frictions):
+            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+                motion.stuck_impulses[k] = motion.block[row, size]
+                row += 1
+    for j in range(motion.columns):
+        for i in range(count):
+            motion.pull_slopes[j, i] = 0.0
+    rubbing_columns(motion, near, 0, zeros(count))
+
+
+@lean_jit
 def rest_columns(motion, near):
     """The columns at the end of an accumulation, where impulses on the contacts in `near` alone
     take their speeds.
@@ -407,7 +446,9 @@ def rest_columns(motion, near):
         motion.jump[a] = 0.0
         for i in range(motion.contacts.shape[0]):
             motion.jump[a] += push(motion, a, i) * motion.impulses[i]
-    if is_pressed(motion):
+    if motion.multipliers > 0:
+        rest_row_columns(motion, near)
+    elif is_pressed(motion):
         invert(motion.solver_numbers, local, motion.first_order, motion.block, motion.inverse)
         for j in range(motion.columns):
             for i in range(motion.contacts.shape[0]):

@@ -26,7 +26,7 @@ from saltus.flow.contacts.complementarity import (
     push,
     tell_instant,
 )
-from saltus.flow.contacts.held_rows import left_of, onto, row_lift
+from saltus.flow.contacts.held_rows import fill_pushes, left_of, onto, row_lift
 from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, press_of
 from saltus.flow.contacts.layout import (
     APART,
@@ -37,6 +37,7 @@ from saltus.flow.contacts.layout import (
     copy_all,
     restitution,
 )
+from saltus.flow.contacts.rows import gives, row_series
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand, move_columns
 from saltus.taylor import jit, lean_jit
@@ -257,6 +258,22 @@ def note_shifts(motion, shifts):
         ] = shifts[j]
 
 
+@jit
+def row_pull_slopes(motion, t):
+    """`pull_slopes` of contacts with rows, whose second derivatives are margins of their own."""
+    shifts = motion.shifts.copy()
+    expand(motion, t, 1.0, 2)
+    move_columns(motion, -1.0)
+    for i in range(motion.contacts.shape[0]):
+        place = row_series(motion, motion.multipliers) + i
+        columns_at_event(motion, EventCode.RELEASE, place, t, 1.0)
+        for j in range(motion.columns):
+            moved = shifts[j] * motion.margin_series[place, 1]
+            motion.pull_slopes[j, i] = motion.shifts[j] + moved
+    copy_all(shifts, motion.shifts)
+    move_columns(motion, 1.0)
+
+
 @lean_jit
 def pull_slopes(motion, t):
     """Fill `PULL_SLOPES`, the derivatives of the gaps' second derivatives with all contacts open,
@@ -264,6 +281,9 @@ def pull_slopes(motion, t):
 
     All coordinates must be free, and the columns must have been taken to the event.
     """
+    if motion.multipliers > 0:
+        row_pull_slopes(motion, t)
+        return
     own = motion.own
     a = motion.acceleration_series
     expand(motion, t, 1.0, 0)
@@ -275,6 +295,14 @@ def pull_slopes(motion, t):
             change = a[own * (1 + j) + coordinate, 0] + motion.shifts[j] * a[coordinate, 1]
             motion.pull_slopes[j, i] = motion.signs[i] * change
     move_columns(motion, 1.0)
+
+
+@lean_jit
+def numbers_of_impacts(motion):
+    """How many of the numbers decide on impacts without friction: M and E, or all with rows."""
+    if motion.multipliers > 0:
+        return motion.solver_numbers.size
+    return motion.local * motion.local + motion.contacts.shape[0] * motion.contacts.shape[0]
 
 
 @lean_jit
@@ -291,11 +319,16 @@ def perturb(motion, j, step):
         if motion.rates[i] != 0.0:
             motion.rates[i] += step * lift_rate(motion, j, i)
         motion.pulls[i] += step * motion.pull_slopes[j, i]
-    for k in range(local * local + count * count):
+    for k in range(numbers_of_impacts(motion)):
         numbers[k] += step * slope(motion, j, k)
     invert(numbers, local, motion.first_order, motion.block, motion.inverse)
+    if motion.multipliers > 0:
+        fill_pushes(motion)
     for i in range(count):
         for k in range(count):
+            if motion.multipliers > 0:
+                motion.coupling[i, k] = gives(motion, i, k)
+                continue
             entry = motion.inverse[
                 motion.contacts[i, ContactColumn.COORDINATE],
                 motion.contacts[k, ContactColumn.COORDINATE],
@@ -310,7 +343,6 @@ def accumulation_shifts(motion, near, t):
     """Add to `EVENT_SHIFTS`, which hold the shifts of the last impact, those of the time left until
     the accumulation ends: central differences of this time over the gaps, rates, accelerations and
     numbers."""
-    local = motion.local
     count = motion.contacts.shape[0]
     fill_slopes(motion)
     pull_slopes(motion, t)
@@ -327,7 +359,7 @@ def accumulation_shifts(motion, near, t):
                     largest = max(largest, abs(lift_rate(motion, j, i) / rates[i]))
                 if gaps[i] != 0.0:
                     largest = max(largest, abs(gap_derivative(motion, j, i) / gaps[i]))
-        for k in range(local * local + count * count):
+        for k in range(numbers_of_impacts(motion)):
             largest = max(largest, abs(slope(motion, j, k)))
         change = 0.0
         step = RELATIVE_STEP / max(largest, 1e-300)

@@ -640,11 +640,6 @@ def _undefined(motion: Motion, columns: np.ndarray) -> str | None:
     if np.isfinite(columns).all():
         return None
     for event, detail in zip(reversed(motion.events), motion.events.details[::-1], strict=True):
-        if event.kind is EventKind.HELD and motion.system.model.has_multipliers:
-            return (
-                f"impacts on {event.contact} accumulate until time {event.time:.9g}, and where"
-                " contacts are distances derivatives of this time are not known"
-            )
         if (
             event.kind is EventKind.IMPACT
             and motion.system.model.contacts
