@@ -58,12 +58,14 @@ def hold_frictions(motion):
         motion.parameters[first - 2 - motion.frictions.shape[0] + k] = (
             1.0 * slides if slides != 2 else 0.0
         )
-        if slides == 0 and motion.multipliers > 0:
+        if slides != 0:
+            continue
+        if motion.multipliers > 0:
             idle = motion.frictions[k, FrictionColumn.IDLE]
             motion.parameters[first - 2 - motion.frictions.shape[0] + k] = 2.0 * idle
             if idle == 0:
                 motion.parameters[first + motion.contacts.shape[0] + k] = 0.0
-        elif slides == 0:
+        else:
             motion.parameters[first + motion.frictions[k, FrictionColumn.COORDINATE]] = 0.0
 
 
@@ -530,7 +532,7 @@ def leans(motion, k):
     """Whether a closed contact holds the coordinate along which a friction acts, so that the
     friction carries what it can.
     """
-    found = motion.multipliers > 0 and motion.frictions[k, FrictionColumn.IDLE] != 0
+    found = motion.frictions[k, FrictionColumn.IDLE] != 0
     for i in range(motion.contacts.shape[0]):
         found = found or (motion.contacts[i, ContactColumn.CLOSED] == 1 and is_along(motion, k, i))
     return found
@@ -539,7 +541,7 @@ def leans(motion, k):
 @lean_jit
 def is_along(motion, k, i):
     """Whether a friction, no surface and not without force, acts along the coordinate of a contact."""
-    along = motion.multipliers == 0 and (
+    along = (
         motion.contacts[i, ContactColumn.COORDINATE]
         == motion.frictions[k, FrictionColumn.COORDINATE]
     )

@@ -63,15 +63,27 @@ def closed_bits(motion):
 def gap_series(motion, i, position, order, g):
     """The Taylor coefficients of a contact's gap."""
     if motion.multipliers > 0:
-        series = motion.margin_series[row_series(motion, i)]
-        for k in range(order + 1):
-            g[k] = series[k]
-        return
-    sign = motion.signs[i]
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+        row_gap_series(motion, i, order, g)
+    else:
+        coordinate_series(motion, i, order, g)
+        g[0] -= motion.signs[i] * position
+
+
+@lean_jit
+def row_gap_series(motion, i, order, g):
+    """`gap_series` of a contact with a row."""
+    series = motion.margin_series[row_series(motion, i)]
     for k in range(order + 1):
-        g[k] = sign * motion.coordinate_series[coordinate, k]
-    g[0] -= sign * position
+        g[k] = series[k]
+
+
+@lean_jit
+def coordinate_series(motion, i, order, g):
+    """`gap_series` of a contact that holds a coordinate, at the position 0."""
+    sign = motion.signs[i]
+    series = motion.coordinate_series[motion.contacts[i, ContactColumn.COORDINATE]]
+    for k in range(order + 1):
+        g[k] = sign * series[k]
 
 
 @lean_jit
@@ -101,8 +113,10 @@ def open_gap_series(motion, i, order, g):
     """`gap_series` at the start of a step, with the gap that is kept beside the coordinate: it has
     all of its digits where the position is far from 0.
     """
-    gap_series(motion, i, 0.0, order, g)
-    if motion.multipliers == 0:
+    if motion.multipliers > 0:
+        row_gap_series(motion, i, order, g)
+    else:
+        coordinate_series(motion, i, order, g)
         g[0] = motion.open_gaps[i]
 
 
@@ -118,8 +132,8 @@ def contact_step_size(motion, t, target, size, with_columns):
         natural = min(natural, column_step(motion))
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for i in range(motion.contacts.shape[0]):
-        idle = motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1
-        if motion.contacts[i, ContactColumn.CLOSED] == 1 and not idle:
+        row = motion.contacts[i]
+        if row[ContactColumn.CLOSED] == 1 and row[ContactColumn.IDLE] == 0:
             r = motion.margin_series[i : i + 1]
             reaction = max(press_of(motion, i), abs(r[0, 0]))
             if reaction > 0.0:

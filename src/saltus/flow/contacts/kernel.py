@@ -410,9 +410,9 @@ def first_guard(motion, h, whole):
     for i in range(count):
         skip = motion.contacts[i, ContactColumn.SKIP]
         guard = motion.gap_series
-        if motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1:
-            continue
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
+            if motion.contacts[i, ContactColumn.IDLE] == 1:
+                continue
             guard = motion.margin_series[i]
             if skip == 0 and guard[0] < -ZERO * press_of(motion, i):
                 return i, 0.0, False
@@ -615,14 +615,14 @@ def passes(motion, bits, rubs, tau):
     rounding: beyond an open contact, away from a contact in `bits` that closes, or away from the
     surface `rubs` that it reaches.
     """
-    for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
+    # gaps of rows are looked at in `away_in_rows`
+    first = motion.contacts.shape[0] if motion.multipliers > 0 else 0
+    for row in range(first, motion.contacts.shape[0] + motion.frictions.shape[0]):
         i = row
         k = row - motion.contacts.shape[0]
         place = 0
         position = 0.0
         gap = 0.0
-        if k < 0 and motion.multipliers > 0:
-            continue
         if k < 0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
             place = motion.contacts[i, ContactColumn.COORDINATE]
             position = contact_position(motion, i)

@@ -62,6 +62,7 @@ SLOW_LOAD = 1e4
 # what `SLOW_LOAD` asks. It spares most systems their own time, which takes ten times as long to
 # find as a short motion.
 NEVER_SLOW = 1e3
+NO_COORDINATE = -1  # of a contact whose gap is a row
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
 
@@ -359,6 +360,7 @@ class ContactState(KernelState):
         )
         rates = None
         if run.structure.sizes.multipliers:
+            contacts[: len(held), ContactColumn.COORDINATE] = NO_COORDINATE
             rates = self._close_rows(request, run, own_contacts)
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             if rates is not None:
