@@ -265,9 +265,8 @@ def push_of(motion):
 @lean_jit
 def note_motion(motion):
     """Note the accelerations of a choice, for `moves_alike`."""
-    if motion.multipliers > 0:
-        for i in range(motion.local):
-            motion.jump[i] = motion.acceleration_series[i, 0]
+    for i in range(motion.local):
+        motion.jump[i] = motion.acceleration_series[i, 0]
 
 
 @lean_jit
@@ -371,7 +370,8 @@ def choose_closed(motion, candidates, still, held, t, zero):
             if best >= 0 and motion.multipliers > 0 and moves_alike(motion):
                 continue  # other reactions of the same motion
             push = push_of(motion)
-            note_motion(motion)
+            if motion.multipliers > 0:
+                note_motion(motion)
             several = several or best >= 0
             if best < 0 or push < least - EQUAL_PUSH * abs(least):
                 alike = False
@@ -412,7 +412,7 @@ def slides_beside_idle(motion):
 def is_undetermined(motion, candidates, still, held, t):
     """Whether another choice, with reactions on other contacts, gives another motion than the one
     that has just been made."""
-    if motion.multipliers == 0 or not slides_beside_idle(motion):
+    if not slides_beside_idle(motion):
         return False
     contacts = motion.contacts.copy()
     frictions = motion.frictions.copy()

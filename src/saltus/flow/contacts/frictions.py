@@ -379,7 +379,9 @@ def slides_so(motion, count, candidates, held):
     order = motion.order
     g = motion.gap_series
     # at other reactions of the same motion others are at their limits at the same instant
-    shared = motion.multipliers > 0 and some_idle(motion) and any_reached(motion)
+    shared = False
+    if motion.multipliers > 0:
+        shared = some_idle(motion) and any_reached(motion)
     for k in range(motion.frictions.shape[0]):
         if not candidates >> k & 1:
             continue

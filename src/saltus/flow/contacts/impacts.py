@@ -623,8 +623,8 @@ def note_rubs(motion):
     for k in range(motion.frictions.shape[0]):
         if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
             continue
-        surface = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
-        if motion.multipliers > 0 and not surface:
+        in_row = motion.multipliers > 0
+        if in_row and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE:
             press = abs(pull_of(motion, motion.contacts.shape[0] + k))
             speed = abs(motion.slide_rates[k])
         else:

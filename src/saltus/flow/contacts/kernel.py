@@ -350,7 +350,7 @@ def decide_contacts(motion):
     held = sticking(motion, before)
     if not choose_all(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
-    if is_undetermined(motion, candidates, still, held, t):
+    if motion.multipliers > 0 and is_undetermined(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
     hold_coordinates(motion)
     hold_frictions(motion)
