@@ -236,3 +236,44 @@ def test_coordinates_of_first_order_alone(frequency, volt, rate):
         assert units.lengths[0] / volt == pytest.approx(3.0, rel=1e-12)
     of_one = natural_units(made())
     assert units.lengths[0] / volt == pytest.approx(of_one.lengths[0], rel=1e-12)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain(saltus.ContactModel):
+    """Three masses on springs, about an origin of each: a wall before the first one, a stop of the
+    second one on the third, and a soft stop."""
+
+    origins: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    coordinates: ClassVar[tuple] = ("x", "y", "z")
+    channels: ClassVar[tuple] = ("force",)
+
+    @property
+    def contacts(self):
+        a, b, c = self.origins
+        return (
+            saltus.Contact(name="wall", coordinate="x", position=a - 0.3),
+            saltus.Contact(name="stop", coordinate={"z": 1.0, "y": -1.0}, position=c - b - 0.2),
+        )
+
+    @property
+    def surfaces(self):
+        return (saltus.Surface(name="soft", coordinate="y", position=self.origins[1] + 0.4),)
+
+    def force(self, t, q, velocity, load, sides):
+        x, y, z = (value - origin for value, origin in zip(q, self.origins, strict=True))
+        soft = 3.0 * (1.0 + sides.soft) / 2.0 * (y - 0.4)
+        return load.force(t) - 2.0 * x + y, x - 3.0 * y + z - soft, y - 1.5 * z
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_several_coordinates_do_not_depend_on_their_origins(seed):
+    """The places of contacts set the coordinates that they do not hold to 0."""
+    load = saltus.Load(frequency=1.1, force=saltus.Harmonic(0.3, mean=0.05))
+    origins = tuple(np.random.default_rng(seed).uniform(-30.0, 30.0, 3).tolist())
+    usual, moved = (
+        natural_units(saltus.System(model=Chain(origins=o), load=load))
+        for o in ((0.0, 0.0, 0.0), origins)
+    )
+    np.testing.assert_allclose(moved.lengths, usual.lengths, rtol=1e-9)
+    assert moved.own_time == pytest.approx(usual.own_time, rel=1e-9)
+    assert moved.speed == pytest.approx(usual.speed, rel=1e-9)

@@ -31,6 +31,9 @@ TINY = float(np.finfo(float).tiny)
 SWING = 2.0 * math.sqrt(2.0)  # the range of a sine, in units of the root of its mean square
 # A distance that is this share of the largest one is rounding.
 ROUNDING = 1e-12
+# What is left of the forces on the other coordinates where these act linearly.
+SOLVED = 1e-6
+MOST_STEPS = 6  # Newton's steps to there, of which one is enough without surfaces
 # A load that is slow without end: its frequency is this share of its own.
 SLOWER = 2.0**-40
 # What moves by itself in a larger share of the time of a load moves with it.
@@ -302,9 +305,69 @@ def _places(model: Any, load: Any, instants: np.ndarray) -> Iterator[tuple[np.nd
         if isinstance(part, Surface) and _is_inert(model, place, load, instants):
             continue
         places += 1
-        yield place, row * part.sign
+        yield _held_equilibrium(model, load, place, row, instants), row * part.sign
     if not places:
         yield np.zeros(len(names)), np.zeros(len(names))
+
+
+def _held_equilibrium(
+    model: Any, load: Any, place: np.ndarray, row: np.ndarray, instants: np.ndarray
+) -> np.ndarray:
+    """The place (n,) at which a contact holds a system in equilibrium, on the plane of its sum
+    through another place; that one where the other coordinates do not act linearly.
+
+    Where the others are does not depend on the origin from which they are measured then.
+    """
+    count = len(model.moving)
+    if count == 1 or not hasattr(model, "mass_matrix"):
+        return place
+    try:
+        masses = np.array(mass_rows(model, tuple(place.tolist())), dtype=float)[:count, :count]
+    except Exception:  # a user's own code may raise anything
+        return place
+    scales = _scales(model)[:count]
+    # a reaction l along the sum: M (a + J dq) = l row, with row dq = 0
+    scaled = masses * scales[:, None] * scales
+    normal = row[:count] * scales
+
+    def pushed(at: np.ndarray) -> np.ndarray | None:
+        """M a in the mean over the instants."""
+        pushes = []
+        for t in instants:
+            for beside in _on_both_sides(model, float(t), at, load):
+                value = _acceleration(model, float(t), at.tolist(), model.every_side[0], beside)
+                if value is None:
+                    return None
+                pushes.append(value[:count] / scales)
+        return np.asarray(scaled @ np.mean(pushes, axis=0))
+
+    size = float(np.linalg.norm(normal))
+    if not size > 0.0:
+        return place
+    along = normal / size
+    held = place.copy()
+    push = pushed(held)
+    begun = 0.0 if push is None else float(np.linalg.norm(push - along * (along @ push)))
+    for _ in range(MOST_STEPS):  # surfaces make it linear in parts
+        slopes = _slopes_beside(model, held, load)[0][:count, :count]
+        stiffness = scaled @ (slopes * scales / scales[:, None])
+        if push is None or not (np.isfinite(push).all() and np.isfinite(stiffness).all()):
+            return place
+        border = along * (float(np.abs(stiffness).max(initial=0.0)) or 1.0)
+        matrix = np.block([[stiffness, -border[:, None]], [border[None], np.zeros((1, 1))]])
+        try:
+            solution = np.linalg.lstsq(matrix, -np.append(push, 0.0), rcond=ROUNDING)[0]
+        except np.linalg.LinAlgError:  # numbers whose squares overflow
+            return place
+        held[:count] += solution[:count] * scales
+        if np.count_nonzero(row) == 1:  # on a surface to the last digit
+            held = np.where(row != 0.0, place, held)
+        push = pushed(held)
+        if push is None:
+            return place
+        if np.linalg.norm(push - along * (along @ push)) <= SOLVED * begun:
+            return held
+    return place
 
 
 def _is_sum(part: Any, names: tuple[str, ...]) -> bool:
