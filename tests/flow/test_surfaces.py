@@ -143,6 +143,8 @@ def test_motions_in_lanes_pass_the_same_surfaces():
         np.testing.assert_allclose(
             [many.x.values[i], many.y.values[i]], one.position, rtol=0, atol=1e-11
         )
+    # on whichever side of the stop, and whichever kernel ended it, it is not at rest
+    assert many.side.values.tolist() == [1] * 6
 
 
 def test_orbits_of_a_soft_stop_are_found_and_followed():

@@ -79,11 +79,12 @@ class EnsembleResult:
 
     @property
     def side(self) -> np.ndarray:
-        """The side of the contact at the end, 0 at rest; with several contacts 1 if the motion is
-        not at rest, (n,).
+        """The side of the contact at the end, 0 at rest; of a model with several parts 1 if the
+        motion is not at rest, (n,).
         """
         side = self.ends.rows["side"]
-        return np.where(self.held, 0, np.ones_like(side) if self.system.model.contacts else side)
+        several = self.system.model.holds_coordinates
+        return np.where(self.held, 0, np.ones_like(side) if several else side)
 
     @property
     def time(self) -> np.ndarray:
