@@ -270,6 +270,14 @@ def test_periods_double_where_a_multiplier_is_minus_1():
     # beyond it the motion settles on the doubled orbit
     settled = saltus.find_orbit(last.system, x=1.0, y=1.0, z=0.1)
     assert settled.period == pytest.approx(last.period, abs=1e-9)
+    # followed back from there it turns round in no fold: it meets its own image at the doubling
+    back = saltus.continue_orbit(settled, "model.c", (2.4, 3.2))
+    (born,) = back.special
+    assert str(born.kind) == "PD"
+    assert born.parameter == pytest.approx(doubling.parameter, rel=1e-9)
+    assert {orbit.signature.period for orbit in back.orbits} == {2}
+    parameters = [point.parameter for point in back.points]
+    assert (np.diff(parameters) > 0.0).all() or (np.diff(parameters) < 0.0).all()
 
 
 def test_a_symmetric_cycle_loses_its_symmetry_at_a_branch_point():

@@ -31,7 +31,7 @@ from saltus.orbits.equations.cycles import PERIOD
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_near
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.signature import Signature
+from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
 from saltus.systems import check_along, check_path, driven_displacement
@@ -132,8 +132,43 @@ def continue_orbit(
     course = replace(course, special=with_special_start(course, first, events(functions or {})))
     course = ended_where_grazings_accumulate(course, first)
     branch = Branch(**vars(course), path=path)
+    recounted = _of_doubled_rounds(orbit, branch)
+    if recounted is not None:
+        return continue_orbit(
+            recounted,
+            path,
+            bounds,
+            functions=functions,
+            step=step,
+            while_stable=while_stable,
+            progress=progress,
+            growing=growing,
+        )
     show(branch)
     return branch
+
+
+def _of_doubled_rounds(orbit: PeriodicOrbit, branch: Branch) -> PeriodicOrbit | None:
+    """A cycle without a load with its round counted as two, if its branch turns back where it
+    repeats itself after half a round: it is born there by period doubling. Else None.
+    """
+    counted = orbit.equations.counted_twice(orbit.solution)
+    if counted is None or not any(
+        point.kind is SpecialKind.LP and _repeats_halves(point.orbit) for point in branch.special
+    ):
+        return None
+    return PeriodicOrbit.near(*counted, orbit.solution.values)
+
+
+def _repeats_halves(orbit: PeriodicOrbit) -> bool:
+    """Whether a cycle has the same state after half a round."""
+    motion = orbit.followed
+    states = [
+        np.concatenate([np.atleast_1d(part) for part in motion.at(time)])
+        for time in (motion.start, motion.start + 0.5 * orbit.duration / orbit.signature.period)
+    ]
+    apart = (states[1] - states[0]) / orbit.equations.natural.state
+    return bool(np.abs(apart).max() < TOLERANCES.grazing_orbits)
 
 
 def _unseen(branch: Branch) -> None:

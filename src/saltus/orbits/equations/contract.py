@@ -400,6 +400,12 @@ class OrbitEquations(ABC):
         """
         return direction
 
+    def counted_twice(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray] | None:
+        """The equations of an orbit of which each round counts as two, and its unknowns; None where
+        a load says what a round is.
+        """
+        return None
+
     def shorter_period(self, solution: Solution, within: float) -> int | None:
         """The forcing periods of a shorter orbit that this one repeats, up to `within`; None if the
         equations exclude it.

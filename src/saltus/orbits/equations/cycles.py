@@ -203,6 +203,11 @@ class CycleEquations(WholeMotionEquations):
     def halves(self, solution: Solution, mirrored: bool) -> np.ndarray | None:
         return None if self.signature.period % 2 else super().halves(solution, False)
 
+    def counted_twice(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray] | None:
+        rounds = replace(self.signature, period=2 * self.signature.period)
+        unknowns = np.append(solution.unknowns[:-1], 0.5 * solution.unknowns[-1])
+        return self.with_signature(rounds), unknowns
+
     least_size = 1e-3  # the parameter of its birth is extrapolated from larger ones
 
     def size_of(self, orbit: Any) -> float:
@@ -354,6 +359,9 @@ class FamilyEquations(CycleEquations):
 
     def family(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray, np.ndarray]:
         return self, solution.unknowns, solution.values
+
+    def counted_twice(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray] | None:
+        return None  # its parameter is the time of a round
 
 
 def _section_along(
