@@ -1,6 +1,8 @@
 """Cycles of systems on which nothing acts that varies with time: their period is an unknown."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import saltus
-from saltus import BeltOscillator, NewtonImpact, System
+from saltus import BeltOscillator, ContactModel, NewtonImpact, System
 
 
 def stick_slip_period(kinetic, static, belt_speed):
@@ -254,6 +256,35 @@ def test_a_branch_ends_at_the_equilibrium_of_which_its_cycles_are_born():
 
     assert excess(change.parameter + 1e-5) < -1e-7
     assert excess(change.parameter - 1e-5) > 1e-7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Born(ContactModel):
+    """x'' = -x + x' (mu - r^law) with r^2 = x^2 + x'^2: its cycle is the circle r^law = mu."""
+
+    mu: float = 0.5
+    law: ClassVar[int] = 1
+    coordinates: ClassVar[tuple] = ("x",)
+    channels: ClassVar[tuple] = ()
+
+    def force(self, t, x, velocity, load):
+        square = x * x + velocity * velocity
+        return -x + velocity * (self.mu - square ** (0.5 * self.law))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BornSlowly(Born):
+    law: ClassVar[int] = 4
+
+
+@pytest.mark.parametrize("law", [Born, BornSlowly])
+@pytest.mark.parametrize("largest", [0.51, 1.0])
+def test_births_of_other_laws_do_not_depend_on_the_asked_range(law, largest):
+    orbit = saltus.find_orbit(System(model=law()), x=0.6)
+    assert np.ptp(orbit.followed.extrema) == pytest.approx(2.0 * 0.5 ** (1.0 / law.law), rel=1e-9)
+    branch = saltus.continue_orbit(orbit, "model.mu", (-0.2, largest))
+    born = next(end for end in branch.ends if end.reason is saltus.orbits.OrbitEnd.EQUILIBRIUM)
+    assert born.parameter == pytest.approx(0.0, abs=1e-9)
 
 
 def test_periods_double_where_a_multiplier_is_minus_1():

@@ -45,6 +45,11 @@ WITHIN = 1e-12
 LEAST_STRAIGHT = 0.5
 # the least ratio of the squares of sizes by which two orbits count as two
 APART = 1.1
+# Parameters leave that of a birth as a power of the size of the cycle. The square is generic; a
+# damping that grows with the speed itself gives 1. Another power than 2 is taken if it misses a
+# fourth orbit by a much smaller share.
+POWERS = (2, 1, 3, 4)
+CLEARLY = 0.01
 
 
 class CycleEquations(WholeMotionEquations):
@@ -216,23 +221,27 @@ class CycleEquations(WholeMotionEquations):
         return float((ways / self.natural.lengths).max() * self.natural.length)
 
     def birth(self, points: list[Any]) -> float | None:
-        """A parabola in the square of the size, through three orbits: smaller ones have an error of
-        rounding by their size.
+        """A parabola in a power of the size, through three orbits: smaller ones have an error of
+        rounding by their size. The power is 2, or that which tells a fourth orbit much better.
         """
-        known = {self.size_of(point.orbit) ** 2: point.parameter for point in points[-8:]}
-        least = (self.least_size * self.natural.length) ** 2
-        squares: list[float] = []
-        for square in sorted(known):  # one orbit may be there at two sections
-            if square > max([least, *(APART * other for other in squares)]) and len(squares) < 3:
-                squares.append(square)
-        if len(squares) < 3:
+        parameters = {self.size_of(point.orbit): point.parameter for point in points[-8:]}
+        sizes: list[float] = []
+        for size in sorted(parameters):  # one orbit may be there at two sections
+            smallest = self.least_size * self.natural.length
+            if size > max([smallest, *(math.sqrt(APART) * other for other in sizes)]):
+                sizes.append(size)
+        if len(sizes) < 3:
             return float(points[-1].parameter)
-        value = 0.0
-        for square in squares:
-            others = [other for other in squares if other != square]
-            weight = math.prod(other / (other - square) for other in others)
-            value += known[square] * weight
-        return value
+        power = 2
+        if len(sizes) > 3:
+            fourth = sizes[3]
+            misses = {
+                power: abs(_extrapolated(parameters, sizes[:3], power, fourth) - parameters[fourth])
+                for power in POWERS
+            }
+            best = min(POWERS, key=misses.__getitem__)
+            power = best if misses[best] < CLEARLY * misses[2] else 2
+        return _extrapolated(parameters, sizes[:3], power, 0.0)
 
     def lost_ahead(self, point: Any) -> Zero | None:
         return None
@@ -362,6 +371,22 @@ class FamilyEquations(CycleEquations):
 
     def counted_twice(self, solution: Solution) -> tuple[OrbitEquations, np.ndarray] | None:
         return None  # its parameter is the time of a round
+
+
+def _extrapolated(
+    parameters: dict[float, float], sizes: list[float], power: int, size: float
+) -> float:
+    """The parameter of the orbit of a size, on the polynomial in a power of the size through the
+    orbits of some sizes."""
+    value = 0.0
+    for own in sizes:
+        weight = math.prod(
+            (size**power - other**power) / (own**power - other**power)
+            for other in sizes
+            if other != own
+        )
+        value += parameters[own] * weight
+    return value
 
 
 def _section_along(
