@@ -138,8 +138,13 @@ def test_what_is_no_cycle_is_refused_in_a_sentence():
     with pytest.raises(saltus.MotionError, match="comes to an equilibrium, which is no cycle"):
         saltus.find_orbit(System(model=VanDerPol(mu=-0.5)), x=0.5)
     # nearly no loss: the equilibrium solves the equations with half the natural period
-    with pytest.raises(saltus.MotionError, match="comes to an equilibrium, which is no cycle"):
+    with pytest.raises(saltus.MotionError, match="finds an equilibrium near it alone"):
         saltus.find_orbit(System(model=VanDerPol(mu=-1e-8)), x=0.5)
+    # without a push it settles on the swing that just touches: smaller ones are cycles, too
+    idle = System(model=Clock(push=0.0), impact=NewtonImpact(0.5))
+    with pytest.raises(saltus.MotionError, match="only touches a contact"):
+        saltus.find_orbit(idle, x=0.0, velocity=2.0)
+    assert str(saltus.classify(idle, x=0.0, velocity=2.0)).startswith("undecided")
     with pytest.raises(saltus.MotionError, match="comes to rest for good, which is no cycle"):
         saltus.find_orbit(System(model=BeltOscillator(belt_speed=0.0)), x=0.5)
     with pytest.raises(saltus.ParameterError, match="period must lie in"):

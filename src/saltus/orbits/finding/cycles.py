@@ -41,6 +41,9 @@ class FindCycleSettings:
     as_near: float = 3.0
     # A motion smaller than this, in natural units, stands still.
     still: float = 1e-6
+    # Impacts that change speeds by less, in natural units, are touches: a motion settles on a swing that
+    # touches as the root of the distance.
+    touching: float = 1e-5
 
 
 SETTINGS = FindCycleSettings()
@@ -151,6 +154,29 @@ def swing_of(base: OrbitEquations, motion: Motion) -> float:
             "the motion comes to an equilibrium, which is no cycle; start farther from it"
         )
     return size
+
+
+def check_is_cycle(base: OrbitEquations, orbit: PeriodicOrbit, back: Return) -> None:
+    """Refuse a solution that is an equilibrium, and a cycle that only touches a contact: motions
+    without impacts lie beside it, and it is solved to the root of rounding only.
+    """
+    try:
+        swing_of(base, orbit.followed)
+    except MotionError as error:  # without loss an equilibrium solves the equations, too
+        raise MotionError(
+            f"the motion comes back after {back.time:.9g}, but Newton's method finds an equilibrium"
+            " near it alone: it settles slowly, or swings beside it are cycles, too; let it settle"
+            " for longer (settle=...), or try another start"
+        ) from error
+    impacts = orbit.followed.impacts
+    jumps = np.abs(impacts.velocity_after - impacts.velocity_before)
+    largest = float(jumps.max(initial=0.0))
+    if 0.0 < largest < SETTINGS.touching * natural_units(orbit.system).speed:
+        raise MotionError(
+            f"the motion settles on a swing of the period {orbit.period:.9g} that only touches a"
+            f" contact, which changes its speed by {largest:.1g}, and beside which others have no"
+            " impact: whether it is stable, and alone, is undecided"
+        )
 
 
 def round_within(orbit: PeriodicOrbit) -> float | None:

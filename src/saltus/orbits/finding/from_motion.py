@@ -32,10 +32,10 @@ from saltus.orbits.equations.kinds import equations_of, kinds_of
 from saltus.orbits.finding.cycles import (
     Return,
     after,
+    check_is_cycle,
     next_return,
     round_within,
     settled_return,
-    swing_of,
 )
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import Signature
@@ -209,7 +209,7 @@ def _cycle(
     if orbit is not None and shorter is not None:
         orbit = orbit_from(base, orbit.equations.start(orbit.solution), 1, shorter) or orbit
     if orbit is not None and orbit.admissible:
-        swing_of(base, orbit.followed)  # without loss an equilibrium solves the equations, too
+        check_is_cycle(base, orbit, found)
         progress(1.0, "done")
         return orbit
     raise MotionError(
