@@ -55,3 +55,17 @@ def test_doctor_says_how_to_install_what_clusters_need(saltus, monkeypatch):
     monkeypatch.setattr(metadata, "version", without_distributed)
     found = saltus("doctor")
     assert 'pip install ".[cluster]"' in " ".join(found.stdout.split())
+
+
+def test_doctor_compiles_all_kernels_if_asked(saltus, monkeypatch):
+    from saltus import flow
+
+    waiting = ["motions", "lanes"]
+    monkeypatch.setattr(
+        flow, "compile_kernels", lambda workers: ((waiting.pop(0), len(waiting)) for _ in range(2))
+    )
+    found = saltus("doctor", "--compile")
+    assert found.exit_code == 0, found.output
+    assert "compiled: motions" in found.stdout
+    assert "compiled: lanes" in found.stdout
+    assert not waiting

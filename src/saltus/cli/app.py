@@ -356,19 +356,24 @@ def info(study: Study) -> None:
 
 
 @app.command()
-def doctor() -> None:
+def doctor(
+    compile_all: Annotated[
+        bool,
+        typer.Option("--compile", help="First compile all kernels, so that no later call has to."),
+    ] = False,
+) -> None:
     """Say what saltus runs on, and whether it computes what it should there.
 
     The machine and the width of its vectors, the folder of compiled code, the
     versions of all packages beside those allowed; then a motion whose closed
     form is known, alone and in lanes. To be sent along with a question.
 
-    Example: [cyan]saltus doctor[/]
+    Example: [cyan]saltus doctor --compile[/]
     """
     with guarded():
         from saltus.cli.doctor_command import print_doctor
 
-        print_doctor()
+        print_doctor(compile_all)
 
 
 add_commands(app)

@@ -26,14 +26,16 @@ if TYPE_CHECKING:
 DOCUMENTED = (0.22733602, 0.31675834, 0.79736546)
 
 
-def print_doctor() -> None:
+def print_doctor(compile_all: bool = False) -> None:
     """Print the machine, the cache and the versions, test what saltus assumes of other packages,
-    then a motion with a closed form, alone and in lanes.
+    then a motion with a closed form, alone and in lanes. If asked, compile all kernels before.
 
     If anything is wrong, the command ends with one sentence about it, after everything is printed.
     """
     console = Console(highlight=False)
     wrong: list[str] = []
+    if compile_all:
+        _compile(console)
     for block in (
         _machine(),
         _cache(wrong),
@@ -46,6 +48,16 @@ def print_doctor() -> None:
     if wrong:
         stop("; ".join(wrong), BAD_INPUT)
     console.print("\nsaltus works here.")
+
+
+def _compile(console: Console) -> None:
+    """Compile the kernels that are not compiled yet."""
+    from saltus.flow import available_cores, compile_kernels
+
+    with console.status("compiling all kernels") as status:
+        for name, left in compile_kernels(available_cores()):
+            console.print(f"compiled: {name}", markup=False)
+            status.update(f"compiling, {left} left")
 
 
 def _machine() -> Block:
@@ -71,7 +83,7 @@ def _machine() -> Block:
 
 
 def _cache(wrong: list[str]) -> Block:
-    from saltus.taylor import cache_directory
+    from saltus.taylor import cache_directory, shipped_level
 
     folder = cache_directory()  # warns if another folder than the usual one is used, and why
     files = [path for path in folder.rglob("*") if path.is_file()]
@@ -83,6 +95,7 @@ def _cache(wrong: list[str]) -> Block:
     rows: list[Row] = [
         ("folder", str(folder)),
         ("compiled", f"{kernels} kernels and models, {size:.0f} MiB"),
+        ("shipped", f"kernels for {level}" if (level := shipped_level()) else "none"),
         (
             "private",
             (

@@ -65,3 +65,4 @@ from .motion.simulate import simulate as simulate
 from .motion.validity import Validity as Validity
 from .one_contact.regularity import ContactRegularity as ContactRegularity
 from .one_contact.regularity import contact_regularity as contact_regularity
+from .preparation import compile_kernels as compile_kernels

@@ -32,7 +32,7 @@ goes through the table and compares the coefficients with power series in 40 dig
 How code is cached: in the user's cache directory (`cache.py`). A structure's object file has the
 digest of its functions' tapes, of the sources that write their code, of llvmlite's version and of
 the processor in its name; a kernel's file that of its text and of the sources that compile it, and
-numba keeps the machine code beside it. Numbers are arguments, so that new numbers never compile
+numba keeps the machine code beside it; a wheel may have this code (`shipped.py`). Numbers are arguments, so that new numbers never compile
 anything. Interfaces of numba that are not public are used in `private_numba.py` alone.
 """
 

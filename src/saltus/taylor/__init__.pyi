@@ -51,6 +51,7 @@ from .private_numba import llvm_of as llvm_of
 from .private_numba import pointer as pointer
 from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows
+from .shipped import shipped_level as shipped_level
 from .tracing import FREQUENCY as FREQUENCY
 from .tracing import Trace as Trace
 from .tracing import trace as trace

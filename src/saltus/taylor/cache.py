@@ -165,6 +165,12 @@ def with_digest(content: bytes) -> bytes:
     return content + hashlib.sha256(content).digest()
 
 
+def without_digest(content: bytes) -> bytes | None:
+    """The code in the content of a file, or None where the digest is another one."""
+    code = content[:-DIGEST]
+    return code if with_digest(code) == content else None
+
+
 def undamaged(path: str) -> bytes | None:
     """The code in a file, without its digest, or None; a damaged file, a link or another user's
     file is removed, with a remark.
@@ -180,8 +186,9 @@ def undamaged(path: str) -> bytes | None:
         content = Path(path).read_bytes() if own else b""
     except OSError:
         return None
-    if own and with_digest(content[:-DIGEST]) == content:
-        return content[:-DIGEST]
+    code = without_digest(content) if own else None
+    if code is not None:
+        return code
     log.warning("%s is %s; it is compiled again", path, "damaged" if own else "not the user's own")
     with contextlib.suppress(OSError):
         os.unlink(path)

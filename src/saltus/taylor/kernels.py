@@ -36,6 +36,7 @@ from saltus.taylor.cache import (
     with_digest,
     write,
 )
+from saltus.taylor.shipped import is_shipped
 
 MARKER = "# --- compiled from here on"
 log = logging.getLogger("saltus.cache")
@@ -83,9 +84,9 @@ def module_name(kind: str, text: str) -> str:
 
 
 def is_compiled(name: str) -> bool:
-    """Whether a module's compiled code is on disk."""
+    """Whether a module's compiled code is on disk, in the cache or as a part of a wheel."""
     stem = name.removeprefix("saltus_")
-    return any((cache_directory() / "__pycache__").glob(f"{stem}.*.nbi"))
+    return is_shipped(stem) or any((cache_directory() / "__pycache__").glob(f"{stem}.*.nbi"))
 
 
 def load_module(kind: str, text: str) -> ModuleType:

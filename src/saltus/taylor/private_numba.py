@@ -35,6 +35,7 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import pickle
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -47,6 +48,7 @@ from numba.extending import infer_getattr
 
 from saltus.taylor.cache import undamaged, with_digest
 from saltus.taylor.numba_types import Pointer, Reference, field_type, function_type
+from saltus.taylor.shipped import shipped_code
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
 # For functions that only compiled code calls: numba writes no wrappers. If they also make no
@@ -251,9 +253,12 @@ def _kept() -> Any:
             self._cache_file = _with_digests()(self._cache_path, self._impl.filename_base, stamp)
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            """The code for a signature, or None."""
+            """The code for a signature, which came with a wheel or was compiled here, or None."""
             # numba cannot count references to arrays before this
             runtime.initialize(target_context)
+            shipped = shipped_code(self._impl.filename_base)
+            if shipped is not None:
+                return self._impl.rebuild(target_context, pickle.loads(shipped))
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
 

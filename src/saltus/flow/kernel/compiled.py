@@ -134,7 +134,7 @@ class CompiledStructure:
         if len(data):
             constants = np.append(constants, data)
         geometry = np.zeros(3)
-        fill_constants, fill_geometry, _ = _load_fillers()
+        fill_constants, fill_geometry, _ = load_fillers()
         fill_constants(self.tables[0], parameters, constants)
         if self.several:
             env = (
@@ -172,7 +172,7 @@ def fill_matrices(function, env, piece, state, numbers):
 
 
 @cache
-def _load_fillers() -> tuple[Callable[..., None], ...]:
+def load_fillers() -> tuple[Callable[..., None], ...]:
     """Functions that call a structure's `constants`, `geometry` and `matrices` with arrays."""
     module = load_module("fillers", _SIGNATURES + _FILLERS)
     functions = module.fill_constants, module.fill_geometry, module.fill_matrices
@@ -608,7 +608,7 @@ def contact_rows_at(run: Program, time: float, length: float, state: np.ndarray)
     place = len(run.env[0]) - run.structure.flags - len(INSTANT)
     run.env[0][place : place + len(INSTANT)] = local, first * length
     piece = piece_at(run, time, local, length)
-    _load_fillers()[2](run.structure.functions[1], run.env, piece, state, numbers)
+    load_fillers()[2](run.structure.functions[1], run.env, piece, state, numbers)
     end = len(numbers) - len(run.trace.signs)
     table = numbers[end - sizes.multipliers * (sizes.own + 1) : end]
     table = table.reshape(sizes.multipliers, sizes.own + 1)
