@@ -59,8 +59,8 @@ MISTAKES = {
         "use NumPy's functions, not math's",
     ),
     "a function without a series": (
-        lambda: saltus.System(model=pushed(lambda t, x, v: -np.sign(x))),
-        "np.sign cannot be traced",
+        lambda: saltus.System(model=pushed(lambda t, x, v: -np.floor(x))),
+        "np.floor cannot be traced",
     ),
     "the only coordinate as a list": (
         lambda: saltus.System(model=pushed(lambda t, x, v: -x[0])),
@@ -71,8 +71,8 @@ MISTAKES = {
         "the time may only be passed to a load channel",
     ),
     "drag": (
-        lambda: saltus.System(model=pushed(lambda t, x, v: -v * abs(v))),
-        "quadratic drag as -v * sqrt(v**2 + w**2)",
+        lambda: saltus.System(model=pushed(lambda t, x, v: -v * v if v > 0.0 else v * v)),
+        "as in -v * abs(v)",
     ),
     "a class that may change": (
         lambda: saltus.System(model=own(frozen=False, force=lambda self, t, x, v, load: -x)),

@@ -168,6 +168,30 @@ class RockingTable(saltus.ContactModel):
 
 @saltus.register
 @dataclass(frozen=True, kw_only=True)
+class AsymmetricDamper(saltus.ContactModel):
+    """A mass x with quadratic drag, and a mass y on a damper with two slopes to it."""
+
+    drag: float = 0.1
+    damping: float = 0.1
+    bump: float = 0.1
+    rebound: float = 0.3
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="rebound", function="stretching"),)
+
+    def stretching(self, t, q, velocity, load):
+        return velocity[1] - velocity[0]
+
+    def force(self, t, q, velocity, load, sides):
+        (x, y), (u, v) = q, velocity
+        slope = self.bump + (self.rebound - self.bump) * (1.0 + sides.rebound) / 2.0
+        pull = y - x + slope * (v - u)
+        return load.force(t) - 2.0 * x - self.drag * u * abs(u) - self.damping * u + pull, -pull
+
+
+@saltus.register
+@dataclass(frozen=True, kw_only=True)
 class Harvester(saltus.ContactModel):
     """A mass before a stop with a voltage, which is a coordinate of first order."""
 
@@ -438,6 +462,12 @@ CLASSES = (
         "your own: a contact of a `distance`",
         _rocking_table,
         {"x": 0.1, "y": 0.9, "tilt": 0.1},
+    ),
+    ModelClass(
+        "own, switches",
+        "your own: surfaces of velocities, and `abs` in a force",
+        lambda: System(model=AsymmetricDamper(), load=_pushed()),
+        {"x": 0.1, "y": 0.0},
     ),
 )
 NAMES = tuple(each.name for each in CLASSES)

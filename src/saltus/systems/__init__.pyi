@@ -24,6 +24,7 @@ from .impact_laws import friction_margins as friction_margins
 from .load import Channel as Channel
 from .load import DeclaredLoad as DeclaredLoad
 from .load import Load as Load
+from .load import Sides as Sides
 from .load import corners_between as corners_between
 from .metainterface import Metainterface as Metainterface
 from .mirror import Mirror as Mirror

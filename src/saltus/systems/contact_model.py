@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
 from decimal import Decimal
+from importlib import import_module
 from numbers import Complex
 from typing import Any, ClassVar, NamedTuple
 
@@ -236,6 +237,9 @@ class Surface:
     coordinates as that of a `Contact`. At a crossing coordinates and velocities are continuous. The
     model's `force` reads s by the surface's name.
 
+    Any other surface is a `function`, a method of the model, and s is its sign: a damper with two
+    slopes, a spring that never pulls.
+
     Parameters
     ----------
     name
@@ -249,6 +253,9 @@ class Surface:
     stiffness, damping
         k and c of the force -k (q - p) - c q' that acts on the side +1, of a `Structure`; another
         model has it in its `force`.
+    function
+        In place of a coordinate: the name of the model's method whose sign is s, as `rebound(t, q,
+        velocity, load)`.
 
     Examples
     --------
@@ -257,14 +264,16 @@ class Surface:
     """
 
     name: str
-    coordinate: Any
+    coordinate: Any = None
     position: Number = 0.0
     sign: int = 1
     stiffness: Number = 0.0
     damping: Number = 0.0
+    function: str | None = None
 
     def __post_init__(self) -> None:
         _check_texts(self, "name")
+        _check_function(self, "function", position=0.0, sign=1, stiffness=0.0, damping=0.0)
         _check_sign(self)
         _check_numbers(self, "position", "stiffness", "damping")
 
@@ -274,7 +283,7 @@ class Surface:
         Parameters
         ----------
         position
-            The coordinate q.
+            The coordinate q, or the value of the function.
         below
             Whether q = p itself counts as below the position; by default it counts as above.
         """
@@ -329,9 +338,9 @@ def _check_texts(part: Contact | Friction | Surface, *names: str) -> None:
             raise ParameterError(f"{name} of a {what} must be a text, got {shown(value)}", name)
 
 
-def _check_function(part: Contact | Friction, name: str, **usual: Any) -> None:
-    """Refuse a contact or friction with neither a coordinate nor a function, or with both, and a
-    function beside fields that only a coordinate has."""
+def _check_function(part: Contact | Friction | Surface, name: str, **usual: Any) -> None:
+    """Refuse a part with neither a coordinate nor a function, or with both, and a function beside
+    fields that only a coordinate has."""
     function = getattr(part, name)
     if (function is None) == (part.coordinate is None):
         got = "neither" if function is None else "both"
@@ -490,6 +499,25 @@ class ContactModel(Model):
             f"{type(self).__name__} must define force(t, theta, velocity, load)"
         )
 
+    @property
+    def has_switches(self) -> bool:
+        """Whether a surface is a function, or the force has switches of its own, such as an absolute
+        value.
+        """
+        given = any(surface.function is not None for surface in self.surfaces)
+        return given or force_has_switches(self)
+
+    @property
+    def holds_coordinates(self) -> bool:
+        """Whether contacts or frictions may hold its coordinates one by one, while the others move
+        on, or it has surfaces, or its force has switches.
+        """
+        return Model.holds_coordinates.fget(self) or force_has_switches(self)  # type: ignore[attr-defined]
+
+    def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
+        """The value of a surface's function."""
+        return ask(self, str(surface.function), t, q, v, load)
+
     def mass_matrix(self, theta: Any) -> Any:
         """M(q): rows of numbers, symmetric and positive definite; with one coordinate a number, or
         [[M]].
@@ -544,6 +572,23 @@ class ContactModel(Model):
             The load, whose channels are called with the time.
         """
         return (1.0,) * len(self.frictions)
+
+
+def force_has_switches(model: Any) -> bool:
+    """Whether the force of a class of models has switches of its own: absolute values, signs,
+    maxima, comparisons.
+
+    The tracer is in a room above this one, which is asked by its name.
+    """
+    kind = getattr(model, "own_class", type(model))
+    if kind not in _switching:
+        _switching[kind] = False  # while it is asked
+        own = kind.__module__.partition(".")[0] != "saltus"
+        _switching[kind] = own and import_module("saltus.taylor").force_has_switches(model)
+    return _switching[kind]
+
+
+_switching = dict[type, bool]()
 
 
 class SolvedMotion(NamedTuple):
@@ -783,7 +828,7 @@ def mass_and_force(
     model: Any, t: Any, q: Any, v: Any, load: Any
 ) -> tuple[list[list[Any]], list[Any]]:
     """M(q) as rows and r(t, q, v) as a list, for any number of coordinates."""
-    force = ask(model, "force", t, q, v, load, *sides_for(model, t, q, load))
+    force = ask(model, "force", t, q, v, load, *sides_for(model, t, q, v, load))
     return mass_rows(model, q, t, load), [force] if len(model.coordinates) == 1 else list(force)
 
 
@@ -821,9 +866,11 @@ def on_sides(model: Any, load: Any, slides: Sequence[Any]) -> Any:
     )
 
 
-def sides_for(model: Any, t: Any, q: Any, load: Any, below: bool = False) -> tuple[Sides, ...]:
+def sides_for(
+    model: Any, t: Any, q: Any, v: Any, load: Any, below: bool = False
+) -> tuple[Sides, ...]:
     """The argument `sides` of a model's force, if it takes one: those that come with the load, else
-    those of the coordinates. At a surface itself they are those above it, or `below` it.
+    those of the state. At a surface itself they are those above it, or `below` it.
     """
     if not model.surfaces:
         return ()
@@ -844,7 +891,9 @@ def sides_for(model: Any, t: Any, q: Any, load: Any, below: bool = False) -> tup
         )
 
     def kept(surface: Surface) -> Any:
-        """The coordinate of a surface, or its sum."""
+        """The coordinate of a surface, its sum, or its function."""
+        if surface.function is not None:
+            return model.value_of_function(surface, t, q, v, load)
         if isinstance(surface.coordinate, str):
             return known[surface.coordinate]
         return sum(factor * value_of(name) for name, factor in surface.coordinate.items())

@@ -38,6 +38,7 @@ from saltus.systems.gap_places import (
     Part,
     columns_of,
     inverse,
+    placed,
     places_of,
     terms_of,
 )
@@ -81,8 +82,10 @@ class InGapCoordinates(ContactModel):
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
-        """The surfaces, each of one of the coordinates."""
-        return self._on_coordinates(super().surfaces, self.gap_places.surfaces)
+        """The surfaces, each of one of the coordinates, or a function."""
+        given = super().surfaces
+        found = iter(self._on_coordinates(placed(given), self.gap_places.surfaces))
+        return tuple(part if part.function is not None else next(found) for part in given)
 
     @property
     def frictions(self) -> tuple[Friction, ...]:
@@ -152,7 +155,7 @@ class InGapCoordinates(ContactModel):
             [float(i == j) for j in range(len(names))] for i in range(len(self.gap_places.names))
         ]
         moving, nonlinear = ([dict[str, Any]() for _ in rows] for _ in range(2))
-        parts: list[Part] = [*super().contacts, *super().surfaces, *super().frictions]
+        parts: list[Part] = [*super().contacts, *placed(super().surfaces), *super().frictions]
         places = self.gap_places.contacts + self.gap_places.surfaces + self.gap_places.frictions
         first = len(parts) - len(self.gap_places.frictions)
         left_out = [first + k for k in self.gap_places.left_out]
@@ -381,6 +384,11 @@ class InGapCoordinates(ContactModel):
             rate + left for left, rate, _ in self._of_sums(t, theta, velocity, load)
         ]
         return as_given(found)
+
+    def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
+        """The value of a surface's function, of the model's own coordinates."""
+        own, rates = self.own_values(t, load, q, v)
+        return super().value_of_function(surface, t, own, rates, load)
 
     def _of_sums(self, t: Any, theta: Any, velocity: Any, load: Any) -> list[tuple[Any, Any, Any]]:
         """For each dependent sum s its rounding B q + n - s, its rate B q' + n', and B q_0'' +

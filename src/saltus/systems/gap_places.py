@@ -41,7 +41,7 @@ class GapPlaces:
     order: tuple[int, ...]  # the places of sums, in the order in which their terms are eliminated
     # the place of each contact's sum, and +1, or -1 if the coordinate is minus the sum
     contacts: tuple[tuple[int, int], ...]
-    surfaces: tuple[tuple[int, int], ...]  # of each surface likewise
+    surfaces: tuple[tuple[int, int], ...]  # of each surface likewise, but those of functions
     frictions: tuple[tuple[int, int], ...]  # and of each friction
     # the coordinates in the order of solving, with the functions that each needs
     solved: tuple[tuple[int, tuple[str, ...]], ...]
@@ -62,6 +62,11 @@ def terms_of(contact: Part) -> dict[str, Any]:
     )
 
 
+def placed(surfaces: Sequence[Surface]) -> list[Surface]:
+    """The surfaces of coordinates, or sums of them; those of functions need no place."""
+    return [surface for surface in surfaces if surface.function is None]
+
+
 def places_of(model: Any) -> GapPlaces | None:
     """Which coordinates the sums of a model's contacts take the place of; None if each contact
     holds a single coordinate.
@@ -69,7 +74,8 @@ def places_of(model: Any) -> GapPlaces | None:
     Functions that stand for the coordinate on which they depend are tried only if there is no other
     way; then frictions without force are left out.
     """
-    parts: tuple[Part, ...] = (*model.contacts, *model.surfaces, *model.frictions)
+    surfaces = placed(model.surfaces)
+    parts: tuple[Part, ...] = (*model.contacts, *surfaces, *model.frictions)
     if all(isinstance(part.coordinate, str) for part in parts):
         return None
     reads = {
@@ -83,7 +89,7 @@ def places_of(model: Any) -> GapPlaces | None:
         for name, places in reads.items()
         if len(places) == 1 and hasattr(model, name + INVERSE)
     }
-    held = (*model.contacts, *model.surfaces)
+    held = (*model.contacts, *surfaces)
     acting = tuple(friction for friction in model.frictions if not has_no_force(friction))
     refusals = list[str]()
     for kept in (parts, (*held, *acting)) if len(acting) < len(model.frictions) else (parts,):
@@ -173,7 +179,7 @@ def _placed(
         return _no_place(parts[-1], parts, reads)
     count = len(model.contacts)
     every = tuple(found.values())
-    last = count + len(model.surfaces)
+    last = count + len(placed(model.surfaces))
     return GapPlaces(
         tuple(called),
         tuple(order),

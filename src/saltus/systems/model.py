@@ -180,6 +180,13 @@ class Model:
         )
 
     @property
+    def has_switches(self) -> bool:
+        """Whether its equations differ on the sides of functions of the state, of surfaces or in its
+        force; a `ContactModel` may have some.
+        """
+        return False
+
+    @property
     def friction_limits(self) -> tuple[str, ...]:
         """The limits at which its frictions end a motion."""
         return ()

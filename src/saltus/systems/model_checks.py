@@ -234,6 +234,8 @@ def _check_first_order(model: Model) -> None:
             "model",
         )
     for part in parts if given else ():
+        if part.coordinate is None:
+            continue
         terms = [part.coordinate] if isinstance(part.coordinate, str) else list(part.coordinate)
         held = [name for name in terms if name in getattr(model, "own_class", model).first_order]
         if held and not (isinstance(part, Surface) and len(terms) == 1):
@@ -264,7 +266,7 @@ def _check_rates(model: Model) -> None:
         state = [(q,) * size, (v,) * moving + (unknown,) * (size - moving)]
         place, speed = (x[0] if size == 1 else x for x in state)
         rest = {
-            "force": (load, *sides_for(model, t, place, load)),
+            "force": (load, *sides_for(model, t, place, speed, load)),
             "normal_forces": (load,),
             "margins": (speed, 1, load),
         }
@@ -394,6 +396,9 @@ def check_contact_model(model: ContactModel) -> bool:
         if isinstance(contact, Contact) and contact.distance is not None:
             _check_method(model, contact, contact.distance, DISTANCE)
             continue
+        if isinstance(contact, Surface) and contact.function is not None:
+            _check_method(model, contact, contact.function, RATE)
+            continue
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
             known = ", ".join(model.coordinates)
             what = _named(contact)
@@ -418,7 +423,8 @@ def check_contact_model(model: ContactModel) -> bool:
     if model.has_multipliers:
         _check_surfaces(model)
         return False
-    sums = any(not isinstance(part.coordinate, str) for part in (*parts, *frictions))
+    placed = [part for part in (*parts, *frictions) if part.coordinate is not None]
+    sums = any(not isinstance(part.coordinate, str) for part in placed)
     if model.rubs_in_contacts and not sums:
         check_paradox(model)
     return sums
@@ -428,7 +434,7 @@ def _check_surfaces(model: ContactModel) -> None:
     """Refuse surfaces of sums beside distances and rates."""
     kind = type(model).__name__
     for surface in model.surfaces:
-        if not isinstance(surface.coordinate, str):
+        if not isinstance(surface.coordinate, str) and surface.function is None:
             raise ParameterError(
                 f"the surface {surface.name!r} of {kind} is of a sum: beside a distance or a rate"
                 " it must be of one coordinate so far",
@@ -436,7 +442,8 @@ def _check_surfaces(model: ContactModel) -> None:
             )
 
 
-# The arguments of the methods that a contact's `distance` and a friction's `rate` name.
+# The arguments of the methods that a contact's `distance` names, and a friction's `rate` or a
+# surface's `function`.
 DISTANCE = ("t", "q", "load")
 RATE = ("t", "q", "velocity", "load")
 
@@ -797,11 +804,14 @@ def _probe(model: Model) -> None:
     t, q, v = PROBE
     load = DeclaredLoad(Load(frequency=1.0), model)
     state: tuple[Any, Any] = (q, v) if size == 1 else ((q,) * size, (v,) * size)
-    single = all(isinstance(each.coordinate, str) for each in getattr(model, "surfaces", ()))
+    single = all(
+        isinstance(each.coordinate, str) or each.function is not None
+        for each in getattr(model, "surfaces", ())
+    )
     if model.first_order and single and not isinstance(model, InGapCoordinates):
         _check_rates(model)
     if isinstance(model, ContactModel) and single and type(model).force is not ContactModel.force:
-        pushed = _asked(model, "force", t, *state, load, *sides_for(model, t, state[0], load))
+        pushed = _asked(model, "force", t, *state, load, *sides_for(model, t, *state, load))
         if pushed is not None and _size_of(pushed) != (
             "a number" if size == 1 else f"{size} numbers"
         ):

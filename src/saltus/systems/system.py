@@ -503,12 +503,14 @@ def check_system(
     several_contacts: bool = False,
     sums: bool = True,
     multipliers: bool = False,
+    switches: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that
     `asking` is for.
 
     Without `sums` each contact and surface must be of a single coordinate; without `multipliers`
-    none may be a `distance`, and no friction a `rate`.
+    none may be a `distance`, and no friction a `rate`; without `switches` no surface a `function`,
+    and the force must have no switches of its own.
 
     Raises
     ------
@@ -526,6 +528,13 @@ def check_system(
         raise ParameterError(
             f"{asking} does not follow contacts of a distance and frictions of a rate so far, and"
             f" {type(system.model).__name__} has {', '.join(held)}; simulate and"
+            " sensitivities do",
+            "system",
+        )
+    if not switches and system.model.has_switches:
+        raise ParameterError(
+            f"{asking} does not follow surfaces that are functions, and forces with abs, sign, maximum"
+            f" or comparisons, so far, and {type(system.model).__name__} has some; simulate and"
             " sensitivities do",
             "system",
         )

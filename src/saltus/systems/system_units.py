@@ -512,7 +512,8 @@ def _on_both_sides(model: Any, t: float, place: np.ndarray, load: Any) -> list[A
         return [load]
     q = float(place[0]) if len(place) == 1 else tuple(place.tolist())
     try:
-        both = [sides_for(model, t, q, load, below)[0] for below in (False, True)]
+        still = 0.0 if len(place) == 1 else (0.0,) * len(place)
+        both = [sides_for(model, t, q, still, load, below)[0] for below in (False, True)]
     except Exception:  # a user's own code may raise anything
         return [load]
     return [LoadOnSides(load, sides) for sides in both]

@@ -52,6 +52,7 @@ from .private_numba import pointer as pointer
 from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows
 from .shipped import shipped_level as shipped_level
+from .switches import force_has_switches as force_has_switches
 from .tracing import FREQUENCY as FREQUENCY
 from .tracing import Trace as Trace
 from .tracing import trace as trace

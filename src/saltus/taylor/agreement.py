@@ -76,6 +76,14 @@ def _compare(
         directions[: len(system.model.frictions)] = [0.0] * len(system.model.frictions)
     leaves |= {Expr("free", (), i): 1.0 for i in range(traced.flags)}
     leaves |= {Expr("slide", (), k): direction for k, direction in enumerate(directions)}
+    first = len(traced.friction_coordinates) - len(traced.switches)
+    for k in range(first, len(directions)):  # those of the force are where the state is
+        value = substitute(traced.reactions[len(traced.signs) + 2 * k], leaves)
+        if value.op != "number":
+            return  # a record or a pulse is read from a table
+        directions[k] = 1.0 if value.value >= 0.0 else -1.0
+        leaves[Expr("slide", (), k)] = directions[k]
+    directions = directions[:first]
     for part, own in _own_values(system, traced, state, directions):
         roots = getattr(traced, part)
         roots = roots if isinstance(roots, list) else [roots]
@@ -130,7 +138,8 @@ def _own_values(
                     0.0 if traced.rows else friction.ground_speed for friction in model.frictions
                 ]
                 places = [surface.position for surface in model.surfaces]
-                found.append(("ground_speeds", [*speeds, *places]))
+                switches = [0.0] * len(traced.switches)
+                found.append(("ground_speeds", [*speeds, *places, *switches]))
             else:
                 value = model.acceleration(time, x, rate, side, load)
                 found.append(("acceleration", value if len(q) > 1 else [value]))

@@ -21,7 +21,10 @@ from saltus.taylor.rules import FUNCTIONS
 
 # The operations without Taylor recurrence that a reset may use, because it is evaluated at one
 # instant only.
-POINTWISE = ("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum")
+POINTWISE = (
+    *("greater", "less", "greater_equal", "less_equal", "where", "maximum", "minimum"),
+    *("absolute", "sign"),
+)
 LEAVES = (
     *(
         "number",
@@ -53,8 +56,8 @@ BRANCH = (
 )
 FRICTION = (
     "a force that jumps with the sign of a velocity (dry friction, stick-slip) cannot be traced:"
-    " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and quadratic"
-    " drag as -v * sqrt(v**2 + w**2) with a small w"
+    " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and the force"
+    " of a ContactModel may have abs, sign, maximum, minimum and where, as in -v * abs(v)"
 )
 COMPARISON = (
     "a traced model may not compare its state or numbers, or look them up (==, !=, in, a dict, a"
@@ -62,7 +65,7 @@ COMPARISON = (
 )
 # NumPy's names, and ours
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
-_AS_THEY_ARE = ("tan", "square", "absolute", "negative", "positive", *POINTWISE)
+_AS_THEY_ARE = ("tan", "square", "negative", "positive", *POINTWISE)
 UFUNCS = (
     ARITHMETIC
     | {name: name for name in _AS_THEY_ARE}
@@ -71,9 +74,12 @@ UFUNCS = (
 
 
 class _UsersCode(threading.local):
-    """Whether a user's code runs in this thread, which may not compare symbols."""
+    """Whether a user's code runs in this thread, which may not compare symbols, and whether it may
+    have switches.
+    """
 
     runs = False
+    switches = False
 
 
 _USERS_CODE = _UsersCode()
@@ -88,6 +94,17 @@ def comparing_symbols(refused: bool) -> Iterator[None]:
         yield
     finally:
         _USERS_CODE.runs = before
+
+
+@contextmanager
+def switching() -> Iterator[None]:
+    """Allow switches: absolute values and signs of any expression."""
+    before = _USERS_CODE.switches
+    _USERS_CODE.switches = True
+    try:
+        yield
+    finally:
+        _USERS_CODE.switches = before
 
 
 class Expr:
@@ -158,6 +175,8 @@ class Expr:
         return self
 
     def __abs__(self) -> Expr:
+        if _USERS_CODE.switches:
+            return combine("absolute", self)
         if self.op != "coordinate":
             raise TraceError(
                 "abs of an expression that is not a coordinate cannot be traced;"
@@ -217,6 +236,8 @@ class Expr:
         if _holds_expressions(inputs):
             return NotImplemented  # type: ignore[no-any-return]
         name = UFUNCS.get(ufunc.__name__)
+        if name == "sign" and not _USERS_CODE.switches:
+            name = None
         if method != "__call__" or kwargs or name is None:
             raise TraceError(f"np.{ufunc.__name__} cannot be traced; {_what_is_allowed(*inputs)}")
         return _apply(name, inputs)
@@ -224,6 +245,8 @@ class Expr:
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Expr:
         if func is np.where and len(args) == 3:
             return combine("where", *args)
+        if func is np.clip and len(args) == 3 and not kwargs and _USERS_CODE.switches:
+            return combine("minimum", combine("maximum", *args[:2]), args[2])
         raise TraceError(f"np.{func.__name__} cannot be traced; allowed are {ALLOWED}")
 
     def __getattr__(self, name: str) -> Any:
@@ -462,6 +485,8 @@ def _chain(node: Expr, d: list[Expr]) -> Expr:
         "pow": lambda: (
             b * power(a, b - 1) * d[0] + (0.0 if d[1] is number(0.0) else node * np.log(a) * d[1])
         ),
+        "absolute": lambda: combine("sign", a) * d[0],
+        "sign": lambda: 0.0,
         "where": lambda: combine("where", a, d[1], d[2]),
         "maximum": lambda: combine("where", combine("greater", a, b), d[0], d[1]),
         "minimum": lambda: combine("where", combine("less", a, b), d[0], d[1]),

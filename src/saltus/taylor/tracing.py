@@ -37,6 +37,7 @@ from saltus.taylor.graph import (
     number,
     ordered,
     substitute,
+    switching,
     uses_velocity,
 )
 from saltus.taylor.load_tables import CORNER, LoadTime
@@ -51,11 +52,15 @@ from saltus.taylor.memory import (
     without_modes,
 )
 from saltus.taylor.multipliers import held_motion
+from saltus.taylor.switches import Switches, called, pointwise
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
 FREQUENCY = "load.frequency"
+MOST_BITS = (
+    62  # of contacts, and two for each friction, surface and switch, in the number of a mode
+)
 
 
 @dataclass(eq=False)
@@ -127,6 +132,10 @@ class Trace:
     friction_contacts: tuple[int, ...] = ()
     # the coordinate of each friction, then -1 less that of each surface
     friction_coordinates: tuple[int, ...] = ()
+    # the rows of frictions and surfaces that are functions, whose series stand in the place of the
+    # first margin; the last of these rows are those of switches of the force, by name
+    functions: tuple[int, ...] = ()
+    switches: tuple[str, ...] = ()
     modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
     # the accelerations of all columns, which are then leaves "mode" too
     sums: tuple[ColumnSum, ...] = ()
@@ -229,6 +238,34 @@ class Trace:
         """The symbol of the number at a dotted path."""
         self.parameters.append(path)
         return Expr("parameter", (), len(self.parameters) - 1)
+
+    def append_switches(self, names: tuple[str, ...], functions: list[Expr]) -> None:
+        """Append the rows of the switches of the force, behind those of the surfaces."""
+        count = len(self.signs)
+        first = len(self.friction_coordinates)
+        more = len(functions)
+        if more and count + 2 * (first + more) > MOST_BITS:
+            raise TraceError(
+                f"{self.model} has {more} switches, such as absolute values and comparisons, and at"
+                f" most {(MOST_BITS - count) // 2 - first} can be followed beside its parts"
+            )
+        empty = [number(0.0)] * more
+        margins = [x for function in functions for x in (function, number(1.0))]
+        series = self.reactions
+        last = count + 2 * first
+        held = last + count + first if self.rows else last
+        between = series[last:held] + (empty if self.rows else [])
+        self.reactions = series[:last] + margins + between + series[held:]
+        if self.rows:
+            gaps = len(self.rows) - count
+            self.rows = self.rows[:gaps] + empty * (self.dof + 1) + self.rows[gaps:]
+        if self.coefficients:
+            self.coefficients = self.coefficients + empty
+            self.friction_contacts += (-1,) * more
+        self.ground_speeds = self.ground_speeds + empty
+        self.friction_coordinates += (-1,) * more
+        self.functions += tuple(range(first, first + more))
+        self.switches = tuple(called(function, names, self.parameters) for function in functions)
 
     def append_tangent(self, paths: tuple[str, ...]) -> None:
         """Append the tangent's columns as further coordinates; coordinate dof + j dof + d is u_d of
@@ -372,10 +409,21 @@ def trace(
         )
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
+    switches = Switches(len(result.friction_coordinates))
+    if several:
+        result.acceleration = switches.written(result.acceleration)
+        result.reactions = switches.written(result.reactions)
+        result.jumps = [pointwise(root) for root in result.jumps]
     if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _check_powers(result.acceleration, _edges(model, result.contact, coordinates))
     _trace_margins(result, twin, t, q, v, side, stop_at)
+    if several:
+        margins = switches.written(result.margins.values())
+        result.margins = dict(zip(result.margins, margins, strict=True))
+        # a force may have none under the load that is given
+        none = model.has_switches and not result.several and not switches.functions
+        result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
     if energy:
         result.margins["kinetic_energy"] = combine(
             "add", ask_user(model, "kinetic_energy", t, q, v, side, load), 0.0
@@ -500,6 +548,7 @@ def ask_user(model: Any, method: str, *arguments: Any) -> Any:
     return ask(model, method, *arguments)
 
 
+@switching()
 @comparing_symbols(refused=True)
 def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> list[Any]:
     """Trace the accelerations of a model with several contacts, for any choice of closed ones."""
@@ -509,6 +558,16 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     frictions = twin.contact_model.frictions
     local = getattr(model, "local_count", result.dof)
     parts = (*frictions, *model.surfaces)
+    functions = [
+        number(1.0)
+        if part.function is None
+        else combine("add", model.value_of_function(part, t, q, v, load), 0.0)
+        for part in model.surfaces
+    ]
+    result.functions = tuple(
+        k for k, part in enumerate(parts) if getattr(part, "function", None) is not None
+    )
+    beside = [x for function in functions for x in (function, number(1.0))]
     if local < result.dof:
         q, v = local_parts(q, v, local)
     a, slides = (
@@ -517,7 +576,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     )
     sums: dict[int, Any] = {}
     if model.has_multipliers:
-        found, holding = _trace_multipliers(result, model, t, q, v, load)
+        found, holding = _trace_multipliers(result, model, t, q, v, load, beside)
     else:
         found, along, sums = solved_motion(
             model, t, q, v, load, [Expr("free", (), i) for i in range(local)], slides
@@ -527,7 +586,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
             for forces in (reactions, stick_margins)
             for f in forces(model, t, q, v, a, load, slides, along)
         ]
-        holding += [1.0] * (2 * len(model.surfaces))
+        holding += beside
     result.reactions = [combine("add", r, 0.0) for r in holding]
     if model.rubs_in_contacts:
         given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
@@ -542,7 +601,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [
         0
-        if model.has_multipliers and k < len(frictions)
+        if part.coordinate is None or (model.has_multipliers and k < len(frictions))
         else model.coordinates.index(part.coordinate)
         for k, part in enumerate(parts)
     ]
@@ -582,7 +641,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
 
 
 def _trace_multipliers(
-    result: Trace, model: Any, t: LoadTime, q: Any, v: Any, load: Any
+    result: Trace, model: Any, t: LoadTime, q: Any, v: Any, load: Any, beside: list[Expr]
 ) -> tuple[list[Any], list[Any]]:
     """Trace the accelerations of a model whose contacts and frictions are rows, and the series that
     events need: reactions, margins of frictions, gaps, sliding speeds."""
@@ -597,8 +656,7 @@ def _trace_multipliers(
     result.rows += [row.value for row in held.contacts]
     gaps = [row.value for row in held.contacts]
     speeds = [row.value for row in held.frictions]
-    ones = [number(1.0)] * (2 * len(surfaces))
-    series = [*held.reactions, *held.margins, *ones, *gaps, *speeds, *surfaces]
+    series = [*held.reactions, *held.margins, *beside, *gaps, *speeds, *surfaces]
     if result.with_pulls:
         series += [_pull_of(row) for row in held.contacts]
     return held.accelerations, series

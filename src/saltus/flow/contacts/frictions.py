@@ -5,7 +5,7 @@ The kernel's array of contacts has a row for each friction behind those of the c
 columns of `FrictionColumn`; `frictions` are these rows. The guard of a friction that slides is the
 speed q' - w in its direction; a friction that sticks has two guards, its margins (`stick_margins`).
 A surface has a row behind those of the frictions: its guard is the distance of the coordinate from
-its position on its side, and when it is reached the side changes. Directions and sides are kept in
+its position on its side, or its function, and when it is reached the side changes. Directions and sides are kept in
 the parameters of `env`, before the numbers that say which coordinates are free.
 
 Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
@@ -15,17 +15,19 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import eliminate, friction_rate
-from saltus.flow.contacts.held_rows import all_rows_stand, onto, some_idle, stop_row
+from saltus.flow.contacts.held_rows import all_rows_stand, guard_step, onto, some_idle, stop_row
 from saltus.flow.contacts.impacts import friction_mobility, record_contact_event
 from saltus.flow.contacts.layout import (
     TOGETHER,
     ContactColumn,
     FrictionColumn,
-    NoMargin,
+    FrictionImpact,
     NoPress,
     first_flag,
     ground_speed,
+    is_function,
     is_sum,
+    is_surface,
 )
 from saltus.flow.contacts.rows import row_series
 from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
@@ -46,6 +48,9 @@ from saltus.taylor import lean_jit
 # than this, in units of what presses (`note_press`). So is a margin of a friction that can only
 # just stick when its speed becomes that of the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
+# A coefficient of a function is rounding if its term in the natural time is a smaller share of the
+# largest one.
+VANISHES = 1e-13
 
 
 @lean_jit
@@ -74,7 +79,7 @@ def is_on_surface(motion, k):
     """Whether a row is that of a surface on which the motion is exactly, unless it has just passed
     it."""
     row = motion.frictions[k]
-    if row[FrictionColumn.MARGIN] != NoMargin.SURFACE or row[FrictionColumn.REACHED] == 3:
+    if not is_surface(motion, k) or is_function(motion, k) or row[FrictionColumn.REACHED] == 3:
         return False
     return motion.coordinates[row[FrictionColumn.COORDINATE]] == ground_speed(motion, k)
 
@@ -86,6 +91,101 @@ def on_surfaces(motion):
     for k in range(motion.frictions.shape[0]):
         found = found or is_on_surface(motion, k)
     return found
+
+
+@lean_jit
+def is_to_read(motion, k):
+    """Whether the side of a function is to be chosen: it has just been reached, or may have
+    jumped."""
+    row = motion.frictions[k]
+    found = row[FrictionColumn.REACHED] == 3 or row[FrictionColumn.STRUCK] == FrictionImpact.JUMPED
+    return found and is_function(motion, k)
+
+
+@lean_jit
+def any_to_read(motion):
+    """Whether the side of any function is to be chosen."""
+    found = False
+    for k in range(motion.frictions.shape[0]):
+        found = found or is_to_read(motion, k)
+    return found
+
+
+@lean_jit
+def note_jumps(motion):
+    """Note that what functions read may have jumped."""
+    for k in range(motion.frictions.shape[0]):
+        if is_function(motion, k):
+            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.JUMPED
+
+
+@lean_jit
+def side_ahead(motion, k):
+    """The side of a function just behind the present instant, by the series on its present side:
+    0 if it stays at 0. Notes how many of the first coefficients are 0."""
+    row = motion.frictions[k]
+    series = motion.margin_series[motion.contacts.shape[0] + 2 * k]
+    row[FrictionColumn.SKIP] = 0
+    if row[FrictionColumn.REACHED] != 3 and series[0] != 0.0:
+        return 1 if series[0] > 0.0 else -1
+    unit = time_scale(motion)
+    size = 0.0
+    power = 1.0
+    for i in range(1, motion.order + 1):
+        power *= unit
+        size = max(size, abs(series[i]) * power)
+    power = 1.0
+    for i in range(1, motion.order + 1):
+        power *= unit
+        row[FrictionColumn.SKIP] = i
+        if series[i] != 0.0 and abs(series[i]) * power >= VANISHES * size:
+            return 1 if series[i] > 0.0 else -1
+    return 0
+
+
+@lean_jit
+def choose_sides(motion, t):
+    """Choose the sides of the functions that are to be read: those to which the motion moves on.
+
+    0 if there are none, or if both sides of one lead away from it; else 1, or 2 if one has changed.
+    """
+    changed = 1
+    agrees = False
+    for _ in range(1 + 2 * motion.frictions.shape[0]):
+        hold_frictions(motion)
+        expand(motion, t, 1.0, motion.order)
+        agrees = True
+        for k in range(motion.frictions.shape[0]):
+            row = motion.frictions[k]
+            ahead = side_ahead(motion, k) if is_to_read(motion, k) else 0
+            if ahead == -row[FrictionColumn.SLIDES] and ahead != 0:
+                row[FrictionColumn.SLIDES] = ahead
+                agrees = False
+                changed = 2
+        if agrees:
+            break
+    if not agrees:
+        return 0
+    return changed if motion.leave_by == 0 or lead_one_way(motion, t) else 0
+
+
+@lean_jit
+def lead_one_way(motion, t):
+    """Whether a motion that starts at 0 of functions would move on to none but the sides that were
+    chosen."""
+    one_way = True
+    for k in range(motion.frictions.shape[0]):
+        row = motion.frictions[k]
+        skip = row[FrictionColumn.SKIP]
+        if is_to_read(motion, k) and skip > 0:
+            row[FrictionColumn.SLIDES] *= -1
+            hold_frictions(motion)
+            expand(motion, t, 1.0, motion.order)
+            one_way = one_way and side_ahead(motion, k) != row[FrictionColumn.SLIDES]
+            row[FrictionColumn.SLIDES] *= -1
+            row[FrictionColumn.SKIP] = skip
+    hold_frictions(motion)
+    return one_way
 
 
 @lean_jit
@@ -159,7 +259,9 @@ def sliding_series(motion, k, direction, order, g):
     from a surface on a side.
     """
     v = motion.velocity_series[motion.frictions[k, FrictionColumn.COORDINATE]]
-    if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+    if is_function(motion, k):
+        v = motion.margin_series[motion.contacts.shape[0] + 2 * k]
+    elif is_surface(motion, k):
         v = motion.coordinate_series[motion.frictions[k, FrictionColumn.COORDINATE]]
     elif motion.multipliers > 0:
         v = motion.margin_series[row_series(motion, motion.contacts.shape[0] + k)]
@@ -175,9 +277,9 @@ def margin_size(motion, k):
 
 
 @lean_jit
-def friction_step_size(motion, count, natural):
+def friction_step_size(motion, count, natural, longest):
     """The step, at most `natural`, that the series of the friction forces of sticking coordinates
-    allow.
+    and of functions allow, where no step is longer than `longest`.
     """
     tol = motion.tolerance
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
@@ -187,6 +289,8 @@ def friction_step_size(motion, count, natural):
             size = max(margin_size(motion, k), abs(r[0, 0]))
             if size > 0.0:
                 natural = min(natural, step_size(r, motion.order, size, sharp))
+        if is_function(motion, k):
+            natural = guard_step(motion, count + 2 * k, natural, longest)
     return natural
 
 
@@ -238,23 +342,25 @@ def reach_ground_speed(motion, count, t, k, which, later):
     """Take the motion, with the tangent's columns, to the instant at which a friction's guard is 0.
 
     If that is the sliding speed, it is set to exactly 0; the instant moves by dt = -(z - w_c) / a.
-    At a surface the coordinate is set to its position, and dt = -(u - p_c) / v.
+    At a surface the coordinate is set to its position, and dt = -(u - p_c) / v; at a function h the
+    state stays as it is, and dt = -h_c / h'.
     """
     own = motion.own
     rest = motion.frictions[k, FrictionColumn.COORDINATE]
-    crossed = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
+    crossed = is_surface(motion, k)
     if motion.columns > 0:
         expand(motion, t, 1.0, 1)
+        row = -1  # of the margins, whose series is the guard
         if which < 2:
             row = count + 2 * k + which
-            columns_at_event(motion, EventCode.RELEASE, row, t, 1.0)
+        elif is_function(motion, k):
+            row = count + 2 * k
         elif motion.multipliers > 0 and not crossed:
-            columns_at_event(motion, EventCode.RELEASE, row_series(motion, count + k), t, 1.0)
+            row = row_series(motion, count + k)
+        if row >= 0:
+            columns_at_event(motion, EventCode.RELEASE, row, t, 1.0)
         for j in range(motion.columns):
-            if which < 2:
-                motion.shifts[j] /= -motion.margin_series[row, 1]
-            elif motion.multipliers > 0 and not crossed:
-                row = row_series(motion, count + k)
+            if row >= 0:
                 motion.shifts[j] /= -motion.margin_series[row, 1]
             else:
                 moved = slope(motion, j, motion.solver_numbers.size - motion.frictions.shape[0] + k)
@@ -267,7 +373,8 @@ def reach_ground_speed(motion, count, t, k, which, later):
                     )
         move_columns(motion, 1.0)
     if crossed:
-        motion.coordinates[rest] = ground_speed(motion, k)
+        if not is_function(motion, k):
+            motion.coordinates[rest] = ground_speed(motion, k)
     elif which == 2 and motion.multipliers > 0:
         stop_row(motion, count + k)
         motion.slide_rates[k] = 0.0
@@ -291,7 +398,7 @@ def undecided(motion):
     for k in range(motion.frictions.shape[0]):
         turns = turns or motion.frictions[k, FrictionColumn.REACHED] > 0
     for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+        if is_surface(motion, k):
             if motion.frictions[k, FrictionColumn.REACHED] == 3:
                 motion.frictions[k, FrictionColumn.SLIDES] *= -1
                 motion.frictions[k, FrictionColumn.SKIP] = 1
@@ -424,7 +531,7 @@ def record_slides(motion, before, t):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         before //= 4
         # the side that a motion leaves a surface to, on which it was, is no passage of it
-        on_side = motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE
+        on_side = is_surface(motion, k)
         on_side = on_side and motion.frictions[k, FrictionColumn.REACHED] != 3
         if slides != was and slides != 2 and was != 2 and not on_side:
             kind = (
@@ -434,7 +541,7 @@ def record_slides(motion, before, t):
                 if slides == 0
                 else EventCode.REVERSAL
             )
-            if motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
+            if is_surface(motion, k):
                 kind = EventCode.CROSSING
             record_contact_event(motion, kind, 1 << (motion.contacts.shape[0] + k), t)
             note_shifts(motion, motion.shifts)
@@ -548,7 +655,7 @@ def is_along(motion, k, i):
         == motion.frictions[k, FrictionColumn.COORDINATE]
     )
     along = along and motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT
-    return along and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
+    return along and not is_surface(motion, k)
 
 
 @lean_jit
@@ -584,7 +691,7 @@ def all_stand(motion):
     if free > 0:
         return False
     for k in range(motion.frictions.shape[0]):
-        is_friction = motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE
+        is_friction = not is_surface(motion, k)
         is_friction = is_friction and motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT
         moves = moves or (is_friction and ground_speed(motion, k) != 0.0)
     return not moves

@@ -14,9 +14,9 @@ from saltus.flow.contacts.layout import (
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
-    NoMargin,
     first_flag,
     first_row,
+    is_surface,
 )
 from saltus.flow.contacts.rows import (
     gives,
@@ -180,7 +180,7 @@ def measure_slides(motion):
     struck = struck and motion.mode == Mode.CONTACT
     for k in range(motion.frictions.shape[0]):
         row = motion.frictions[k]
-        if row[FrictionColumn.MARGIN] == NoMargin.SURFACE:
+        if is_surface(motion, k):
             continue
         sticks = row[FrictionColumn.SLIDES] == 0
         if struck:
@@ -344,30 +344,37 @@ STEPS_TRIED = 5
 
 
 @lean_jit
+def guard_step(motion, place, natural, longest):
+    """The step, at most `natural`, that the series at a place among the margins allows, where no
+    step is longer than `longest`."""
+    series = motion.margin_series[place : place + 1]
+    order = motion.order
+    for _ in range(STEPS_TRIED):
+        span = min(natural, longest)
+        size = size_along(series, span, FIRST_OF_SERIES)
+        if not size > 0.0:
+            size = size_along(series, span, order // 2)
+        if not size > 0.0:
+            break
+        shorter = step_size(series, order, size, motion.tolerance)
+        if not shorter < span:
+            break
+        natural = shorter
+    return natural
+
+
+@lean_jit
 def row_step(motion, natural, longest):
     """The step, at most `natural`, that the series of open gaps and of sliding speeds allow, where
     no step is longer than `longest`."""
     count = motion.contacts.shape[0]
-    order = motion.order
     for r in range(motion.multipliers):
         watched = r < count and motion.contacts[r, ContactColumn.CLOSED] == 0
         if r >= count and has_speed(motion, r - count):
             watched = abs(motion.frictions[r - count, FrictionColumn.SLIDES]) == 1
         if not watched:
             continue
-        place = row_series(motion, r)
-        series = motion.margin_series[place : place + 1]
-        for _ in range(STEPS_TRIED):
-            span = min(natural, longest)
-            size = size_along(series, span, FIRST_OF_SERIES)
-            if not size > 0.0:
-                size = size_along(series, span, order // 2)
-            if not size > 0.0:
-                break
-            shorter = step_size(series, order, size, motion.tolerance)
-            if not shorter < span:
-                break
-            natural = shorter
+        natural = guard_step(motion, row_series(motion, r), natural, longest)
     return natural
 
 

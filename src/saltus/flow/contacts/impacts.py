@@ -21,10 +21,11 @@ from saltus.flow.contacts.layout import (
     VANISHED,
     ContactColumn,
     FrictionColumn,
-    NoMargin,
     NoPress,
     contact_position,
     first_flag,
+    is_function,
+    is_surface,
     jumping,
     restitution,
 )
@@ -581,7 +582,7 @@ def contact_mobility(motion, i):
 def friction_mobility(motion, k):
     """The acceleration along a friction or a surface by a force of 1 along it."""
     row = motion.frictions[k]
-    if motion.multipliers > 0 and row[FrictionColumn.MARGIN] != NoMargin.SURFACE:
+    if motion.multipliers > 0 and not is_surface(motion, k):
         entry = motion.mobilities[motion.contacts.shape[0] + k]
         return entry if entry > 0.0 else 1.0
     return mobility(motion, row[FrictionColumn.COORDINATE])
@@ -621,10 +622,10 @@ def note_rubs(motion):
     """Note what presses on frictions and surfaces at the start of a step, and sliding speeds, for
     the natural scales."""
     for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
+        inert = motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT
+        if inert or is_function(motion, k):
             continue
-        in_row = motion.multipliers > 0
-        if in_row and motion.frictions[k, FrictionColumn.MARGIN] != NoMargin.SURFACE:
+        if motion.multipliers > 0 and not is_surface(motion, k):
             press = abs(pull_of(motion, motion.contacts.shape[0] + k))
             speed = abs(motion.slide_rates[k])
         else:

@@ -32,10 +32,13 @@ from saltus.flow.contacts.closings import (
 from saltus.flow.contacts.complementarity import is_pressed, slides_on
 from saltus.flow.contacts.frictions import (
     all_stand,
+    any_to_read,
     begin_on_surfaces,
+    choose_sides,
     first_friction,
     friction_step_size,
     hold_frictions,
+    note_jumps,
     on_surfaces,
     reach_ground_speed,
     record_slides,
@@ -86,6 +89,7 @@ from saltus.flow.contacts.layout import (
     contact_position,
     first_flag,
     ground_speed,
+    is_function,
     solver_arrays,
 )
 from saltus.flow.contacts.propagators import (
@@ -265,14 +269,20 @@ def choose_all(motion, candidates, still, held, t):
     holds.
     """
     on = on_surfaces(motion)
+    read = any_to_read(motion)
     if motion.leave_by == 1 and on and begin_on_surfaces(motion, t) == 0:
         return False
-    for _ in range(3 if on else 1):
+    if read:
+        choose_sides(motion, t)
+    for _ in range(3 if on or read else 1):
         if not choose_holding(motion, candidates, still, held, t):
             return False
         hold_coordinates(motion)
         hold_frictions(motion)
         moved = begin_on_surfaces(motion, t) if on else 1
+        if read and moved > 0:
+            turned = choose_sides(motion, t)
+            moved = max(moved, turned) if turned > 0 else 0
         if moved < 2:
             return moved == 1
     return False
@@ -296,7 +306,8 @@ def first_press(motion, t):
             place = motion.contacts[row, ContactColumn.COORDINATE]
         else:
             k = row - motion.contacts.shape[0]
-            if motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT:
+            inert = motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT
+            if inert or is_function(motion, k):
                 continue
             place = motion.frictions[k, FrictionColumn.COORDINATE]
         a = motion.acceleration_series[place]
@@ -376,6 +387,8 @@ def decide_contacts(motion):
         motion.contacts[i, ContactColumn.RELEASED] = 0
     for k in range(motion.frictions.shape[0]):
         motion.frictions[k, FrictionColumn.REACHED] = 0
+        if is_function(motion, k):
+            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
     if motion.rested == 1 and not rested:
         all_bits = closed_bits(motion)
         for k in range(motion.frictions.shape[0]):
@@ -541,7 +554,7 @@ def seek_event(motion, t, target):
     natural = contact_step_size(motion, t, target, size, not carried)
     if carried and natural > 0.0:
         natural = min(natural, input_step(motion, order, min(natural, target - t)))
-    natural = friction_step_size(motion, count, natural)
+    natural = friction_step_size(motion, count, natural, target - t)
     h = min(natural, target - t)
     whole = h == natural
     hit, first, shorter = first_guard(motion, h, whole)
@@ -688,6 +701,7 @@ def contact_arc(motion, target):
         if tau > 0.0 or k == rubs or bits != 0:
             motion.frictions[k, FrictionColumn.SKIP] = 0
     if bits != 0:  # the sign is the bit of the 64th contact
+        note_jumps(motion)
         motion.mode = Mode.CONTACT
         t = motion.time
         return contact_impact(motion, t, bits)
@@ -763,6 +777,7 @@ def one_pass(motion, target, t_end):
     held = closed_bits(motion) != 0 or motion.frictions.shape[0] > 0
     if motion.new_piece > 0 and held and motion.mode != Mode.CONTACT:
         motion.mode = Mode.CONTACT
+        note_jumps(motion)
     if motion.mode == Mode.CONTACT:
         return decide_contacts(motion)
     return contact_arc(motion, target)

@@ -60,6 +60,7 @@ class FrictionImpact(IntEnum):
     STUCK = 1  # after it the coordinate has the speed of the ground
     FORWARDS = 2  # it slides forwards after it
     BACKWARDS = 3
+    JUMPED = 4  # of a surface that is a function, which may have jumped: its side is read anew
 
 
 class NoPress(IntEnum):
@@ -72,6 +73,7 @@ class NoMargin(IntEnum):
     """In place of the number of a margin in a row of `FrictionColumn`."""
 
     SURFACE = -1  # the row is that of a surface
+    FUNCTION = -2  # of one that is a function, whose series is in the place of its first margin
 
 
 class SegmentPlan(IntEnum):
@@ -284,6 +286,18 @@ def jumping(motion, i):
     """
     follows = i >= motion.own - motion.first_order and not is_sum(motion, i)
     return motion.coordinates[i] if follows else motion.velocities[i]
+
+
+@lean_jit
+def is_surface(motion, k):
+    """Whether a row behind those of the contacts is that of a surface."""
+    return motion.frictions[k, FrictionColumn.MARGIN] < 0
+
+
+@lean_jit
+def is_function(motion, k):
+    """Whether it is that of a surface that is a function."""
+    return motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.FUNCTION
 
 
 @lean_jit

@@ -27,9 +27,9 @@ from saltus.flow.contacts.layout import (
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
-    NoMargin,
     NoPress,
     first_row,
+    is_surface,
 )
 from saltus.taylor import lean_jit
 
@@ -90,7 +90,7 @@ def has_speed(motion, k):
     """Whether a row behind those of the contacts is that of a friction with a force."""
     row = motion.frictions[k]
     inert = row[FrictionColumn.PRESSED] == NoPress.INERT
-    return row[FrictionColumn.MARGIN] != NoMargin.SURFACE and not inert
+    return not is_surface(motion, k) and not inert
 
 
 @lean_jit

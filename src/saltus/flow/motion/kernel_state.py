@@ -16,7 +16,13 @@ import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
+from saltus.flow.contacts.layout import (
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    NoMargin,
+    NoPress,
+)
 from saltus.flow.kernel.compiled import (
     Program,
     contact_rows_at,
@@ -151,6 +157,7 @@ class KernelState:
         at = request.clock
         self.rows = NO_ROWS  # of several contacts
         self._count = 0  # of these, of contacts
+        self._functions: dict[int, str] = {}  # by the numbers of their rows
         # coordinates, velocities, each with its tangent's columns, and shifts
         self.state = _first_state(run, request.start)
         # one record MOTION
@@ -201,6 +208,11 @@ class KernelState:
     @property
     def touching(self) -> list[int]:
         """The contacts that are closed, or have just been, of several."""
+        return []
+
+    @property
+    def undecided(self) -> list[str]:
+        """The names of functions whose sides the kernel was choosing."""
         return []
 
     def _kernel(self) -> Callable[..., int]:
@@ -395,12 +407,22 @@ class ContactState(KernelState):
         for k in inert_frictions(request.system, dict.fromkeys(request.sensitivities or (), ())):
             contacts[len(held) + k, FrictionColumn.PRESSED] = NoPress.INERT
             contacts[len(held) + k, FrictionColumn.SLIDES] = 2
-        for row, surface in zip(contacts[len(contacts) - len(surfaces) :], surfaces, strict=True):
+        first = len(held) + len(own_frictions)
+        for row, surface in zip(contacts[first : first + len(surfaces)], surfaces, strict=True):
+            if surface.function is not None:
+                continue
             place = names.index(surface.coordinate)
             row[FrictionColumn.MARGIN] = NoMargin.SURFACE
             row[FrictionColumn.SLIDES] = int(
                 np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1
             )
+        named = [part.name for part in (*own_frictions, *surfaces)] + [*run.trace.switches]
+        self._functions = {len(held) + k: named[k] for k in run.trace.functions}
+        for number in self._functions:
+            row = contacts[number]
+            row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
+            row[FrictionColumn.SLIDES] = 1
+            row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED  # the kernel reads its side
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
     def _close_rows(self, request: MotionRequest, run: Program, contacts: Any) -> np.ndarray:
@@ -440,6 +462,20 @@ class ContactState(KernelState):
         touches = (rows[:, ContactColumn.CLOSED] == 1) | (rows[:, ContactColumn.SKIP] > 0)
         found: list[int] = np.flatnonzero(touches).tolist()
         return found
+
+    @property
+    def undecided(self) -> list[str]:
+        """The names of functions whose sides the kernel was choosing."""
+        rows = self.rows
+        return [
+            name
+            for row, name in self._functions.items()
+            if rows[row, FrictionColumn.REACHED] == 3
+            or (
+                rows[row, FrictionColumn.STRUCK] == FrictionImpact.JUMPED
+                and rows[row, FrictionColumn.SKIP] > 0
+            )
+        ]
 
     def _kernel(self) -> Callable[..., int]:
         return load_contacts_kernel()
@@ -511,6 +547,7 @@ class Recorder:
         self._columns = run.structure.sizes.columns
         self._own = run.structure.sizes.own
         self._several = run.structure.several
+        self._switches = run.trace.switches
         # what one pass of the kernel may record (`spare_events`)
         parts = run.trace.contact_coordinates, run.trace.friction_coordinates
         self._spare = 2 * sum(map(len, parts)) if self._several else 0
@@ -658,7 +695,7 @@ class Recorder:
             contacts, *others = _parts(self._system)
             names = (
                 [part.name for part in contacts],
-                [part.name for parts in others for part in parts],
+                [*(part.name for parts in others for part in parts), *self._switches],
             )
             places = joined(self._places) if self._bends else np.empty(0)
             return ContactEvents(self._length, labels, values, names, places)

@@ -542,7 +542,7 @@ def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
-    check_system(system, "sensitivities", several_contacts=True, multipliers=True)
+    check_system(system, "sensitivities", several_contacts=True, multipliers=True, switches=True)
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 

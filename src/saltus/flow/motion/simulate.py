@@ -166,7 +166,7 @@ class MotionRequest:
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
     ) -> None:
-        check_system(system, "simulate", several_contacts=True, multipliers=True)
+        check_system(system, "simulate", several_contacts=True, multipliers=True, switches=True)
         # what a system remembers is forgotten where values that its classes read have changed
         structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
@@ -561,6 +561,13 @@ def _refuse(system: System, status: int, now: KernelState) -> None:
     position = now.state[:own]
     velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
+    if status == Status.NOT_UNIQUE and now.undecided:
+        names = " and ".join(repr(name) for name in now.undecided)
+        raise MotionError(
+            f"the motion slides along {names} at time {time:.9g}, or is not unique: the forces on its"
+            " two sides both push the motion to it, or both away, which is not followed so far; a"
+            " force that jumps with the sign of a velocity is a Friction"
+        )
     in_rows = system.model.has_multipliers
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and in_rows:
         _refuse_crushed(system, now, now.touching)

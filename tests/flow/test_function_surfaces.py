@@ -1,0 +1,358 @@
+"""Surfaces that are functions of the state, and switches that formulas have by themselves: motions
+and derivatives, against closed forms and an independent integrator.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import saltus
+from saltus import Contact, NewtonImpact, Surface
+from saltus.errors import ParameterError
+from saltus.flow import sensitivities, simulate
+from saltus.systems import ContactModel, Harmonic, Load, System
+
+DAMPED = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thrown(ContactModel):
+    """A ball with quadratic drag above a floor, as a textbook writes it."""
+
+    drag: float = 0.02
+    gravity: float = 9.81
+
+    coordinates: ClassVar[tuple[str, ...]] = ("height",)
+    contacts: ClassVar[tuple[Contact, ...]] = (Contact(name="floor", coordinate="height"),)
+
+    def force(self, t, height, velocity, load):
+        return -self.gravity - self.drag * velocity * abs(velocity)
+
+
+def test_quadratic_drag_has_the_closed_form_of_its_bounces():
+    """Up: v = tan, to H = ln(1 + k v^2 / g) / (2 k); down: v = tanh, so that the speed at the floor
+    is sqrt(g / k (1 - exp(-2 k H)))."""
+    k, g, e = 0.02, 9.81, 0.8
+    motion = simulate(
+        System(model=Thrown(drag=k, gravity=g), impact=NewtonImpact(e)),
+        height=0.0,
+        velocity=25.0,
+        duration=20.0,
+    )
+    time, speed, expected = 0.0, 25.0, []
+    for _ in range(6):
+        root = math.sqrt(g * k)
+        time += math.atan(speed * math.sqrt(k / g)) / root
+        expected.append(("crossing", time))
+        height = math.log1p(k * speed**2 / g) / (2.0 * k)
+        time += math.acosh(math.exp(k * height)) / root
+        expected.append(("impact", time))
+        speed = e * math.sqrt(-g / k * math.expm1(-2.0 * k * height))
+    found = [(str(event.kind), event.time) for event in motion.events[:12]]
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert np.allclose([t for _, t in found], [t for _, t in expected], rtol=0.0, atol=1e-12)
+    assert motion.events[0].contact == "height_velocity"
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuarterCar(ContactModel):
+    """A car on a spring and a damper with two slopes over a road that moves."""
+
+    stiffness: float = 4.0
+    bump: float = 0.2
+    rebound: float = 0.9
+
+    coordinates: ClassVar[tuple[str, ...]] = ("y",)
+    channels: ClassVar[tuple[str, ...]] = ("ground",)
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="rebound", function="stretching"),)
+
+    def stretching(self, t, y, velocity, load):
+        return velocity - load.ground.velocity(t)
+
+    def force(self, t, y, velocity, load, sides):
+        slope = self.bump + (self.rebound - self.bump) * (1.0 + sides.rebound) / 2.0
+        rate = velocity - load.ground.velocity(t)
+        return -self.stiffness * (y - load.ground(t)) - slope * rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class TracedCar(QuarterCar):
+    """The same, whose force has the switch itself."""
+
+    surfaces: ClassVar[tuple[Surface, ...]] = ()
+
+    def force(self, t, y, velocity, load):
+        rate = velocity - load.ground.velocity(t)
+        slope = np.where(rate > 0.0, self.rebound, self.bump)
+        return -self.stiffness * (y - load.ground(t)) - slope * rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoucWen(ContactModel):
+    """A mass with hysteresis, as Bouc and Wen write it."""
+
+    memory: float = 0.5
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "z")
+    first_order: ClassVar[tuple[str, ...]] = ("z",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def force(self, t, q, velocity, load):
+        x, z = q
+        v = velocity[0]
+        rate = v - self.memory * abs(v) * z - self.memory * v * abs(z)
+        return load.force(t) - 0.1 * v - 0.2 * x - z, rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rubbing(ContactModel):
+    """A rotor in a soft stator, whose gap is a function of two coordinates, with a damper that
+    never pulls."""
+
+    clearance: float = 0.4
+    stiffness: float = 30.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def force(self, t, q, velocity, load):
+        x, y = q
+        radius = np.sqrt(x * x + y * y)
+        rate = (x * velocity[0] + y * velocity[1]) / radius
+        pressed = np.maximum(radius - self.clearance, 0.0)
+        push = np.maximum(self.stiffness * pressed + 2.0 * rate * pressed, 0.0) / radius
+        drive = load.force(t)
+        return (
+            drive - x - 0.1 * velocity[0] - push * x,
+            0.7 * drive - y - 0.1 * velocity[1] - push * y,
+        )
+
+
+def by_dop853(field, functions, start, end):
+    """The state at the end and the instants of crossings by SciPy's DOP853, from one zero of a
+    function to the next; `field(t, s, sides)`."""
+    state = np.array(start, dtype=float)
+    t = 0.0
+    sides = [1.0 if function(0.0, state) >= 0.0 else -1.0 for function in functions]
+    times = []
+
+    def events_of(after):
+        """An event for each function, which is not at its zero at the start."""
+        found = []
+        for number, function in enumerate(functions):
+            event = lambda t, s, function=function: function(t, s)  # noqa: E731
+            event.terminal = True
+            event.direction = -sides[number]
+            found.append(event)
+        return found
+
+    while t < end:
+        run = solve_ivp(
+            lambda t, s: field(t, s, sides),
+            (t, end),
+            state,
+            "DOP853",
+            events=events_of(t),
+            rtol=1e-13,
+            atol=1e-14,
+            max_step=0.05,
+        )
+        t, state = run.t[-1], run.y[:, -1]
+        if run.status == 1:
+            number = next(i for i, hits in enumerate(run.t_events) if len(hits))
+            sides[number] *= -1.0
+            times.append(t)
+    return state, np.array(times)
+
+
+def crossings(motion):
+    return np.array([event.time for event in motion.events if str(event.kind) == "crossing"])
+
+
+CAR = System(model=QuarterCar(), load=Load(frequency=1.3, ground=Harmonic(0.4)))
+TRACED_CAR = dataclasses.replace(CAR, model=TracedCar())
+BOUC = System(model=BoucWen(), load=Load(frequency=1.0, force=Harmonic(1.0)))
+ROTOR = System(model=Rubbing(), load=Load(frequency=0.8, force=Harmonic(1.0)))
+
+
+def test_a_damper_with_two_slopes_over_a_road():
+    w, a = 1.3, 0.4
+
+    def field(t, s, sides):
+        rate = s[1] - a * w * math.cos(w * t)
+        slope = 0.9 if sides[0] > 0.0 else 0.2
+        return [s[1], -4.0 * (s[0] - a * math.sin(w * t)) - slope * rate]
+
+    end = 30.0
+    state, times = by_dop853(field, [lambda t, s: s[1] - a * w * math.cos(w * t)], [0.3, 0.2], end)
+    for system in (CAR, TRACED_CAR):
+        motion = simulate(system, y=0.3, velocity=0.2, duration=end)
+        assert np.allclose([motion.position, motion.velocity], state, rtol=0.0, atol=1e-10)
+        assert np.allclose(crossings(motion), times, rtol=0.0, atol=1e-10)
+
+
+def test_hysteresis_of_bouc_and_wen_from_rest():
+    def field(t, s, sides):
+        x, v, z = s
+        return [
+            v,
+            math.sin(t) - 0.1 * v - 0.2 * x - z,
+            v - 0.5 * sides[0] * v * z - 0.5 * v * sides[1] * z,
+        ]
+
+    end = 40.0
+    state, times = by_dop853(field, [lambda t, s: s[1], lambda t, s: s[2]], [0.0, 0.0, 0.0], end)
+    motion = simulate(BOUC, x=0.0, z=0.0, velocity=0.0, duration=end)
+    found = [motion.position[0], motion.velocity[0], motion.position[1]]
+    assert np.allclose(found, state, rtol=0.0, atol=1e-10)
+    assert np.allclose(crossings(motion), times, rtol=0.0, atol=1e-10)
+
+
+def test_a_rotor_in_a_soft_stator_that_never_pulls():
+    def push(s, sides):
+        radius = math.hypot(s[0], s[1])
+        rate = (s[0] * s[2] + s[1] * s[3]) / radius
+        pressed = radius - 0.4 if sides[0] > 0.0 else 0.0
+        return (30.0 + 2.0 * rate) * pressed / radius if sides[1] > 0.0 else 0.0
+
+    def field(t, s, sides):
+        drive, back = math.sin(0.8 * t), push(s, sides)
+        return [
+            s[2],
+            s[3],
+            drive - s[0] - 0.1 * s[2] - back * s[0],
+            0.7 * drive - s[1] - 0.1 * s[3] - back * s[1],
+        ]
+
+    end = 25.0
+    start = [0.1, -0.15, 0.0, 0.2]
+    # it never pulls here, so that the second switch has no zero of its own
+    state, times = by_dop853(
+        field,
+        [lambda t, s: math.hypot(s[0], s[1]) - 0.4, lambda t, s: 1.0],
+        start,
+        end,
+    )
+    motion = simulate(ROTOR, x=start[0], y=start[1], velocity=start[2:], duration=end)
+    found = [*motion.position, *motion.velocity]
+    assert np.allclose(found, state, rtol=0.0, atol=2e-10)
+    hits = [t for t in crossings(motion) if np.abs(times - t).min() < 1e-9]
+    assert len(hits) >= len(times) > 5
+
+
+def ends(system, start, end):
+    motion = simulate(system, **start, duration=end)
+    return np.concatenate([np.atleast_1d(motion.position), np.atleast_1d(motion.velocity)])
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "paths", "end"),
+    [
+        (CAR, {"y": 0.3, "velocity": 0.2}, ("model.rebound", "load.ground.amplitude"), 9.0),
+        (TRACED_CAR, {"y": 0.3, "velocity": 0.2}, ("model.bump", "load.frequency"), 9.0),
+        (BOUC, {"x": 0.1, "z": 0.05, "velocity": 0.2}, ("model.memory", "load.frequency"), 9.0),
+        (
+            System(model=Thrown(), impact=NewtonImpact(0.8)),
+            {"height": 0.5, "velocity": 3.0},
+            ("model.drag", "impact.e"),
+            2.5,
+        ),
+    ],
+)
+def test_derivatives_are_those_of_neighbouring_motions(system, start, paths, end):
+    found = sensitivities(system, **start, parameters=paths, duration=end)
+    for number, path in enumerate(paths):
+        value, step = system.get(path), 1e-4
+
+        def at(shift, path=path, value=value):
+            return ends(system.with_(**{path: value + shift}), start, end)
+
+        slope = (8.0 * (at(step) - at(-step)) - at(2.0 * step) + at(-2.0 * step)) / (12.0 * step)
+        own = found.parameters[:, number]
+        moving = np.ones(len(slope), dtype=bool)
+        if system.model.first_order:
+            moving[-1] = False
+        assert np.allclose(own[moving], slope[moving], rtol=1e-7, atol=1e-8), path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plain(ContactModel):
+    """A mass on a spring between a wall and nothing."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        Contact(name="wall", coordinate="x", position=0.4, sign=-1),
+    )
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - x - 0.1 * velocity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inert(Plain):
+    """The same, with a switch that changes nothing."""
+
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="none", function="speed"),)
+
+    def speed(self, t, x, velocity, load):
+        return velocity - 0.1 * load.force(t)
+
+    def force(self, t, x, velocity, load, sides):
+        return super().force(t, x, velocity, load) + 0.0 * sides.none
+
+
+def test_a_switch_without_effect_changes_no_motion():
+    load = Load(frequency=0.9, force=Harmonic(0.6))
+    plain, inert = (
+        simulate(
+            System(model=model, load=load, impact=NewtonImpact(0.7)),
+            x=0.0,
+            velocity=0.0,
+            duration=60.0,
+        )
+        for model in (Plain(), Inert())
+    )
+    assert len(inert.impacts) == len(plain.impacts) > 4
+    assert np.allclose(inert.impacts.time, plain.impacts.time, rtol=0.0, atol=1e-10)
+    assert math.isclose(inert.position, plain.position, abs_tol=1e-10)
+    # one side follows the other, and at an impact the velocity jumps from one to the other
+    assert len(crossings(inert)) > 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signed(ContactModel):
+    """A mass under a force with the sign of its velocity."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - 0.3 * np.sign(velocity)
+
+
+def test_other_verbs_refuse_it_in_one_sentence():
+    with pytest.raises(ParameterError, match="does not follow surfaces that are functions"):
+        saltus.simulate_many(CAR, y=[0.1, 0.2], velocity=0.0, periods=2)
+
+
+def test_a_surface_needs_a_method():
+    @dataclass(frozen=True, kw_only=True)
+    class Without(ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="s", function="missing"),)
+
+        def force(self, t, x, velocity, load, sides):
+            return -x
+
+    with pytest.raises(ParameterError, match="the surface 's' needs a method missing"):
+        System(model=Without())
+    with pytest.raises(ParameterError, match="leave its position out"):
+        Surface(name="s", function="missing", position=1.0)
+    with pytest.raises(ParameterError, match="got neither"):
+        Surface(name="s")
