@@ -812,7 +812,7 @@ def test_other_verbs_refuse_distances_in_one_sentence():
     system = rotor()
     for verb in (
         lambda: saltus.simulate_many(system, x=[0.3], y=[0.2], velocity=(0.0, 0.0), periods=1),
-        lambda: saltus.find_orbit(system, x=0.3, y=0.2, velocity=(0.0, 0.0), period=1),
+        lambda: saltus.classify(system, x=0.3, y=0.2, velocity=(0.0, 0.0)),
         lambda: saltus.page(system, x=0.3, y=0.2, velocity=(0.0, 0.0), path="none.html"),
     ):
         with pytest.raises(ParameterError, match="does not follow contacts of a distance"):

@@ -128,7 +128,7 @@ class CurvedGround(saltus.ContactModel):
 @saltus.register
 @dataclass(frozen=True, kw_only=True)
 class RockingTable(saltus.ContactModel):
-    """A table on a shaken floor, with two feet that hit and rub: contacts of distances."""
+    """A table on a spring, with two feet that hit a floor and rub: contacts of distances."""
 
     friction: float = 0.3
     damping: float = 0.1
@@ -163,7 +163,7 @@ class RockingTable(saltus.ContactModel):
         return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.3]]
 
     def force(self, t, q, velocity, load):
-        return load.force(t) - self.damping * velocity[0], -1.0, 0.0
+        return load.force(t) - self.damping * velocity[0] - 0.4 * q[0], -1.0, 0.0
 
 
 @saltus.register

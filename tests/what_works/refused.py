@@ -19,8 +19,6 @@ SWITCHES = "does not follow surfaces that are functions"
 NOT_BESIDE_DISTANCES = (
     "ensemble",
     "its extrema",
-    "orbit",
-    "branch",
     "sweep",
     "verdict",
     "attractors",
@@ -59,7 +57,7 @@ REFUSED = {
     ("belt, no load", "sweep"): SWEEP,
     ("belt, no load", "diagram"): DIAGRAM,
     **{("own, two feet that rub", verb): DISTANCES for verb in NOT_BESIDE_DISTANCES},
-    **{("own, switches", verb): SWITCHES for verb in NOT_BESIDE_DISTANCES},
+    **{("own, switches", verb): SWITCHES for verb in ("orbit", "branch", *NOT_BESIDE_DISTANCES)},
 }
 REASONS = {
     SUMS: (
@@ -76,8 +74,8 @@ REASONS = {
     SWEEP: "Cycles without a load are not swept yet; `continue_orbit` follows them.",
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
     DISTANCES: (
-        "Contacts of a `distance` and frictions of a `rate` are followed by `simulate` and"
-        " `sensitivities` so far."
+        "Contacts of a `distance` and frictions of a `rate` are followed by `simulate`,"
+        " `sensitivities`, `find_orbit` and `continue_orbit` so far."
     ),
     SWITCHES: (
         "Surfaces that are functions, and forces with `abs`, `sign`, `maximum` or comparisons, are"

@@ -55,6 +55,8 @@ from .motion.quantities import extremes_of as extremes_of
 from .motion.quantities import own_quantities as own_quantities
 from .motion.quantities import quantity_of as quantity_of
 from .motion.quantities import unit_of as unit_of
+from .motion.row_values import RowValues as RowValues
+from .motion.row_values import closing_rates as closing_rates
 from .motion.sensitivities import Sensitivities as Sensitivities
 from .motion.sensitivities import derivatives_of as derivatives_of
 from .motion.sensitivities import sensitivities as sensitivities

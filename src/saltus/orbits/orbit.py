@@ -255,8 +255,9 @@ class PeriodicOrbit(Result):
     def rest_share(self) -> float:
         """The share of its period for which it rests at a contact, of several at one at least."""
         if not self.releases.size:  # it rests all the time, or never
+            contacts = (1 << len(self.system.model.contacts)) - 1  # not the frictions behind them
             closed = [event.closed for event in self.signature.events] or [self.signature.closed]
-            return float(all(closed))
+            return float(all(bits & contacts for bits in closed))
         return float(self.rest_durations.sum() / self.duration)
 
     @property

@@ -49,7 +49,9 @@ class Signature:
     events
         For an orbit with several contacts, in place of `sides`: its impacts and releases in order.
     closed
-        For such an orbit without events: the contacts that are closed all the time, as bits.
+        For such an orbit without events: the contacts that are closed all the time, as bits. For
+        one with a section and contacts that multipliers hold: those that are closed there, and
+        behind them the frictions that stick.
     section
         For an orbit that is followed through its events: the phase at which its state is the
         unknown. None for all others.

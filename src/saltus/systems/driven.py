@@ -62,9 +62,11 @@ def _driven(system: System) -> str:
 
 
 def _held(model: Any) -> set[str]:
-    """The coordinates along which contacts hold."""
+    """The coordinates along which contacts hold; of a distance none is known."""
     held = set[str]()
     for contact in model.contacts:
+        if contact.coordinate is None:
+            continue
         along = contact.coordinate
         held |= {along} if isinstance(along, str) else set(dict(along))
     return held

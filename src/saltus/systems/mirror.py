@@ -207,6 +207,8 @@ def has_half_the_period(system: System) -> bool:
 
 def _mirror_of(system: System) -> Mirror | None:
     model = system.model
+    if model.has_multipliers:  # images of distances and rates are not known
+        return None
     inner = system.in_gap_coordinates
     origin = (0.0,) * len(model.coordinates)
     if declares_mirror(model):

@@ -428,7 +428,7 @@ class ContactState(KernelState):
     def _close_rows(self, request: MotionRequest, run: Program, contacts: Any) -> np.ndarray:
         """Fill the rows of contacts whose gaps are functions, and return the rates of these gaps,
         then of the frictions' sliding speeds. Gaps and rates count as 0 up to the rounding of their
-        terms.
+        terms, or of natural units.
 
         Raises
         ------
@@ -438,9 +438,9 @@ class ContactState(KernelState):
         entries, drifts, gaps = contact_rows_at(run, request.time, request.clock.length, self.state)
         position, velocity = np.split(request.start, 2)
         rates: np.ndarray = entries @ velocity + drifts
-        speeds = np.abs(entries) @ np.abs(velocity) + np.abs(drifts)
+        length, speed = units_of_gaps(request.system)
+        speeds = np.abs(entries) @ np.abs(velocity) + np.abs(drifts) + speed
         rates[np.abs(rates) <= CLOSED_BELOW * speeds] = 0.0
-        length = units_of_gaps(request.system)[0]
         sizes = np.abs(entries[: len(contacts)]) @ np.abs(position) + length
         for i, (contact, gap) in enumerate(zip(contacts, gaps, strict=True)):
             touches = abs(gap) <= CLOSED_BELOW * sizes[i]

@@ -29,7 +29,7 @@ from saltus.continuation import (
     Zero,
 )
 from saltus.errors import SaltusError
-from saltus.flow import EventCode, EventKind
+from saltus.flow import EventCode, EventKind, RowValues
 from saltus.orbits.branches.orbit_curve import FLIP, OrbitPoint
 from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
 from saltus.orbits.branches.symmetry import is_image, nearest, parent_of
@@ -245,11 +245,22 @@ def _turns_at_an_impact(point: OrbitPoint) -> bool:
         return False
     motion = point.orbit.motion()
     for event in motion.events.of(EventKind.IMPACT):
-        _, speed = system.to_gaps(event.time, motion.at(event.time)[0], event.velocity_after)
-        slips = [
-            abs(speed[inner.coordinates.index(each.coordinate)] - float(each.ground_speed))
-            for each in pressed
-        ]
+        position = motion.at(event.time)[0]
+        if inner.has_multipliers:
+            after = np.append(np.atleast_1d(position), np.atleast_1d(event.velocity_after))
+            values = RowValues(system)
+            rates = values.along(np.array([event.time]), after[None])[1][0, values.count :]
+            slips = [
+                abs(rate)
+                for each, rate in zip(inner.frictions, rates.tolist(), strict=True)
+                if each in pressed
+            ]
+        else:
+            _, speed = system.to_gaps(event.time, position, event.velocity_after)
+            slips = [
+                abs(speed[inner.coordinates.index(each.coordinate)] - float(each.ground_speed))
+                for each in pressed
+            ]
         if min(slips) < SETTINGS.probes[0] * point.orbit.equations.natural.speed:
             return True
     return False

@@ -50,6 +50,11 @@ def is_symmetric(system: System) -> bool:
     True
     """
     check_system(system, "is_symmetric", several_contacts=True)
+    return has_symmetry(system)
+
+
+def has_symmetry(system: System) -> bool:
+    """`is_symmetric`; False where multipliers hold contacts, as their images are not known."""
     mirrored = system.mirrored()
     if mirrored is None or system.load.period is None:
         return False
@@ -116,7 +121,7 @@ CENTRE_ROUNDING = 1e-9
 def keeps_symmetry(system: System, path: str) -> bool:
     """Whether a system is symmetric and stays so, about the same centre, as the parameter at `path`
     changes."""
-    if not is_symmetric(system):
+    if not has_symmetry(system):
         return False
     inner = mirror_of(system.in_gap_coordinates)
     assert inner is not None, "a symmetric system has a mirror"
@@ -128,7 +133,7 @@ def keeps_symmetry(system: System, path: str) -> bool:
             beside = system.with_({path: value * (1 + share) if value else share})
         except ParameterError:  # on one side of a limit of the parameter
             continue
-        other = mirror_of(beside.in_gap_coordinates) if is_symmetric(beside) else None
+        other = mirror_of(beside.in_gap_coordinates) if has_symmetry(beside) else None
         if other is not None:
             lengths = natural_units(system.in_gap_coordinates).lengths
             # the parameter moves by a thousandth, and rounding moves the centre by far less

@@ -139,8 +139,9 @@ class ContactsEquations(OrbitEquations):
     def read(
         cls, base: OrbitEquations, motion: MotionToRead
     ) -> tuple[OrbitEquations, np.ndarray] | None:
-        """None with frictions, dependent sums or accumulations of impacts, or with walls that move
-        the mass matrix, for which there are no equations from event to event."""
+        """None with frictions, dependent sums, contacts that multipliers hold or accumulations of
+        impacts, or with walls that move the mass matrix, for which there are no equations from
+        event to event."""
         known: Any = base.system.contact_model if isinstance(base, cls) else None
         if (
             known is None
@@ -148,6 +149,7 @@ class ContactsEquations(OrbitEquations):
             or known.surfaces
             or base.has_corners
             or base.system.dependent
+            or known.has_multipliers
             or _has_moving_mass(known)
         ):
             return None

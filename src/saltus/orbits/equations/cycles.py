@@ -27,7 +27,7 @@ from saltus.orbits.equations.contract import (
     Solution,
 )
 from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.equations.event_sequence import EventSequence, section_time
+from saltus.orbits.equations.event_sequence import EventSequence, held_at, section_time
 from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
@@ -404,7 +404,9 @@ def _section_along(
     state = states_of(motion, np.array([time]))[0]
     normal = direction_at(motion, time, equations)
     state[equations.following] = 0.0
-    return Signature((), rounds, section=0.0, through=(*state.tolist(), *normal.tolist())), state
+    through = (*state.tolist(), *normal.tolist())
+    held = held_at(motion, time)
+    return Signature((), rounds, closed=held, section=0.0, through=through), state
 
 
 def direction_at(motion: Motion, time: float, equations: OrbitEquations) -> np.ndarray:

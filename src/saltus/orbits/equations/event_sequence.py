@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import EventCode, EventKind, Motion
+from saltus.flow import EventCode, EventKind, Motion, modes_of
 from saltus.orbits.equations.contract import FARTHEST
 from saltus.orbits.equations.sampled_motion import ONE_INSTANT, Group, SampledMotion, modes_in
 from saltus.orbits.signature import ModeChange, Signature
@@ -375,6 +375,19 @@ def section_time(motion: Motion, duration: float | None = None) -> float:
     middles = 0.5 * (bounds[1:] + bounds[:-1])
     moves = _moves(motion.system, motion.dense.states(middles)[2])
     return float(middles[max(range(len(spans)), key=lambda i: (moves[i], spans[i]))])
+
+
+def held_at(motion: Motion, time: float) -> int:
+    """The contacts that are closed at a time, and behind them the frictions that stick, as bits, of
+    a motion in which multipliers hold them; else 0."""
+    model = motion.system.model
+    if not model.has_multipliers:
+        return 0
+    assert motion.dense is not None
+    side = motion.dense.states(np.array([time]))[2]
+    bits, slides, _ = modes_of(model, side)
+    sticks = sum(1 << k for k, way in enumerate(slides) if way[0] == 0)
+    return int(bits[0]) | sticks << len(model.contacts)
 
 
 def _moves(system: System, side: np.ndarray) -> np.ndarray:

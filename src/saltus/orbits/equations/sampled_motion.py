@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from saltus.flow import EventCode, EventKind, Motion, contact_pull, modes_of
+from saltus.flow import (
+    EventCode,
+    EventKind,
+    Motion,
+    RowValues,
+    closing_rates,
+    contact_pull,
+    modes_of,
+)
 from saltus.systems import NaturalUnits, System, natural_units, reactions, stick_margins
 
 # in each step; minima of parabolas through them have errors of the fourth power of their distance
@@ -27,6 +35,8 @@ MOST_ORDER = 24  # the highest order of a step's series
 ONE_INSTANT = 1e-9
 # The name of what a closed contact or a sticking friction lacks to open or to slip.
 REACTION = "reaction or friction force"
+# Samples after an event at which what begins with 0 there may be rounding.
+AT_BEGIN = 2
 # Slower impacts, in natural units, are not listed: they belong to an accumulation.
 DYING = 1e-5
 
@@ -227,7 +237,7 @@ class ContactModes(SideModes):
             ),
         )
         names = dict.fromkeys(contact.group for contact in contacts)
-        if len(names) < 2 or frictions:
+        if len(names) < 2 or frictions or model.has_multipliers:
             return everything
         mass = np.asarray(model.mass_matrix(position), dtype=float)
         places = [
@@ -246,27 +256,32 @@ class ContactModes(SideModes):
         return motion.events.codes
 
     def impact_speeds(self, motion: Motion) -> np.ndarray:
-        return np.asarray(self._closing_speeds(motion.impacts).min(axis=0, initial=math.inf))
+        return np.asarray(self._closing_speeds(motion).min(axis=0, initial=math.inf))
 
     def listed(self, motion: Motion) -> np.ndarray:
         """Without those of accumulations."""
         impacts = motion.impacts
-        speeds = self._closing_speeds(motion.impacts)
+        speeds = self._closing_speeds(motion)
         slowest = DYING * natural_units(self.system).speed
         contact, impact = np.nonzero((speeds > slowest) & np.isfinite(speeds))
         found = np.column_stack([impacts.time[impact], speeds[contact, impact]])
         return np.asarray(found[np.argsort(found[:, 0], kind="stable")])
 
-    def _closing_speeds(self, impacts: Any) -> np.ndarray:
+    def _closing_speeds(self, motion: Motion) -> np.ndarray:
         """The speed at which each contact is closed by each impact, (contacts, n); inf where it is
         not.
         """
+        impacts = motion.impacts
         names = self.system.model.coordinates
         contacts = self.system.contact_model.contacts
+        rates = (
+            closing_rates(motion)
+            if self.system.model.has_multipliers
+            else [impacts.velocity_before[:, names.index(c.coordinate)] for c in contacts]
+        )
         speeds = np.full((len(contacts), len(impacts)), math.inf)
-        for i, contact in enumerate(contacts):
-            rates = np.abs(impacts.velocity_before[:, names.index(contact.coordinate)])
-            speeds[i] = np.where(impacts.side >> i & 1 == 1, rates, math.inf)
+        for i in range(len(contacts)):
+            speeds[i] = np.where(impacts.side >> i & 1 == 1, np.abs(rates[i]), math.inf)
         return speeds
 
     def rests(
@@ -282,6 +297,7 @@ class ContactModes(SideModes):
         gaps = [
             GapAlong(names.index(c.coordinate), c.sign, float(c.position), ~closed)
             for c, closed in found
+            if not known.has_multipliers
         ]
         surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
         for number, (surface, beside) in enumerate(surfaces):
@@ -492,6 +508,8 @@ class SampledMotion:
         """
         modes = modes_in(self.motion.system)
         least = [(self._lowest_of(modes.gaps(self.side, smooth)) / units.length, "gap")]
+        if self.motion.system.model.has_multipliers:
+            return min([*least, *self._nearest_of_rows(units)])
         for place, ground_speed, s in modes.slidings(self.side):
             course = s[:, None] * (self.series[:, place] * ORDERS[: self.series.shape[2]])[:, 1:]
             course[:, 0] = course[:, 0] - s * ground_speed
@@ -507,6 +525,53 @@ class SampledMotion:
                 least.append((force / largest, REACTION))
         value, what = min(least)
         return float(value), what
+
+    def _nearest_of_rows(self, units: NaturalUnits) -> list[tuple[float, str]]:
+        """`nearest_touch` of contacts and frictions that multipliers hold."""
+        values = RowValues(self.motion.system)
+        steps = np.arange(len(self.side))
+        held = values.held_in(self.side)
+        count = values.count
+        closed = [held[:, i] for i in range(count)]
+        slides = np.array(modes_of(self.motion.system.model, self.side)[1]).reshape(-1, len(steps))
+        sliding = [np.abs(way) == 1 for way in slides]
+
+        def rows_of(sampled: SampledMotion) -> list[np.ndarray]:
+            """The gaps, then the sliding speeds."""
+            times, states, _, side = sampled._instants()
+            _, rates, gaps = values.along(times, states)
+            ways = np.array(modes_of(values.model, side)[1]).reshape(-1, len(side))
+            speeds = ways * rates[:, count:].T
+            return [x.reshape(sampled.time.shape) for x in (*gaps.T, *speeds)]
+
+        def forces_of(sampled: SampledMotion) -> list[np.ndarray]:
+            found = values.forces_along(*sampled._instants())
+            return [x.reshape(sampled.time.shape) for x in found.T]
+
+        opened = [~mask for mask in closed]
+        everywhere = [np.ones(len(steps), dtype=bool)] * (2 * len(slides) + 2)
+        gaps, speeds = (
+            self._dip(steps, chosen, rows_of, at_begin=False)
+            for chosen in (
+                [*opened, *(np.zeros_like(mask) for mask in sliding)],
+                [*(np.zeros_like(mask) for mask in opened), *sliding],
+            )
+        )
+        force = self._dip(steps, [*closed, *everywhere], forces_of)
+        return [
+            (gaps / units.length, "gap"),
+            (speeds / units.speed, "sliding speed"),
+            (force / units.force, REACTION),
+        ]
+
+    def _instants(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The times (n,), states (n, d) and accelerations of all samples, and the numbers of their
+        modes."""
+        size = len(self.position)
+        states = np.concatenate([self.position, self.velocity]).reshape(2 * size, -1).T
+        accelerations = self.acceleration.reshape(size, -1).T
+        side = np.repeat(self.side, self.time.shape[1])
+        return self.time.ravel(), states, accelerations, side
 
     def _turning_of(self, course: np.ndarray, rates: np.ndarray, chosen: np.ndarray) -> float:
         """The least of the minima of series (steps, orders), where their rates turn from negative
@@ -530,25 +595,39 @@ class SampledMotion:
         )
 
     def _dip(
-        self, steps: np.ndarray, chosen: list[np.ndarray], forces: Callable[..., list[Any]]
+        self,
+        steps: np.ndarray,
+        chosen: list[np.ndarray],
+        forces: Callable[..., list[Any]],
+        at_begin: bool = True,
     ) -> float:
         """The least inner minimum of any of several forces within stretches of successive chosen
         steps, or the force just after the event with which a stretch begins, if that is less.
         `steps` are the numbers of the steps in the whole motion.
+
+        Not `at_begin`, of what is 0 there: then each stretch ends with an event, and minima just
+        after one, which are rounding, do not count either.
         """
         least = np.inf
         lowest = np.inf
         where = (0, 0, 0)
         for number, (values, mask) in enumerate(zip(self._forces(forces), chosen, strict=True)):
+            mask = mask & ~np.isnan(values).any(axis=1)
+            if not mask.any():
+                continue
             follows = np.append(False, mask[:-1] & (np.diff(steps) == 1))
+            follows &= at_begin | ~self.begins
             stretch = np.cumsum(mask & ~follows)
             for each in range(1, int(stretch[-1]) + 1):
                 rows = np.flatnonzero(mask & (stretch == each))
                 course = np.append(values[rows, :-1].ravel(), values[rows[-1], -1])
-                least = min(least, float(course[0])) if self.begins[rows[0]] else least
+                begins = bool(self.begins[rows[0]])
+                least = min(least, float(course[0])) if begins and at_begin else least
                 inner = 1 + np.flatnonzero(
                     (course[1:-1] <= course[:-2]) & (course[1:-1] < course[2:])
                 )
+                if not at_begin and begins:
+                    inner = inner[inner > AT_BEGIN]
                 if inner.size and course[inner].min() < lowest:
                     place = int(inner[np.argmin(course[inner])])
                     row, sample = divmod(place, SAMPLES - 1)
@@ -559,6 +638,8 @@ class SampledMotion:
     def _forces(self, forces: Callable[..., list[Any]]) -> list[np.ndarray]:
         """The forces that the function `forces` gives along the samples, each (steps, samples)."""
         system = self.motion.system
+        if system.model.has_multipliers:
+            return forces(self)
         given = (self.time, *self._state()[:2])
         model: Any = system.model
         more = (

@@ -22,6 +22,7 @@ from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
     Motion,
     MotionRequest,
+    RowValues,
     SegmentColumn,
     Stop,
     continuous_surfaces,
@@ -52,7 +53,14 @@ from saltus.orbits.equations.contract import (
     OrbitEvaluation,
     Solution,
 )
-from saltus.orbits.equations.event_sequence import STAYS, EventSequence, section_of, sequence_of
+from saltus.orbits.equations.event_sequence import (
+    STAYS,
+    EventSequence,
+    held_at,
+    section_of,
+    section_time,
+    sequence_of,
+)
 from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.resting_segments import resting_segments
@@ -120,14 +128,17 @@ class WholeMotionEquations(OrbitEquations):
         ):
             raise MotionError(STAYS)
         phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
-        return cls(base.given, Signature((), periods, section=phase), base.paths, base.tol), state
+        held = held_at(twice, section_time(twice, motion.duration))
+        signature = Signature((), periods, closed=held, section=phase)
+        return cls(base.given, signature, base.paths, base.tol), state
 
     def section_along(self, motion: Motion, solution: Solution) -> tuple[Signature, np.ndarray]:
         """The signature with its section far from the events of an orbit's motion, and the unknowns
         there.
         """
         phase, state = section_of(motion, self.frequency(solution.values))
-        return replace(self.signature, section=phase), state
+        held = held_at(motion, section_time(motion))
+        return replace(self.signature, closed=held, section=phase), state
 
     @property
     def size(self) -> int:
@@ -295,14 +306,22 @@ class WholeMotionEquations(OrbitEquations):
         return same_events(point)
 
     def held(self, unknowns: np.ndarray, system: System) -> dict[int, float]:
-        """The state variables that are fixed at the section, up to rounding, with their values."""
+        """The state variables that are fixed at the section, up to rounding, with their values; none
+        of what multipliers hold, onto which each start is taken."""
+        if self.system.model.has_multipliers:
+            return {}
         state = self._completed(unknowns, system)
         return held_values(system, state, CLOSED, units=self.natural.state)
 
     def start_state(self, unknowns: np.ndarray, system: System) -> np.ndarray:
         """The state at the section, in which contacts that are closed, and frictions that stick, up
-        to rounding do so exactly.
+        to rounding do so exactly. Those that multipliers hold are known from the signature.
         """
+        if self.system.model.has_multipliers:
+            time = float(self.signature.section or 0.0) / (system.load.frequency or 1.0)
+            values = RowValues(system)
+            held = self.signature.closed >> np.arange(values.size) & 1 == 1
+            return values.onto(time, unknowns, held)
         held = self.held(unknowns, system)
         state = self._completed(unknowns, system, held)
         for place, value in held.items():

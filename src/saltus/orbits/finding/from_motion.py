@@ -25,7 +25,7 @@ from saltus.flow import (
     sensitivities,
     simulate,
 )
-from saltus.orbits.branches.symmetry import divide, half, is_symmetric, keeps_symmetry
+from saltus.orbits.branches.symmetry import divide, half, has_symmetry, keeps_symmetry
 from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
 from saltus.orbits.equations.event_sequence import STAYS
 from saltus.orbits.equations.kinds import equations_of, kinds_of
@@ -168,7 +168,7 @@ def find_orbit(
 
 def _check(system: System, parameters: Iterable[str], given: dict[str, Any]) -> None:
     """Refuse arguments without meaning."""
-    check_system(system, "find_orbit", several_contacts=True)
+    check_system(system, "find_orbit", several_contacts=True, multipliers=True)
     for name, value in given.items():
         if value is None and name != "max_period":
             continue
@@ -384,7 +384,7 @@ def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
 def _is_symmetric(equations: OrbitEquations) -> bool:
     """Whether a system has the mirror symmetry, for all parameters at the equations' paths."""
     paths = equations.paths
-    return keeps_symmetry(equations.given, paths[0]) if paths else is_symmetric(equations.given)
+    return keeps_symmetry(equations.given, paths[0]) if paths else has_symmetry(equations.given)
 
 
 @dataclass(frozen=True)
