@@ -5,6 +5,7 @@ notebook shows.
 import csv
 import io
 import sys
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,13 +13,18 @@ import pytest
 import xarray as xr
 
 import saltus
-from saltus import progress
+from saltus import checks, progress
 from saltus.errors import ParameterError
 
 SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),
     load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
 )
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
 
 @pytest.fixture(scope="module")
@@ -226,10 +232,6 @@ def test_progress_in_a_notebook_is_one_line_that_is_written_over(monkeypatch, ca
 
 @pytest.mark.parametrize("call", [saltus.simulate, saltus.simulate_many])
 def test_long_work_that_nobody_watches_shows_its_progress_in_a_terminal(monkeypatch, call):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
     system = saltus.System(model=saltus.WallOscillator(), load=saltus.Load(frequency=1.1))
     asked = {"x": -0.5, "periods": 40_000}
     call(system, x=-0.5, periods=1)
@@ -247,6 +249,48 @@ def test_long_work_that_nobody_watches_shows_its_progress_in_a_terminal(monkeypa
         asked["x"] -= 0.01  # another motion, as the last one is remembered
     assert "following the motion" in seen[0]
     assert seen[1:] == ["", "", ""]
+
+
+@pytest.mark.parametrize("read", ["a terminal", "a file", "a helper of a terminal"])
+def test_every_long_call_shows_one_line_in_a_terminal(monkeypatch, read):
+    orbit = saltus.find_orbit(SYSTEM, theta=0.3)
+
+    def call():
+        saltus.continue_orbit(orbit, "load.frequency", (0.95, 1.05))
+
+    stream = io.StringIO() if read == "a file" else Terminal()
+    monkeypatch.setattr(progress, "UNWATCHED", 0.0)
+    monkeypatch.setattr(progress, "LOOK_INTERVAL", 0.0)
+    monkeypatch.setattr(sys, "stderr", stream)
+    if read == "a helper of a terminal":
+        helper = threading.Thread(target=call)
+        helper.start()
+        helper.join()
+    else:
+        call()
+    written = stream.getvalue()
+    if read == "a terminal":
+        assert "100 %" in written.split("\r")[-1]
+        assert written.count("\n") == 1
+        assert written.endswith("\n")
+    else:
+        assert written == ""
+
+
+def test_the_line_of_work_that_fails_is_left(monkeypatch):
+    def fails(*, progress=progress.silent):
+        progress(0.5, "half")
+        raise RuntimeError
+
+    stream = Terminal()
+    monkeypatch.setattr(progress, "UNWATCHED", -1.0)
+    monkeypatch.setattr(sys, "stderr", stream)
+    with pytest.raises(RuntimeError):
+        checks.answered(fails)()
+    written = stream.getvalue()
+    assert "half" in written
+    assert "100 %" not in written
+    assert written.count("\n") == 1
 
 
 def test_what_is_no_result_is_refused():

@@ -23,7 +23,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.kinds import check_kinds, check_switches, check_together, switches_of
-from saltus.progress import silent, watched
+from saltus.progress import LongWork, is_unwatched, silent, watched
 
 
 class ManyNumbers(np.ndarray):
@@ -574,17 +574,16 @@ def answered(function: Callable[P, R]) -> Callable[P, R]:
     """
 
     switches = switches_of(function)
+    shows = _has_progress(function)
 
     @functools.wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
         if not switches.isdisjoint(named):
             check_switches(switches, named)
         try:
-            return (
-                told(function, *given, **named)
-                if "progress" in named
-                else function(*given, **named)
-            )
+            if "progress" in named or shows:
+                return told(function, *given, **named)
+            return function(*given, **named)
         except OF_OTHER_KINDS as error:
             _refuse_kinds(function, given, named, error)
             raise
@@ -637,14 +636,33 @@ def _refuse_kinds(
             check_together(function, given, named)
 
 
+# functions that are called by the thousand show long work themselves
+OWN_PROGRESS = frozenset({"simulate"})
+
+
+def _has_progress(function: Callable[..., Any]) -> bool:
+    """Whether a function has a progress, which is shown by default if it takes long."""
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    if code is None or function.__name__ in OWN_PROGRESS:
+        return False
+    named = code.co_varnames[code.co_argcount : code.co_argcount + code.co_kwonlyargcount]
+    return "progress" in named
+
+
 def told(function: Callable[P, R], /, *given: P.args, **named: P.kwargs) -> R:
     """Call a function of which somebody may watch the progress: what takes long within it is told
-    too.
+    too. A progress that nobody has asked for is shown if it takes long.
     """
-    if not callable(named.get("progress")) or named["progress"] is silent:
+    asked: Any = named.get("progress", silent)
+    if not callable(asked) or (asked is silent and not is_unwatched()):
         return function(*given, **named)
-    with watched(named["progress"]) as named["progress"]:  # type: ignore[arg-type]
-        return function(*given, **named)
+    work = LongWork() if asked is silent else None
+    try:
+        with watched(work or asked) as named["progress"]:
+            return function(*given, **named)
+    finally:
+        if work is not None:
+            work.end()
 
 
 def bound_arguments(

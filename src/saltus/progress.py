@@ -9,7 +9,9 @@ from __future__ import annotations
 import html
 import io
 import math
+import multiprocessing
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,7 +22,7 @@ from typing import Any
 from saltus.errors import ParameterError, shown
 
 Progress = Callable[[float, str], object]
-UNWATCHED = 10.0  # seconds after which work that nobody watches shows its progress by itself
+UNWATCHED = 2.0  # seconds after which work that nobody watches shows its progress by itself
 LOOK_INTERVAL = 0.1  # seconds between looks at Ctrl-C, and at the progress of other threads
 
 
@@ -107,20 +109,49 @@ class LongWork:
 
     def __init__(self) -> None:
         self.begin = time.monotonic()
-        self.shown = False
+        self.shown = -math.inf  # when the line was written last
+        self.last: tuple[float, str] | None = None  # what it said then
 
     def __call__(self, fraction: float, what: str) -> None:
-        """Show the line, if it has taken long."""
-        long = fraction < 1.0 and time.monotonic() - self.begin > UNWATCHED
-        if self.shown or (long and (_in_notebook() or _is_terminal())):
-            self.shown = True
+        """Show the line, if it has taken long; at most ten times a second."""
+        now = time.monotonic()
+        if self.last is None and (fraction >= 1.0 or now - self.begin <= UNWATCHED):
+            return
+        if (fraction >= 1.0 or now - self.shown >= LOOK_INTERVAL) and _is_read():
+            self.shown, self.last = now, (fraction, what)
             show_progress(fraction, what)
+
+    @property
+    def is_early(self) -> bool:
+        """Whether it is too early for the line."""
+        return self.last is None and time.monotonic() - self.begin <= UNWATCHED
+
+    def end(self) -> None:
+        """Leave the line, which is full unless an error has ended the work."""
+        if self.last is None or self.last[0] >= 1.0:
+            return
+        if sys.exc_info()[0] is None:
+            show_progress(1.0, self.last[1])
+        elif not _in_notebook():
+            print(file=sys.stderr)
 
 
 def shown_if_long(progress: Progress) -> Progress:
     """A progress; in the place of `silent`, where nobody watches what this is a part of either, one
     that is shown after a while."""
     return LongWork() if progress is silent and _watch.get() is None else progress
+
+
+def is_unwatched() -> bool:
+    """Whether nobody watches what this thread does."""
+    return _watch.get() is None
+
+
+def _is_read() -> bool:
+    """Whether a person reads what this thread writes: that of a script or notebook itself, no
+    thread and no process that helps it."""
+    own = threading.current_thread() is threading.main_thread()
+    return own and multiprocessing.parent_process() is None and (_in_notebook() or _is_terminal())
 
 
 def _is_terminal() -> bool:
@@ -139,6 +170,13 @@ class FractionMemory:
     def __call__(self, fraction: float, what: str) -> object:
         self.fraction = fraction
         return self.progress(fraction, what)
+
+
+def is_idle(progress: Progress) -> bool:
+    """Whether a progress would do nothing now, so that its words need not be written."""
+    if isinstance(progress, FractionMemory):
+        progress = progress.progress
+    return progress is silent or (isinstance(progress, LongWork) and progress.is_early)
 
 
 _watch: ContextVar[FractionMemory | None] = ContextVar("watch", default=None)
@@ -164,7 +202,7 @@ def say(what: str) -> None:
     Where nobody watches, a terminal shows it as a line; a file is not written to.
     """
     watch = _watch.get()
-    if watch is not None:
+    if watch is not None and not isinstance(watch.progress, LongWork):
         watch.progress(watch.fraction, what)
     elif _is_terminal():
         print(f"saltus: {what}", file=sys.stderr, flush=True)

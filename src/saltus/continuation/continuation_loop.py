@@ -18,7 +18,7 @@ from saltus.continuation.pseudo_arclength import STEPS, StepSettings
 from saltus.continuation.test_functions import Cut, Events, located
 from saltus.continuation.trail import SETTINGS as TRAIL
 from saltus.continuation.trail import Trail, TrailPoint
-from saltus.progress import Progress, silent
+from saltus.progress import Progress, is_idle, silent
 
 # the least and the largest value of each parameter, by its name
 Bounds = Mapping[str, tuple[float, float]]
@@ -39,7 +39,7 @@ class Watch:
 
     def __call__(self, point: Any) -> None:
         """Report a new point."""
-        if self.progress is silent:
+        if is_idle(self.progress):
             return
         self.seen, self.points = (
             (min(self.seen[0], point.parameter), max(self.seen[1], point.parameter)),

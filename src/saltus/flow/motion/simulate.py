@@ -168,12 +168,12 @@ class MotionRequest:
     ) -> None:
         check_system(system, "simulate", several_contacts=True, multipliers=True, switches=True)
         # what a system remembers is forgotten where values that its classes read have changed
-        structure_key(system)
+        key = structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)
         self.given = system
         self.system = system.in_gap_coordinates
         self.plan = _plan(
-            system, (periods, duration, tol, time, side, stop_at, dense, times is None)
+            system, key, (periods, duration, tol, time, side, stop_at, dense, times is None)
         )
         self.limits, self.clock = self.plan.limits, self.plan.clock
         for i, name in self.plan.angles:
@@ -202,25 +202,52 @@ class MotionRequest:
         return other
 
 
-def _plan(system: System, asked: tuple[Any, ...]) -> MotionPlan:
-    """The plan of a request. A system remembers the last one: in a loop the arguments are the same
-    objects at every call, and are checked once."""
+class _CheckedPlan(NamedTuple):
+    """A plan, with all of a system that it depends on."""
+
+    key: Any = None  # of the system's structure
+    period: float | None = None  # of its load
+    plan: MotionPlan | None = None
+
+
+# the last one: a loop over numbers asks each of its systems for the same motion
+_checked = _CheckedPlan()
+
+
+def _plan(system: System, key: Any, asked: tuple[Any, ...]) -> MotionPlan:
+    """The plan of a request to a system with this key of its structure. A system remembers the last
+    one: in a loop the arguments are the same objects at every call, and are checked once, also for
+    systems that differ in other numbers than the load's period."""
+    global _checked
     last: list[MotionPlan] = system._remembered("plan", list)
     for plan in last:
         if all(map(is_, plan.asked, asked)):
             return plan
+    known, period = _checked, system.load.period
+    if (
+        known.plan is not None
+        and known.period == period
+        and all(map(is_, known.plan.asked, asked))
+        and known.key == key
+    ):
+        made = known.plan._replace(again=[])
+        last[:] = [made]
+        return made
     periods, duration, tol, time, side, stop_at, dense, whole = asked
     limits = limits_of(system, stop_at)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     check_number("time", time)
     if side not in (None, 1, -1):
         raise ParameterError(f"side must be +1 or -1, got {side!r}", "side")
-    first, local, last_one, end, length = clock(float(time), system.load.period, periods, duration)
+    first, local, last_one, end, length = clock(float(time), period, periods, duration)
     when = Clock(int(first), float(local), int(last_one), float(end), float(length))
     if dense and whole:
         _check_dense(system, when, periods, duration)
     made = MotionPlan(asked, limits, when, _angles(system), [])
-    last[:] = [made] if isinstance(stop_at, (str, tuple)) else []  # others may change
+    fixed = isinstance(stop_at, (str, tuple))  # others may change
+    last[:] = [made] if fixed else []
+    if fixed and period is not None:
+        _checked = _CheckedPlan(key, period, made._replace(again=[]))
     return made
 
 
