@@ -336,9 +336,19 @@ class Signed(ContactModel):
         return load.force(t) - 0.3 * np.sign(velocity)
 
 
-def test_other_verbs_refuse_it_in_one_sentence():
-    with pytest.raises(ParameterError, match="does not follow surfaces that are functions"):
-        saltus.simulate_many(CAR, y=[0.1, 0.2], velocity=0.0, periods=2)
+def test_ensembles_have_the_motions_of_each():
+    starts = np.linspace(-0.5, 0.8, 5)
+    for system in (CAR, TRACED_CAR):
+        together = saltus.simulate_many(system, y=starts, velocity=0.1, periods=6)
+        for number, start in enumerate(starts):
+            alone = simulate(system, y=float(start), velocity=0.1, periods=6)
+            assert float(together.y[number]) == alone.position
+            assert float(together.velocity[number]) == alone.velocity
+
+
+def test_a_page_refuses_it_in_one_sentence():
+    with pytest.raises(ParameterError, match="a page cannot show surfaces yet"):
+        saltus.page(TRACED_CAR, y=0.1, periods=2)
 
 
 def test_a_surface_needs_a_method():

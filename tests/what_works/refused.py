@@ -15,7 +15,6 @@ SWEEP = "cycles without a load are not swept yet"
 DIAGRAM = "are not drawn in diagrams yet"
 
 DISTANCES = "does not follow contacts of a distance"
-SWITCHES = "does not follow surfaces that are functions"
 NOT_BESIDE_DISTANCES = (
     "ensemble",
     "its extrema",
@@ -57,7 +56,8 @@ REFUSED = {
     ("belt, no load", "sweep"): SWEEP,
     ("belt, no load", "diagram"): DIAGRAM,
     **{("own, two feet that rub", verb): DISTANCES for verb in NOT_BESIDE_DISTANCES},
-    **{("own, switches", verb): SWITCHES for verb in ("orbit", "branch", *NOT_BESIDE_DISTANCES)},
+    ("own, switches", "page"): SURFACES,
+    ("own, switches", "of an ensemble"): MANY,
 }
 REASONS = {
     SUMS: (
@@ -76,9 +76,5 @@ REASONS = {
     DISTANCES: (
         "Contacts of a `distance` and frictions of a `rate` are followed by `simulate`,"
         " `sensitivities`, `find_orbit` and `continue_orbit` so far."
-    ),
-    SWITCHES: (
-        "Surfaces that are functions, and forces with `abs`, `sign`, `maximum` or comparisons, are"
-        " followed by `simulate` and `sensitivities` so far."
     ),
 }

@@ -280,7 +280,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     True
     """
     course = course_of(of, periods)
-    check_system(course.system, "energies", several_contacts=True)
+    check_system(course.system, "energies", several_contacts=True, switches=True)
     _refuse_moving_walls(course.system)
     parts = _parts(course)
     roles, names = zip(*parts, strict=True)

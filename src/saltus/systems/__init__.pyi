@@ -1,3 +1,4 @@
+from .contact_model import CONTINUOUS as CONTINUOUS
 from .contact_model import ContactModel as ContactModel
 from .contact_model import called_part as called_part
 from .contact_model import eliminated as eliminated

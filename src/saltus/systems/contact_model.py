@@ -505,14 +505,21 @@ class ContactModel(Model):
         value.
         """
         given = any(surface.function is not None for surface in self.surfaces)
-        return given or force_has_switches(self)
+        return given or bool(switches_of_force(self))
+
+    @property
+    def force_jumps(self) -> bool:
+        """Whether the force has switches of its own at which it may jump: signs and comparisons."""
+        return bool(switches_of_force(self) - CONTINUOUS)
 
     @property
     def holds_coordinates(self) -> bool:
         """Whether contacts or frictions may hold its coordinates one by one, while the others move
         on, or it has surfaces, or its force has switches.
         """
-        return Model.holds_coordinates.fget(self) or force_has_switches(self)  # type: ignore[attr-defined]
+        return Model.holds_coordinates.fget(self) or bool(  # type: ignore[attr-defined]
+            switches_of_force(self)
+        )
 
     def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
         """The value of a surface's function."""
@@ -574,21 +581,24 @@ class ContactModel(Model):
         return (1.0,) * len(self.frictions)
 
 
-def force_has_switches(model: Any) -> bool:
-    """Whether the force of a class of models has switches of its own: absolute values, signs,
-    maxima, comparisons.
+CONTINUOUS = {"absolute", "maximum", "minimum"}  # operations across whose switches values go on
+
+
+def switches_of_force(model: Any) -> frozenset[str]:
+    """The operations by which the force of a class of models has switches of its own: absolute
+    values, signs, maxima, comparisons.
 
     The tracer is in a room above this one, which is asked by its name.
     """
     kind = getattr(model, "own_class", type(model))
     if kind not in _switching:
-        _switching[kind] = False  # while it is asked
-        own = kind.__module__.partition(".")[0] != "saltus"
-        _switching[kind] = own and import_module("saltus.taylor").force_has_switches(model)
+        _switching[kind] = frozenset()  # while it is asked
+        if kind.__module__.partition(".")[0] != "saltus":
+            _switching[kind] = import_module("saltus.taylor").switches_of_force(model)
     return _switching[kind]
 
 
-_switching = dict[type, bool]()
+_switching = dict[type, frozenset[str]]()
 
 
 class SolvedMotion(NamedTuple):

@@ -452,6 +452,8 @@ def _images_of_parts(
     model: Any = system.model
     if not (model.contacts or model.frictions or model.surfaces):
         return ()
+    if any(surface.function is not None for surface in model.surfaces):
+        return None  # images of functions are not looked for
     lengths = natural_units(system).lengths
     names = model.coordinates
 

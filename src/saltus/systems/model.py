@@ -187,6 +187,11 @@ class Model:
         return False
 
     @property
+    def force_jumps(self) -> bool:
+        """Whether its force has switches of its own at which it may jump."""
+        return False
+
+    @property
     def friction_limits(self) -> tuple[str, ...]:
         """The limits at which its frictions end a motion."""
         return ()

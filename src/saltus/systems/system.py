@@ -504,13 +504,14 @@ def check_system(
     sums: bool = True,
     multipliers: bool = False,
     switches: bool = False,
+    jumps: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that
     `asking` is for.
 
     Without `sums` each contact and surface must be of a single coordinate; without `multipliers`
     none may be a `distance`, and no friction a `rate`; without `switches` no surface a `function`,
-    and the force must have no switches of its own.
+    and the force must have no switches of its own; without `jumps` none at which it may jump.
 
     Raises
     ------
@@ -534,8 +535,20 @@ def check_system(
     if not switches and system.model.has_switches:
         raise ParameterError(
             f"{asking} does not follow surfaces that are functions, and forces with abs, sign, maximum"
-            f" or comparisons, so far, and {type(system.model).__name__} has some; simulate and"
-            " sensitivities do",
+            f" or comparisons, so far, and {type(system.model).__name__} has some; simulate does",
+            "system",
+        )
+    if not jumps and system.model.has_switches and system.model.has_multipliers:
+        raise ParameterError(
+            f"{asking} does not follow surfaces that are functions beside a distance or a rate so far;"
+            " simulate does",
+            "system",
+        )
+    if not jumps and system.model.force_jumps:
+        raise ParameterError(
+            f"{asking} does not follow forces that may jump with np.sign or a comparison of their own"
+            f" so far, as that of {type(system.model).__name__}: name what they switch with as a"
+            " method, Surface(function=...), and read its side; simulate does",
             "system",
         )
     if several_contacts and sums and coordinates is None:

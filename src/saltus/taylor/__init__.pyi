@@ -37,6 +37,7 @@ from .kernels import module_name as module_name
 from .load_tables import record_table as record_table
 from .load_tables import record_tables as record_tables
 from .memory import Places as Places
+from .memory import leaves_of as leaves_of
 from .memory import shared_constants as shared_constants
 from .memory import tape as tape
 from .numba_types import Pointer as Pointer
@@ -52,7 +53,7 @@ from .private_numba import pointer as pointer
 from .rules import FUNCTIONS as FUNCTIONS
 from .series import Rows as Rows
 from .shipped import shipped_level as shipped_level
-from .switches import force_has_switches as force_has_switches
+from .switches import switches_of_force as switches_of_force
 from .tracing import FREQUENCY as FREQUENCY
 from .tracing import Trace as Trace
 from .tracing import trace as trace

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from saltus.systems import Sides
+from saltus.systems import CONTINUOUS, Sides
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor.graph import (
     POINTWISE,
@@ -39,6 +39,7 @@ class Switches:
         self._numbers: dict[tuple[Expr, ...], int] = {}
         self._made: dict[int, Expr] = {}
         self.functions: list[Expr] = []
+        self.jumping: set[int] = set()  # those at which values may jump
 
     def written(self, roots: Iterable[Expr]) -> list[Expr]:
         """The expressions on the sides of their switches."""
@@ -53,8 +54,15 @@ class Switches:
         """A node whose operands are on their sides."""
         rule = RULES.get(node.op)
         if rule is not None:
-            return as_expr(rule(self.side_of, *args))
+            side_of = self.side_of if node.op in CONTINUOUS else self.jumping_side_of
+            return as_expr(rule(side_of, *args))
         return combine(node.op, *args) if args else node
+
+    def jumping_side_of(self, function: Expr, other: Any = 0.0) -> Expr:
+        """`side_of` where values may jump."""
+        side = self.side_of(function, other)
+        self.jumping |= {node.value - self._first for node in ordered([side]) if node.op == "slide"}
+        return side
 
     def side_of(self, function: Expr, other: Any = 0.0) -> Expr:
         """The sign of a difference."""
@@ -113,8 +121,8 @@ def pointwise(root: Expr) -> Expr:
     return made[id(root)]
 
 
-def force_has_switches(model: Any) -> bool:
-    """Whether a model's force, under some load, has switches of its own."""
+def switches_of_force(model: Any) -> frozenset[str]:
+    """The operations by which a model's force, under some load, has switches of its own."""
     size = len(model.coordinates)
     try:
         found = list[str]()
@@ -127,8 +135,8 @@ def force_has_switches(model: Any) -> bool:
         roots = force if isinstance(force, (tuple, list)) else [force]
         nodes = ordered([x for x in roots if isinstance(x, Expr)])
     except Exception:  # a user's own code may raise anything; the trace says what
-        return False
-    return any(node.op in POINTWISE for node in nodes)
+        return frozenset()
+    return frozenset(node.op for node in nodes if node.op in POINTWISE)
 
 
 def sides_of_symbols(model: Any) -> tuple[Any, ...]:

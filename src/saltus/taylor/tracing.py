@@ -130,12 +130,12 @@ class Trace:
     coefficients: list[Expr] = field(default_factory=list)
     # then the contact whose reaction presses each of them, -1 for none
     friction_contacts: tuple[int, ...] = ()
-    # the coordinate of each friction, then -1 less that of each surface
+    # the coordinate of each friction, then -1 less that of each surface; in the place of that of a
+    # function, whose series stands in the place of its first margin, the number of coordinates
     friction_coordinates: tuple[int, ...] = ()
-    # the rows of frictions and surfaces that are functions, whose series stand in the place of the
-    # first margin; the last of these rows are those of switches of the force, by name
-    functions: tuple[int, ...] = ()
+    # of switches of the force, which are the last of the rows of frictions and surfaces, the names
     switches: tuple[str, ...] = ()
+    jumping: frozenset[int] = frozenset()  # the rows of those at which the force may jump
     modes: ModeBlock | None = None  # of a structure; their accelerations are leaves "mode"
     # the accelerations of all columns, which are then leaves "mode" too
     sums: tuple[ColumnSum, ...] = ()
@@ -239,6 +239,13 @@ class Trace:
         self.parameters.append(path)
         return Expr("parameter", (), len(self.parameters) - 1)
 
+    @property
+    def functions(self) -> tuple[int, ...]:
+        """The rows of frictions and surfaces that are functions."""
+        return tuple(
+            k for k, place in enumerate(self.friction_coordinates) if place == -1 - self.dof
+        )
+
     def append_switches(self, names: tuple[str, ...], functions: list[Expr]) -> None:
         """Append the rows of the switches of the force, behind those of the surfaces."""
         count = len(self.signs)
@@ -263,8 +270,7 @@ class Trace:
             self.coefficients = self.coefficients + empty
             self.friction_contacts += (-1,) * more
         self.ground_speeds = self.ground_speeds + empty
-        self.friction_coordinates += (-1,) * more
-        self.functions += tuple(range(first, first + more))
+        self.friction_coordinates += (-1 - self.dof,) * more
         self.switches = tuple(called(function, names, self.parameters) for function in functions)
 
     def append_tangent(self, paths: tuple[str, ...]) -> None:
@@ -423,6 +429,8 @@ def trace(
         result.margins = dict(zip(result.margins, margins, strict=True))
         # a force may have none under the load that is given
         none = model.has_switches and not result.several and not switches.functions
+        first = len(result.friction_coordinates)
+        result.jumping = frozenset(first + place for place in switches.jumping)
         result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
     if energy:
         result.margins["kinetic_energy"] = combine(
@@ -564,9 +572,6 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         else combine("add", model.value_of_function(part, t, q, v, load), 0.0)
         for part in model.surfaces
     ]
-    result.functions = tuple(
-        k for k, part in enumerate(parts) if getattr(part, "function", None) is not None
-    )
     beside = [x for function in functions for x in (function, number(1.0))]
     if local < result.dof:
         q, v = local_parts(q, v, local)
@@ -600,8 +605,10 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     )
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
     places = [
-        0
-        if part.coordinate is None or (model.has_multipliers and k < len(frictions))
+        result.dof
+        if getattr(part, "function", None) is not None
+        else 0
+        if model.has_multipliers and k < len(frictions)
         else model.coordinates.index(part.coordinate)
         for k, part in enumerate(parts)
     ]

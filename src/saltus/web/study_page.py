@@ -274,9 +274,10 @@ class Explorer:
 
 def _check(system: System, function: str) -> None:
     """Refuse a system that a page cannot follow."""
-    check_system(system, function, several_contacts=True, sums=False)
+    check_system(system, function, several_contacts=True, sums=False, switches=True, jumps=True)
     model = system.model
-    parts = {"surfaces": model.surfaces, "coordinates of first order": model.first_order}
+    switches = model.surfaces or model.has_switches
+    parts = {"surfaces": switches, "coordinates of first order": model.first_order}
     for what in (
         what
         for what, given in (parts | {"frictions in contacts": model.rubs_in_contacts}).items()

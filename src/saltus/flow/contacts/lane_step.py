@@ -14,7 +14,13 @@ even if it is not the same one in all lanes (`one_free.py`).
 from __future__ import annotations
 
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoMargin, NoPress
+from saltus.flow.contacts.layout import (
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    NoMargin,
+    NoPress,
+)
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.lanes.lane_steps import (
     both_at,
@@ -91,6 +97,8 @@ def begin_contact(lane, env, state):
         row = contacts[count + k]
         surface = coordinate < 0
         coordinate = -1 - coordinate if surface else coordinate
+        function = coordinate >= sizes.own
+        coordinate = 0 if function else coordinate
         beyond = state[coordinate]
         rate = state[state.size // 2 + coordinate]
         if not surface:
@@ -106,6 +114,10 @@ def begin_contact(lane, env, state):
                 row[FrictionColumn.SLIDES] = -1 if rate < 0.0 else 1
         elif row[FrictionColumn.PRESSED] == NoPress.INERT:
             row[FrictionColumn.SLIDES] = 2
+        if function:  # the kernel reads its side
+            row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
+            row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED
+            row[FrictionColumn.SLIDES] = 1
         mode = Mode.CONTACT if mode == Mode.ARC else mode
     lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
     write_closed(lane, contacts[:count])

@@ -9,8 +9,20 @@ derivative is continuous at a touch. It is so at such a single contact, too (see
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
-from saltus.taylor import Expr, Form, NoNormalForm, Trace, constant, normal_form
+from saltus.taylor import (
+    Expr,
+    Form,
+    NoNormalForm,
+    Trace,
+    constant,
+    differentiate,
+    leaves_of,
+    normal_form,
+    number,
+    substitute,
+)
 
 
 @lru_cache(maxsize=4096)
@@ -38,25 +50,42 @@ def continuous_surfaces(
     )
 
 
+def _places_on(traced: Trace, part: int, coordinate: int) -> list[dict[Expr, Any]]:
+    """The leaves on a surface, where there is no speed along it: of a coordinate its position, of a
+    function one of the leaves in which it is linear."""
+    if coordinate < traced.dof:
+        position = traced.ground_speeds[part]
+        return [
+            {Expr("coordinate", (), coordinate): position, Expr("velocity", (), coordinate): 0.0}
+        ]
+    function = traced.reactions[len(traced.signs) + 2 * part]
+    found = list[dict[Expr, Any]]()
+    for leaf in leaves_of(function):
+        slope = differentiate(function, leaf)
+        if not leaves_of(slope) and slope is not number(0.0):
+            found.append({leaf: leaf - function / slope})
+    return found
+
+
 def _is_continuous(traced: Trace, leaves: dict[Expr, Form], part: int, coordinate: int) -> bool:
     """Whether the accelerations on both sides of a surface along a coordinate are equal, at rest
     along it.
     """
     if coordinate in traced.first_order_rows:
         return False
-    try:
-        position = normal_form(traced.ground_speeds[part], leaves)
-        at = {
-            Expr("coordinate", (), coordinate): position,
-            Expr("velocity", (), coordinate): constant(0.0),
-        }
-        above, below = (
-            [
-                normal_form(acceleration, leaves | at | {Expr("slide", (), part): constant(side)})
-                for acceleration in traced.acceleration[: traced.dof]
-            ]
-            for side in (1.0, -1.0)
-        )
-    except NoNormalForm:
-        return False
-    return above == below
+    for at in _places_on(traced, part, coordinate):
+        try:
+            above, below = (
+                [
+                    normal_form(
+                        substitute(acceleration, at | {Expr("slide", (), part): side}), leaves
+                    )
+                    for acceleration in traced.acceleration[: traced.dof]
+                ]
+                for side in (1.0, -1.0)
+            )
+        except NoNormalForm:
+            continue
+        if above == below:
+            return True
+    return False

@@ -132,7 +132,7 @@ def simulate_many(
     >>> ends.impact_count.values, float(ends.theta[2])
     (array([39, 39, 39]), -0.23568059529931645)
     """
-    check_system(system, "simulate_many", several_contacts=True)
+    check_system(system, "simulate_many", several_contacts=True, switches=True, jumps=True)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     options = EnsembleOptions(
         tol=tol,

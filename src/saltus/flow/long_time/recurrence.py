@@ -531,6 +531,7 @@ def _rest_lasts(system: System) -> bool:
     names = system.model.coordinates
     known = not contacts or sorted(contact.coordinate for contact in contacts) == sorted(names)
     known &= not (system.model.frictions or system.model.surfaces or system.dependent)
+    known &= not system.model.has_switches
     return known and not load_releases(system)
 
 

@@ -420,6 +420,7 @@ class ContactState(KernelState):
         self._functions = {len(held) + k: named[k] for k in run.trace.functions}
         for number in self._functions:
             row = contacts[number]
+            row[FrictionColumn.COORDINATE] = 0
             row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
             row[FrictionColumn.SLIDES] = 1
             row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED  # the kernel reads its side

@@ -542,7 +542,9 @@ def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
-    check_system(system, "sensitivities", several_contacts=True, multipliers=True, switches=True)
+    check_system(
+        system, "sensitivities", several_contacts=True, multipliers=True, switches=True, jumps=True
+    )
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 
 

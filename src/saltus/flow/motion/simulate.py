@@ -166,7 +166,9 @@ class MotionRequest:
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
     ) -> None:
-        check_system(system, "simulate", several_contacts=True, multipliers=True, switches=True)
+        check_system(
+            system, "simulate", several_contacts=True, multipliers=True, switches=True, jumps=True
+        )
         # what a system remembers is forgotten where values that its classes read have changed
         key = structure_key(system)
         start = read_start(system, velocity, coordinates, NAMES[sensitivities is not None], time)

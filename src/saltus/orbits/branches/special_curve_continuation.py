@@ -187,7 +187,7 @@ def continue_special(
         )
     first_path = special.orbit.equations.paths[0]
     system = special.orbit.system
-    check_system(system, "continue_special", several_contacts=True)
+    check_system(system, "continue_special", several_contacts=True, switches=True)
     if path == first_path:
         raise ParameterError(
             f"the branch already runs along {path}; name another parameter to follow its"

@@ -49,7 +49,7 @@ def is_symmetric(system: System) -> bool:
     >>> saltus.orbits.is_symmetric(system)
     True
     """
-    check_system(system, "is_symmetric", several_contacts=True)
+    check_system(system, "is_symmetric", several_contacts=True, switches=True)
     return has_symmetry(system)
 
 

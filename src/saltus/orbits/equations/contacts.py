@@ -147,6 +147,7 @@ class ContactsEquations(OrbitEquations):
             known is None
             or known.frictions
             or known.surfaces
+            or known.has_switches
             or base.has_corners
             or base.system.dependent
             or known.has_multipliers

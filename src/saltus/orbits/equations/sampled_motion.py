@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -165,6 +166,12 @@ class SideModes:
         """
         return []
 
+    def functions(
+        self, side: np.ndarray, smooth: frozenset[int]
+    ) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
+        """The same for the sides of surfaces that are functions, without the numbers `smooth`."""
+        return []
+
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
         """Where coordinates are held, and the function of (model, t, q, v, a, load) whose values
         then are positive.
@@ -301,7 +308,7 @@ class ContactModes(SideModes):
         ]
         surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
         for number, (surface, beside) in enumerate(surfaces):
-            if number in smooth:
+            if number in smooth or surface.function is not None:
                 continue
             place = names.index(surface.coordinate)
             position = float(surface.position)
@@ -321,6 +328,17 @@ class ContactModes(SideModes):
             for f, s in pairs
         ]
 
+    def functions(
+        self, side: np.ndarray, smooth: frozenset[int]
+    ) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
+        known = self.system.contact_model
+        found = list[tuple[list[np.ndarray], Callable[..., list[Any]]]]()
+        surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
+        for number, (surface, beside) in enumerate(surfaces):
+            if surface.function is not None and number not in smooth:
+                found.append(([beside > 0, beside < 0], partial(_of_function, surface)))
+        return found
+
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
         known = self.system.contact_model
         closed = self.closed(side)
@@ -335,6 +353,14 @@ class ContactModes(SideModes):
                 (direction == 0) & ~np.any([*leans, np.zeros_like(direction, dtype=bool)], axis=0)
             ] * 2
         return [(closed, reactions), (sticks, stick_margins)]
+
+
+def _of_function(
+    surface: Any, model: Any, t: Any, q: Any, v: Any, a: Any, load: Any, *_: Any
+) -> list[Any]:
+    """The value of a surface's function along a motion, and minus it."""
+    value = np.asarray(model.value_of_function(surface, t, q, v, load), dtype=float)
+    return [value, -value]
 
 
 def excursions(
@@ -515,6 +541,16 @@ class SampledMotion:
             course[:, 0] = course[:, 0] - s * ground_speed
             speed = self._turning_of(course, s[:, None] * self.acceleration[place], s != 0)
             least.append((speed / units.speed, "sliding speed"))
+        for chosen, values in modes.functions(self.side, smooth):
+            everywhere = self.only(np.arange(len(self.side)))
+            largest = float(np.abs(everywhere._forces(values)[0]).max(initial=0.0))
+            for mask, number in zip(chosen, (0, 1), strict=True):
+                steps = np.flatnonzero(mask)
+                if steps.size and largest > 0.0:
+                    one = lambda *given, n=number, f=values: [f(*given)[n]]  # noqa: E731
+                    part = self.only(steps)
+                    lowest = part._dip(steps, [mask[steps]], one, at_begin=False)
+                    least.append((lowest / largest, "switching function"))
         # what holds a single contact is given as an acceleration
         alone = self.motion.system.model.has_one_contact
         largest = units.acceleration if alone else units.force
