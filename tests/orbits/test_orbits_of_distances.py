@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from flow.test_held_rows import Block, compared, rotor
+from flow.test_held_rows import Ball, Block, compared, rotor
 
 import saltus
 from saltus import Contact, Friction, Harmonic, Load, NewtonImpact, System
@@ -307,6 +307,54 @@ def test_of_feet_that_stick_together_the_sum_is_known():
     assert np.isnan(forces[0, 2:6]).all()
     np.testing.assert_allclose(np.sort(forces[0, 6:]), [0.2, 0.4], atol=1e-12)
     assert motion.stop == "rest"
+
+
+@pytest.mark.parametrize(
+    ("system", "start"),
+    [(ROCKING, {"x": 0.1, "y": 1.0, "tilt": 0.1}), (RUBBING, {"x": 0.3, "y": 0.2})],
+)
+def test_energies_of_orbits_are_balanced(system, start):
+    """The surface of the stator turns, and supplies energy while it rubs and in impacts."""
+    found = saltus.energies(saltus.find_orbit(system, **start))
+    assert abs(found.defect) < 1e-12
+    taken = found.energy.values[found.role.values == "dissipated"]
+    assert taken.min() > 1e-3
+    assert ("ground.impacts" in found.part.values) == (system is RUBBING)
+
+
+def test_impacts_on_a_shaken_table_take_what_the_law_of_restitution_says():
+    """(1 - e^2) / 2 times the squares of the relative speeds, which the table's motion is part of."""
+    e, frequency, amplitude = 0.8, 2.0, 0.4
+    load = Load(frequency=frequency, ground=Harmonic(amplitude))
+    system = System(model=Ball(), load=load, impact=NewtonImpact(e=e))
+    motion = saltus.simulate(system, y=0.8, velocity=0.0, periods=2)
+    found = saltus.energies(motion, periods=2)
+    impacts = motion.impacts
+    assert {str(event.kind) for event in motion.events} == {"impact"}  # no accumulation
+    assert len(impacts) > 2
+    ground = amplitude * frequency * np.cos(frequency * impacts.time)
+    speeds = np.ravel(impacts.velocity_before) - ground
+    expected = 0.5 * (1.0 - e**2) * float(speeds @ speeds)
+    by_part = dict(zip(found.part.values.tolist(), found.energy.values.tolist(), strict=True))
+    assert abs(by_part["impact.table"] - expected) < 1e-10 * expected
+    # the impulses are those of the law, and the table moves at its own speed
+    supplied = (1.0 + e) * float(-speeds @ ground)
+    assert abs(by_part["ground.impacts"] - supplied) < 1e-10
+    assert abs(found.defect) < 1e-12
+
+
+def test_coordinates_and_distances_have_the_same_energies():
+    load = Load(frequency=0.8, force=Harmonic(0.4), lift=Harmonic(1.5))
+    one, other = (
+        saltus.energies(
+            saltus.find_orbit(
+                System(model=model, load=load, impact=NewtonImpact(0.3)), x=0.1, y=0.1
+            )
+        )
+        for model in (RubsOnAFloor(), RubsAtADistance())
+    )
+    assert one.part.values.tolist() == other.part.values.tolist()
+    np.testing.assert_allclose(other.energy, one.energy, atol=1e-12)
 
 
 def test_symmetries_of_distances_are_refused():

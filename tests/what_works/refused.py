@@ -26,7 +26,6 @@ NOT_BESIDE_DISTANCES = (
     "exponents",
     "of an ensemble",
     "fit",
-    "energies",
     "page",
 )
 SEVERAL_COORDINATES = (
@@ -75,6 +74,6 @@ REASONS = {
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
     DISTANCES: (
         "Contacts of a `distance` and frictions of a `rate` are followed by `simulate`,"
-        " `sensitivities`, `find_orbit` and `continue_orbit` so far."
+        " `sensitivities`, `find_orbit`, `continue_orbit` and `energies` so far."
     ),
 }

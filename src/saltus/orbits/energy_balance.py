@@ -16,7 +16,7 @@ import numpy as np
 
 from saltus.checks import answered, check_count
 from saltus.errors import ParameterError, near
-from saltus.flow import EventKind, Motion, modes_of
+from saltus.flow import EventKind, Motion, RowValues, modes_of
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import result_dataset
@@ -258,7 +258,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     -------
     xarray.Dataset
         Over `part`: `energy` and `power`, the energy over the time, and the `role`: supplied
-        (`load.force`, `load.together` of channels that act on one another, `ground.belt`),
+        (`load.force`, `load.together` of channels that act on one another, `ground.belt`; of what
+        multipliers hold `wall.table` of a contact that moves by itself, and in impacts
+        `ground.impacts`; of forces that are not determined those of least squares),
         dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a single contact,
         `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has
         no part: what all take together is the sum where `part.str.startswith("impact")`, of no
@@ -280,7 +282,7 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     True
     """
     course = course_of(of, periods)
-    check_system(course.system, "energies", several_contacts=True, switches=True)
+    check_system(course.system, "energies", several_contacts=True, multipliers=True, switches=True)
     _refuse_moving_walls(course.system)
     parts = _parts(course)
     roles, names = zip(*parts, strict=True)
@@ -423,8 +425,12 @@ def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) ->
     """What the grounds of frictions supply, where they move, and what the frictions take."""
     system = course.system
     parts = Parts()
-    if not isinstance(system.model, ContactModel) or not system.contact_model.frictions:
+    if not isinstance(system.model, ContactModel):
         return parts
+    if not (system.contact_model.frictions or system.model.has_multipliers):
+        return parts
+    if system.model.has_multipliers:
+        return parts | _row_parts(course)
     inner = system.in_gap_coordinates
     load = system.load
     velocity = course.velocity
@@ -462,16 +468,44 @@ def _friction_parts(course: SampledPart, mass: np.ndarray, force: np.ndarray) ->
     return parts
 
 
-def _impact_parts(course: SampledPart) -> Parts:
-    """What impacts take, by the contacts that they close."""
-    parts: Parts = {}
-    for name, lost in _impact_losses(course):
-        parts[DISSIPATED, name] = parts.get((DISSIPATED, name), 0.0) + lost
+def _row_parts(course: SampledPart) -> Parts:
+    """What contacts and frictions that multipliers hold supply, where they move by themselves,
+    between impacts and in these, and what the frictions take."""
+    values = RowValues(course.system)
+    states = np.concatenate([course.position, course.velocity]).T
+    accelerations = course.rate(course.velocity).T
+    rates = values.along(course.time, states)[1]
+    drifts = values.drifts_along(course.time, states)
+    carried = values.carried_along(course.time, states, accelerations, course.side)
+    model = course.system.contact_model
+    names = [contact.name for contact in model.contacts]
+    names += [friction.name for friction in model.frictions]
+    parts = Parts()
+    for row, name in enumerate(names):
+        if row >= values.count:
+            parts[DISSIPATED, f"friction.{name}"] = -course.integral(
+                carried[:, row] * rates[:, row]
+            )
+        if drifts[:, row].any():
+            own = f"wall.{name}" if row < values.count else f"ground.{name}"
+            parts[SUPPLIED, own] = -course.integral(carried[:, row] * drifts[:, row])
     return parts
 
 
-def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
-    """The name of each impact's part, and the kinetic energy that it takes; what impacts accumulate
+def _impact_parts(course: SampledPart) -> Parts:
+    """What impacts take, by the contacts that they close."""
+    parts: Parts = {}
+    for name, lost, supplied in _impact_losses(course):
+        parts[DISSIPATED, name] = parts.get((DISSIPATED, name), 0.0) + lost
+        if supplied:
+            moved = SUPPLIED, "ground.impacts"
+            parts[moved] = parts.get(moved, 0.0) + supplied
+    return parts
+
+
+def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float, float]]:
+    """The name of each impact's part, the energy that it takes, and what contacts and frictions that
+    multipliers hold supply in it, where they move by themselves; what impacts accumulate
     to, which are too slow to be followed, is taken by the last one that is, or where a contact is
     held from then on."""
     system = course.system
@@ -511,7 +545,13 @@ def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float]]:
         np.einsum("in,ijn,jn->n", before, first, before)
         - np.einsum("in,ijn,jn->n", after, second, after)
     ) / 2
-    yield from zip(names, lost.tolist(), strict=True)
+    supplied = np.zeros_like(lost)
+    if system.model.has_multipliers:
+        values = RowValues(system)
+        for number, time in enumerate(times.tolist()):
+            change = after[:, number] - before[:, number]
+            supplied[number] = values.supplied_at(time, places[:, number], change)
+    yield from zip(names, (lost + supplied).tolist(), supplied.tolist(), strict=True)
 
 
 def _kinetic(course: SampledPart, place: int) -> float:

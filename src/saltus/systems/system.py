@@ -529,7 +529,7 @@ def check_system(
         raise ParameterError(
             f"{asking} does not follow contacts of a distance and frictions of a rate so far, and"
             f" {type(system.model).__name__} has {', '.join(held)}; simulate,"
-            " sensitivities, find_orbit and continue_orbit do",
+            " sensitivities, find_orbit, continue_orbit and energies do",
             "system",
         )
     if not switches and system.model.has_switches:

@@ -4,6 +4,7 @@ forces that keep them at 0 (`taylor/multipliers.py`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,14 @@ import numpy as np
 from saltus.flow.kernel.compiled import ContactRows, contact_rows_at, program
 from saltus.flow.motion.events import modes_of
 from saltus.flow.motion.motion import Motion
-from saltus.systems import System, inert_frictions, mass_and_force, mass_rows, normal_forces
+from saltus.systems import (
+    System,
+    inert_frictions,
+    mass_and_force,
+    mass_rows,
+    normal_forces,
+    units_of_gaps,
+)
 
 # Rows depend on one another where a singular value is this share of the largest one.
 RANK = 1e-9
@@ -19,6 +27,8 @@ RANK = 1e-9
 STEPS = 12
 # What is carried is not determined if as large a share of it may be anything.
 UNDETERMINED = 1e-5
+# A contact touches at an impact if its gap is smaller than this share of the terms of its rate.
+TOUCHES = 1e-10
 
 
 class RowValues:
@@ -97,84 +107,148 @@ class RowValues:
         (n,): the reactions of contacts; the static limit of each friction minus, then plus what it
         carries; and the same of all that stick together. nan where it is not held, or where it is
         not determined, as of feet that stick along one line."""
-        model = self.model
-        load = self.system.load
+        normals = self._normals(times, states)
+        found = np.full((len(times), self.count + 2 * (self.size - self.count) + 2), np.nan)
+        for at, mode, carried, free in self._carried(times, states, accelerations, side):
+            found[at] = self._margins(mode, carried, free, normals[:, at])
+        return found
+
+    def carried_along(
+        self, times: np.ndarray, states: np.ndarray, accelerations: np.ndarray, side: np.ndarray
+    ) -> np.ndarray:
+        """The forces along all rows, of sliding frictions too, (n, rows); 0 of what does not touch.
+        Of several that are possible they have the least squares."""
+        found = np.zeros((len(times), self.size))
+        for at, _, carried, _ in self._carried(times, states, accelerations, side):
+            found[at] = carried
+        return found
+
+    def drifts_along(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """The rates of all rows at rest, (n, rows)."""
         dof = states.shape[1] // 2
-        q, v = states[:, :dof].T, states[:, dof:].T
+        still = np.concatenate([states[:, :dof], np.zeros((len(times), dof))], axis=1)
+        return self.along(times, still)[1]
+
+    def supplied_at(self, time: float, position: np.ndarray, change: np.ndarray) -> float:
+        """What contacts and frictions that touch at a time supply by moving themselves, in an impact
+        that changes the velocities."""
+        state = np.append(position, np.zeros_like(position))
+        rows = self.at(time, state)
+        length, _ = units_of_gaps(self.system)
+        sizes = np.abs(rows.entries[: self.count]) @ np.abs(position) + length
+        touches = np.abs(rows.gaps) <= TOUCHES * sizes
+        chosen = np.flatnonzero(
+            [*touches, *(True if i is None else touches[i] for i in self._pressed)]
+        )
+        mass = np.array(mass_rows(self.model, _of(position), time, self.system.load), dtype=float)
+        impulses = np.linalg.pinv(rows.entries[chosen].T, rcond=RANK) @ (mass @ change)
+        return float(-(rows.drifts[chosen] @ impulses))
+
+    @property
+    def _pressed(self) -> list[int | None]:
+        """The contact that presses each friction; None of a given normal force."""
+        names = [contact.name for contact in self.model.contacts]
+        return [None if f.contact is None else names.index(f.contact) for f in self.model.frictions]
+
+    def _normals(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """The given normal forces, (frictions, n)."""
+        q, v = np.split(states.T, 2)
+        given = normal_forces(self.model, times, _of(q), _of(v), self.system.load)
+        return np.array([np.broadcast_to(n, times.shape) for n in given]).reshape(
+            self.size - self.count, len(times)
+        )
+
+    def _carried(
+        self, times: np.ndarray, states: np.ndarray, accelerations: np.ndarray, side: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
+        """For each mode its instants, its number, the forces along the rows (m, rows), and for each
+        instant what of them is not determined, (m, rows, rows)."""
+        dof = states.shape[1] // 2
+        q, v = np.split(states.T, 2)
         entries, rates, _ = self.along(times, states)
-        mass, force = mass_and_force(model, times, _of(q), _of(v), load)
+        mass, force = mass_and_force(self.model, times, _of(q), _of(v), self.system.load)
         lacking = np.zeros((len(times), dof))
         for i in range(dof):
             total = sum(m * accelerations[:, j] for j, m in enumerate(mass[i])) - force[i]
             lacking[:, i] = total
-        normals = np.array(
-            [
-                np.broadcast_to(n, times.shape)
-                for n in normal_forces(model, times, _of(q), _of(v), load)
-            ]
-        ).reshape(self.size - self.count, len(times))
-        found = np.full((len(times), self.count + 2 * (self.size - self.count) + 2), np.nan)
-        for mode in np.unique(side):
+        normals = self._normals(times, states)
+        for mode in np.unique(side).tolist():
             at = np.flatnonzero(side == mode)
-            found[at] = self._forces_in(
-                int(mode), entries[at], rates[at], normals[:, at], lacking[at]
-            )
-        return found
+            given = entries[at], rates[at], normals[:, at], lacking[at]
+            yield at, mode, *self._carried_in(mode, *given)
 
-    def _forces_in(
+    def _carried_in(
         self,
         mode: int,
         entries: np.ndarray,
         rates: np.ndarray,
         normals: np.ndarray,
         lacking: np.ndarray,
-    ) -> np.ndarray:
-        """`forces_along` in one mode, from rows, rates, given normal forces, and M a - r."""
-        contacts = self.count
-        names = [contact.name for contact in self.model.contacts]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The forces along the rows in a mode, from rows, rates, given normal forces, and M a -
+        r."""
         held = self.held_in(mode)
         slides = modes_of(self.model, np.array(mode))[1]
         push = entries.copy()
         rest = lacking.copy()
-        unit = np.eye(self.size)
-        shares = list[tuple[np.ndarray, Any]]()  # sums of what is carried, and numbers
-        shares += [(unit[i] if held[i] else np.zeros(self.size), 0.0) for i in range(contacts)]
-        together: list[Any] = [np.zeros(self.size), np.zeros(self.size), 0.0]
-        for k, friction in enumerate(self.model.frictions):
-            row = contacts + k
-            presses = None if friction.contact is None else names.index(friction.contact)
+        slips = np.zeros((len(entries), self.size))
+        for k, (friction, presses) in enumerate(
+            zip(self.model.frictions, self._pressed, strict=True)
+        ):
+            row = self.count + k
             way = int(slides[k])
-            if abs(way) == 1:
-                slips = (
-                    np.reshape(way * friction.coefficient(way * rates[:, row]), (-1, 1))
-                    * entries[:, row]
-                )
-                if presses is None:
-                    rest += normals[k][:, None] * slips
-                else:
-                    push[:, presses] -= slips
-            if not (held[row] and self.has_force[k]):
-                shares += 2 * [(np.zeros(self.size), 0.0)]
+            if abs(way) != 1:
                 continue
-            most = np.zeros(self.size) if presses is None else friction.most * unit[presses]
+            slips[:, row] = way * friction.coefficient(way * rates[:, row])
+            along = slips[:, row, None] * entries[:, row]
+            if presses is None:
+                rest += normals[k][:, None] * along
+            else:
+                push[:, presses] -= along
+        chosen = np.flatnonzero(held)
+        columns = push[:, chosen].transpose(0, 2, 1)
+        inverse = np.linalg.pinv(columns, rcond=RANK)
+        carried = np.zeros((len(entries), self.size))
+        carried[:, chosen] = (inverse @ rest[:, :, None])[:, :, 0]
+        free = np.zeros((len(entries), self.size, self.size))
+        free[:, chosen[:, None], chosen] = np.eye(len(chosen)) - inverse @ columns
+        for k, presses in enumerate(self._pressed):
+            row = self.count + k
+            normal = normals[k] if presses is None else carried[:, presses]
+            carried[:, row] -= slips[:, row] * normal
+        return carried, free
+
+    def _margins(
+        self, mode: int, carried: np.ndarray, free: np.ndarray, normals: np.ndarray
+    ) -> np.ndarray:
+        """`forces_along` in one mode."""
+        held = self.held_in(mode)
+        unit = np.eye(self.size)
+        nothing = np.zeros(self.size)
+        shares = list[tuple[np.ndarray, Any]]()  # sums of what is carried, and numbers
+        shares += [(unit[i] if held[i] else nothing, 0.0) for i in range(self.count)]
+        together: list[Any] = [nothing, nothing, 0.0]
+        for k, (friction, presses) in enumerate(
+            zip(self.model.frictions, self._pressed, strict=True)
+        ):
+            row = self.count + k
+            if not (held[row] and self.has_force[k]):
+                shares += 2 * [(nothing, 0.0)]
+                continue
+            most = nothing if presses is None else friction.most * unit[presses]
             given = friction.most * normals[k] if presses is None else 0.0
             shares += [(most - unit[row], given), (most + unit[row], given)]
             together[0] = together[0] + most - unit[row]
             together[1] = together[1] + most + unit[row]
             together[2] = together[2] + given
         shares += [(together[0], together[2]), (together[1], together[2])]
-        chosen = np.flatnonzero(held)
-        columns = push[:, chosen].transpose(0, 2, 1)
-        inverse = np.linalg.pinv(columns, rcond=RANK)
-        carried = (inverse @ rest[:, :, None])[:, :, 0]
-        free = np.eye(len(chosen)) - inverse @ columns
-        found = np.full((len(entries), len(shares)), np.nan)
+        found = np.full((len(carried), len(shares)), np.nan)
         for place, (share, given) in enumerate(shares):
             if not share.any():
                 continue
-            left = np.abs(share[chosen] @ free).max(axis=1, initial=0.0)
+            left = np.abs(share @ free).max(axis=1, initial=0.0)
             known = left <= UNDETERMINED * np.abs(share).max()
-            found[known, place] = (carried @ share[chosen] + given)[known]
+            found[known, place] = (carried @ share + given)[known]
         return found
 
 
