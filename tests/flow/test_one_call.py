@@ -34,7 +34,7 @@ LAYERS = System(
 )
 CASES = {
     "one contact": (forced(), {"theta": 0.3}, 65),
-    "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 120),
+    "two layers": (LAYERS, {"theta_1": 0.1, "theta_2": -0.05}, 125),
 }
 stiffness = 1.0
 
