@@ -144,7 +144,7 @@ def test_what_is_no_cycle_is_refused_in_a_sentence():
     idle = System(model=Clock(push=0.0), impact=NewtonImpact(0.5))
     with pytest.raises(saltus.MotionError, match="only touches a contact"):
         saltus.find_orbit(idle, x=0.0, velocity=2.0)
-    assert str(saltus.classify(idle, x=0.0, velocity=2.0)).startswith("undecided")
+    assert "undecided" in str(saltus.classify(idle, x=0.0, velocity=2.0))
     with pytest.raises(saltus.MotionError, match="comes to rest for good, which is no cycle"):
         saltus.find_orbit(System(model=BeltOscillator(belt_speed=0.0)), x=0.5)
     with pytest.raises(saltus.ParameterError, match="period must lie in"):
