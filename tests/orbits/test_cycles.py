@@ -20,6 +20,7 @@ from orbits.cycle_cases import (
     difference_multipliers,
 )
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import saltus
@@ -290,6 +291,51 @@ def test_births_of_other_laws_do_not_depend_on_the_asked_range(law, largest):
     branch = saltus.continue_orbit(orbit, "model.mu", (-0.2, largest))
     born = next(end for end in branch.ends if end.reason is saltus.orbits.OrbitEnd.EQUILIBRIUM)
     assert born.parameter == pytest.approx(0.0, abs=1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saddle(ContactModel):
+    """x'' = -x + x^2 + x' (mu - x): its cycle about 0 grows up to the saddle x = 1."""
+
+    mu: float = 0.1
+    coordinates: ClassVar[tuple] = ("x",)
+    channels: ClassVar[tuple] = ()
+
+    def force(self, t, x, velocity, load):
+        return -x + x * x + velocity * (self.mu - x)
+
+
+def test_a_branch_of_cycles_ends_at_a_homoclinic_connection():
+    """Where both manifolds of the saddle meet, by an independent solver. The model has no event."""
+
+    def first_stop(mu, way):
+        """The place at which the way out of the saddle, or the way back into it, turns round."""
+        rate = 0.5 * (mu - 1.0 + way * math.sqrt((mu - 1.0) ** 2 + 4.0))
+
+        def turns(t, y):
+            return y[1]
+
+        turns.terminal = True
+        turns.direction = way
+        start = [1.0 - 1e-7, -1e-7 * rate]
+        run = solve_ivp(
+            lambda t, y: [y[1], -y[0] + y[0] ** 2 + y[1] * (mu - y[0])],
+            (0.0, way * 200.0),
+            start,
+            "DOP853",
+            events=turns,
+            rtol=1e-13,
+            atol=1e-14,
+        )
+        return run.y_events[0][0][0]
+
+    expected = brentq(lambda mu: first_stop(mu, 1.0) - first_stop(mu, -1.0), 0.13, 0.14)
+    orbit = saltus.find_orbit(System(model=Saddle(mu=0.13)), x=0.3)
+    branch = saltus.continue_orbit(orbit, "model.mu", (0.13, 0.2))
+    assert branch.special == ()
+    end = branch.ends[1]
+    assert end.reason is saltus.orbits.OrbitEnd.CONNECTION
+    assert end.parameter == pytest.approx(expected, abs=1e-8)
 
 
 def test_periods_double_where_a_multiplier_is_minus_1():

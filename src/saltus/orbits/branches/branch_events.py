@@ -108,6 +108,9 @@ class OrbitEvents(Events):
         length = equations.natural.length
         if size > SETTINGS.largest * max(length, run.points[0].orbit.size):
             return End(OrbitEnd.GROWS, ahead.parameter, detail=f"{size:.3g}")
+        connected = equations.connection([*run.points, ahead])
+        if connected is not None:
+            return End(OrbitEnd.CONNECTION, connected)
         if not _has_shrunk(ahead):
             return None
         born = equations.birth(run.points)

@@ -137,6 +137,10 @@ class OrbitEnd(EndReason):
         "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance"
         " without damping"
     )
+    CONNECTION = (
+        "its period grows without end at {parameter:.9g}, where it leaves an equilibrium and comes"
+        " back to one"
+    )
     IMAGE = "meets its own image at a {kind}"
     GRAZES_ANOTHER = "ends at a grazing of the {detail}"
     COMES_BACK = (

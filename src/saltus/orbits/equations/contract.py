@@ -498,6 +498,13 @@ class OrbitEquations(ABC):
         """
         return None
 
+    def connection(self, points: list[Any]) -> float | None:
+        """The parameter at which the orbits of a branch come to an equilibrium in the midst of
+        their round, so that they last ever longer: a homoclinic connection, or one of several
+        equilibria. None if they do not.
+        """
+        return None
+
     def lost_ahead(self, point: Any) -> Zero | None:
         """The special point ahead at which an orbit that has nearly shrunk to rest is lost; None if
         it shrinks without one.

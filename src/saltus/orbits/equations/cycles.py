@@ -43,6 +43,10 @@ WITHIN = 1e-12
 # The least cosine of the angle, in natural units, between the flow and the normal of its section: at
 # a right angle of the two, where a branch would turn back, there is no return map.
 LEAST_STRAIGHT = 0.5
+# Along a branch whose period grows by a natural time while the parameter changes by this share of
+# its range, the orbits pass an equilibrium if the state is as slow there, in natural units.
+CONNECTED = 1e-7
+SLOW = 1e-4
 # the least ratio of the squares of sizes by which two orbits count as two
 APART = 1.1
 # Parameters leave that of a birth as a power of the size of the cycle. The square is generic; a
@@ -243,6 +247,29 @@ class CycleEquations(WholeMotionEquations):
             power = best if misses[best] < CLEARLY * misses[2] else 2
         return _extrapolated(parameters, sizes[:3], power, 0.0)
 
+    def connection(self, points: list[Any]) -> float | None:
+        """Where p - p* falls as exp(-rate T), by the slopes between three orbits."""
+        last = points[-1]
+        near = CONNECTED * last.curve.scales[0]
+        chosen = [last]  # half a natural time apart
+        for point in reversed(points):
+            if abs(point.parameter - last.parameter) > near:
+                return None
+            if chosen[-1].orbit.duration - point.orbit.duration > 0.5 * self.natural.time:
+                chosen.append(point)
+            if len(chosen) == 3:
+                break
+        if len(chosen) < 3 or slowest(last.orbit.followed, self) > SLOW:
+            return None
+        values = np.array([point.parameter for point in chosen])
+        periods = np.array([point.orbit.duration for point in chosen])
+        slope, slope_before = np.diff(values) / np.diff(periods)
+        middle, middle_before = periods[:-1] + 0.5 * np.diff(periods)
+        if not slope_before / slope > 1.0:
+            return float(values[0])
+        rate = math.log(slope_before / slope) / (middle - middle_before)
+        return float(values[0] + slope * math.exp(-rate * (periods[0] - middle)) / rate)
+
     def lost_ahead(self, point: Any) -> Zero | None:
         return None
 
@@ -430,6 +457,18 @@ def direction_at(motion: Motion, time: float, equations: OrbitEquations) -> np.n
             "the motion comes to an equilibrium, which is no cycle; start farther from it"
         )
     return np.asarray(scaled / size / equations.natural.state)
+
+
+def slowest(motion: Motion, equations: OrbitEquations) -> float:
+    """The least speed of a motion's state, in natural units and times."""
+    dense = motion.dense
+    assert dense is not None
+    shares = np.linspace(0.0, 1.0, PARTS + 1).clip(WITHIN, 1.0 - WITHIN)
+    times = (dense.start[:, None] + dense.length[:, None] * shares).ravel()
+    rates = np.concatenate([dense.states(times)[1], dense.accelerations(times)])
+    rates[equations.following] = 0.0
+    natural = equations.natural
+    return float(np.linalg.norm(rates.T / natural.state, axis=1).min() * natural.time)
 
 
 def states_of(motion: Motion, times: np.ndarray) -> np.ndarray:
