@@ -318,3 +318,48 @@ def test_a_pipe_as_a_structure_has_the_orbit_and_the_branch_of_the_pipe() -> Non
     branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.0))
     assert [str(end) for end in branch.ends] == ["bound 0.8", "bound 1"]
     assert not branch.special
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallsInTheAir(saltus.ContactModel):
+    """Three balls above one another, of which a force presses the lowest one down."""
+
+    channels: ClassVar[tuple[str, ...]] = ("push",)
+    coordinates: ClassVar[tuple[str, ...]] = ("low", "middle", "high")
+    contacts: ClassVar[tuple[saltus.Contact, ...]] = (
+        saltus.Contact(name="floor", coordinate="low"),
+        saltus.Contact(name="lower", coordinate={"middle": 1.0, "low": -1.0}),
+        saltus.Contact(name="upper", coordinate={"high": 1.0, "middle": -1.0}),
+    )
+
+    def force(self, t: Any, q: Any, velocity: Any, load: Any) -> Any:
+        return -1.0 - load.push(t), -1.0, -1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallsFromAbove(BallsInTheAir):
+    coordinates: ClassVar[tuple[str, ...]] = BallsInTheAir.coordinates[::-1]
+    contacts: ClassVar[tuple[saltus.Contact, ...]] = BallsInTheAir.contacts[::-1]
+
+    def force(self, t: Any, q: Any, velocity: Any, load: Any) -> Any:
+        return -1.0, -1.0, -1.0 - load.push(t)
+
+
+@pytest.mark.parametrize("model", [BallsInTheAir, BallsFromAbove])
+@pytest.mark.parametrize("frequency", [0.7, 1.0, 2.0, 3.1])
+@pytest.mark.parametrize("push", [0.1, 0.2, 0.37])
+def test_balls_that_fall_alike_touch_without_pressing(
+    model: type, frequency: float, push: float
+) -> None:
+    """The lowest one leaves the others, which fall freely at one speed: nothing holds them together
+    or apart but the rounding of forces that cancel."""
+    load = saltus.Load(frequency=frequency, push=saltus.Harmonic(push))
+    system = saltus.System(model=model(), load=load, impact=saltus.NewtonImpact(0.6))
+    speeds = {"low": -0.5, "middle": -0.4, "high": -0.4}
+    velocity = tuple(speeds[name] for name in model.coordinates)
+    start = dict.fromkeys(model.coordinates, 0.3)
+    motion = saltus.simulate(system, **start, velocity=velocity, duration=0.3)
+    place = dict(zip(model.coordinates, motion.position, strict=True))
+    assert place["middle"] == pytest.approx(0.3 - 0.4 * 0.3 - 0.5 * 0.3**2, abs=1e-14)
+    assert place["high"] == pytest.approx(place["middle"], abs=1e-15)
+    assert len(motion.impacts) == 0

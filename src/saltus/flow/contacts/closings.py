@@ -98,7 +98,7 @@ from saltus.flow.contacts.tangent import (
     slope,
 )
 from saltus.flow.kernel.layout import ZERO, EventCode, Status
-from saltus.flow.kernel.roots import leading
+from saltus.flow.kernel.roots import leading, rate_of
 from saltus.flow.kernel.steps import (
     clear_shifts,
     expand,
@@ -108,6 +108,21 @@ from saltus.flow.kernel.steps import (
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
+
+
+@lean_jit
+def deciding(motion, coefficients, start, zero, size, base):
+    """`leading`, where a later coefficient may be all that is left of accelerations that cancel:
+    these grow at a rate that it does not show.
+    """
+    order = motion.order
+    k = leading(coefficients, start, order, zero, size, base, 0.0)
+    if not start < k < order or not motion.press > 0.0:
+        return k
+    rate = 0.0
+    for i in range(motion.local):
+        rate = rate_of(motion.acceleration_series[i], 1, order - 1, motion.press, 0, rate)
+    return leading(coefficients, start, order, zero, size, base, rate)
 
 
 @lean_jit
@@ -126,14 +141,14 @@ def violated(motion, candidates, zero):
             continue  # see `all_idle_stay`
         known = motion.contacts[i, ContactColumn.RELEASED]
         if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            k = leading(motion.margin_series[i], known, order, zero, press_of(motion, i), 0)
+            k = deciding(motion, motion.margin_series[i], known, zero, press_of(motion, i), 0)
             if k < order and motion.margin_series[i, k] < 0.0:
                 wrong |= 1 << i
         else:
             gap_series(motion, i, contact_position(motion, i), order, g)
             if known == 1 and rubs_along(motion, i) and abs(g[2]) > ALIKE * motion.press:
                 known = 0  # its friction has changed with the release
-            k = leading(g, 2 + known, order, zero, motion.press, 2)
+            k = deciding(motion, g, 2 + known, zero, motion.press, 2)
             if k == order or g[k] < 0.0:
                 wrong |= 1 << i
         motion.contacts[i, ContactColumn.SKIP] = k

@@ -221,7 +221,7 @@ def away(motion, k):
     """
     side = 1.0 * motion.frictions[k, FrictionColumn.SLIDES]
     sliding_series(motion, k, side, motion.order, motion.gap_series)
-    return leading(motion.gap_series, 1, motion.order, ZERO, motion.press, 2)
+    return leading(motion.gap_series, 1, motion.order, ZERO, motion.press, 2, 0.0)
 
 
 @lean_jit
@@ -504,7 +504,7 @@ def slides_so(motion, count, candidates, held):
                 row = motion.margin_series[count + 2 * k + b]
                 near = (reached > 0 or shared) and abs(row[0]) <= ALIKE * size
                 known = reached == 1 + b or near
-                i = leading(row, 1 if known else 0, order, ZERO, size, 0)
+                i = leading(row, 1 if known else 0, order, ZERO, size, 0, 0.0)
                 if reached == 0 and not shared and held >> k & 1 and abs(row[0]) <= ZERO * size:
                     continue  # its own event is next if this margin falls
                 if i < order and row[i] < 0.0:
@@ -515,7 +515,7 @@ def slides_so(motion, count, candidates, held):
             continue
         sliding_series(motion, k, 1.0 * slides, order, g)
         known = reached > 0 and abs(g[1]) <= ALIKE * motion.press
-        i = leading(g, 2 if known else 1, order, ZERO, motion.press, 1)
+        i = leading(g, 2 if known else 1, order, ZERO, motion.press, 1, 0.0)
         if i == order or g[i] < 0.0:
             return False
         motion.frictions[k, FrictionColumn.SKIP] = i

@@ -273,29 +273,37 @@ def margin_root(m, order, h, poly):
 
 
 @lean_jit
-def leading(coefficients, start, order, zero, size, base):
+def rate_of(coefficients, start, order, size, base, rate):
+    """The rate w at which coefficients grow from `size` on, the one at `base`: the least one, not
+    below `rate`, with which all from `start` on are at most size w^(k - base).
+    """
+    grown = rate ** (start - base)  # the power of the rate that coefficient k is compared with
+    for k in range(start, order):
+        ratio = abs(coefficients[k]) / size
+        # roots take long, and most coefficients grow no faster than one before
+        if ratio > (1.0 - ROUNDING_OF_POWERS) * grown:
+            rate = max(rate, ratio ** (1.0 / (k - base)))
+            grown = rate ** (k - base)
+        grown *= rate
+    return rate
+
+
+@jit
+def leading(coefficients, start, order, zero, size, base, rate):
     """The index from `start` on of the first coefficient that is more than rounding; `order` if
     there is none.
 
     The coefficients up to `base` exclusively are exactly 0 or not; `size` is the natural size of
     that at `base`, of which the share `zero` is rounding. With the rate w at which the later ones
-    grow from `size` on, the rounding of coefficient k is that times w^(k - base).
+    grow from `size` on, at least `rate`, the rounding of coefficient k is that times w^(k - base).
     """
     rounding = zero * size
     # the rate is needed only where the first coefficient does not decide
     first = abs(coefficients[start]) if start < order and start <= base else 0.0
     if first > (rounding if start == base else 0.0):
         return start
-    rate = 0.0
-    grown = 0.0  # the power of the rate that coefficient k is compared with
     if size > 0.0:
-        for k in range(max(start, base) + 1, order):
-            ratio = abs(coefficients[k]) / size
-            grown *= rate
-            # roots take long, and most coefficients grow no faster than one before
-            if ratio > (1.0 - ROUNDING_OF_POWERS) * grown:
-                rate = max(rate, ratio ** (1.0 / (k - base)))
-                grown = rate ** (k - base)
+        rate = rate_of(coefficients, max(start, base) + 1, order, size, base, rate)
     rounding *= rate ** max(start - base, 0)
     for k in range(start, order):
         if abs(coefficients[k]) > (rounding if k >= base else 0.0):

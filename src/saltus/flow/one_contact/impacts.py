@@ -120,7 +120,7 @@ def leave_or_stay(motion):
     note_press(motion)
     for i in range(motion.sides):
         side = 1 - 2 * i
-        skip = leading(b[i], 1 if released == side else 0, order, ZERO, motion.press, 0)
+        skip = leading(b[i], 1 if released == side else 0, order, ZERO, motion.press, 0, 0.0)
         if skip < order and b[i, skip] > 0.0 and (outward == 0 or motion.leave_by != motion.side):
             outward += 1
             motion.side = side

@@ -182,7 +182,7 @@ def first_release(motion, b, order, h, poly):
     first = NEVER
     released = 0
     for i in range(motion.sides):
-        skip = leading(b[i], 0, order, ZERO, motion.press, 0)
+        skip = leading(b[i], 0, order, ZERO, motion.press, 0, 0.0)
         if skip < order and b[i, skip] > 0.0:
             first = 0.0
             released = 0
