@@ -98,7 +98,7 @@ from saltus.flow.contacts.tangent import (
     slope,
 )
 from saltus.flow.kernel.layout import ZERO, EventCode, Status
-from saltus.flow.kernel.roots import leading, rate_of
+from saltus.flow.kernel.roots import growth_of, leading
 from saltus.flow.kernel.steps import (
     clear_shifts,
     expand,
@@ -121,7 +121,7 @@ def deciding(motion, coefficients, start, zero, size, base):
         return k
     rate = 0.0
     for i in range(motion.local):
-        rate = rate_of(motion.acceleration_series[i], 1, order - 1, motion.press, 0, rate)
+        rate = growth_of(motion.acceleration_series[i], 1, order - 1, motion.press, 0, rate)
     return leading(coefficients, start, order, zero, size, base, rate)
 
 

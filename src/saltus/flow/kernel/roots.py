@@ -273,7 +273,7 @@ def margin_root(m, order, h, poly):
 
 
 @lean_jit
-def rate_of(coefficients, start, order, size, base, rate):
+def growth_of(coefficients, start, order, size, base, rate):
     """The rate w at which coefficients grow from `size` on, the one at `base`: the least one, not
     below `rate`, with which all from `start` on are at most size w^(k - base).
     """
@@ -303,7 +303,7 @@ def leading(coefficients, start, order, zero, size, base, rate):
     if first > (rounding if start == base else 0.0):
         return start
     if size > 0.0:
-        rate = rate_of(coefficients, max(start, base) + 1, order, size, base, rate)
+        rate = growth_of(coefficients, max(start, base) + 1, order, size, base, rate)
     rounding *= rate ** max(start - base, 0)
     for k in range(start, order):
         if abs(coefficients[k]) > (rounding if k >= base else 0.0):
