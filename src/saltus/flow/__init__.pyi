@@ -64,6 +64,8 @@ from .motion.sensitivities import state_rates as state_rates
 from .motion.simulate import MotionRequest as MotionRequest
 from .motion.simulate import follow as follow
 from .motion.simulate import simulate as simulate
+from .motion.step_through import Pause as Pause
+from .motion.step_through import step_through as step_through
 from .motion.validity import Validity as Validity
 from .one_contact.regularity import ContactRegularity as ContactRegularity
 from .one_contact.regularity import contact_regularity as contact_regularity

@@ -25,6 +25,7 @@ from .graph import is_steep as is_steep
 from .graph import number as number
 from .graph import ordered as ordered
 from .graph import substitute as substitute
+from .kernels import MARKER as MARKER
 from .kernels import by_reference as by_reference
 from .kernels import cached_jit as cached_jit
 from .kernels import compiled_part as compiled_part
@@ -42,6 +43,8 @@ from .memory import shared_constants as shared_constants
 from .memory import tape as tape
 from .numba_types import Pointer as Pointer
 from .numba_types import function_type as function_type
+from .numba_types import members_of as members_of
+from .numba_types import result_count as result_count
 from .numba_types import written_type as written_type
 from .portable_text import C_FUNCTIONS as C_FUNCTIONS
 from .portable_text import elementary_texts as elementary_texts

@@ -41,7 +41,7 @@ from numba.extending import (
 from saltus.taylor.vectors import DOUBLE, INDEX, LONG
 
 
-def _members(kind: Any) -> tuple[Any, ...]:
+def members_of(kind: Any) -> tuple[Any, ...]:
     """The types of a tuple's values."""
     return tuple(kind.types)
 
@@ -333,7 +333,7 @@ def written_function(signature: Any) -> Any:
 
 def _llvm_types(kind: Any) -> list[Any]:
     if isinstance(kind, types.BaseTuple):
-        return [part for each in _members(kind) for part in _llvm_types(each)]
+        return [part for each in members_of(kind) for part in _llvm_types(each)]
     if isinstance(kind, types.Array):
         element = DOUBLE if isinstance(kind.dtype, types.Float) else LONG
         return [element.as_pointer(), *[LONG] * (kind.ndim - 1)]
@@ -350,7 +350,7 @@ def given_arguments(signature: Any, function: Any) -> tuple[Any, ...]:
 
 def _assembled(kind: Any, waiting: Iterator[Any]) -> Any:
     if isinstance(kind, types.BaseTuple):
-        return tuple(_assembled(each, waiting) for each in _members(kind))
+        return tuple(_assembled(each, waiting) for each in members_of(kind))
     first = next(waiting)
     if isinstance(kind, types.Array):
         return Array(first, (None, *(next(waiting) for _ in range(kind.ndim - 1))))
@@ -381,7 +381,7 @@ def argument(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         parts = [builder.extract_value(value, i) for i in range(len(kind))]
         return tuple(
             argument(context, builder, each, part)
-            for each, part in zip(_members(kind), parts, strict=True)
+            for each, part in zip(members_of(kind), parts, strict=True)
         )
     return value
 

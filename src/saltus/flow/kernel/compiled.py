@@ -66,7 +66,7 @@ from saltus.taylor.vectors import SCALAR
 
 # length of a series at the tightest tolerance: order 21, hence 23 coefficients, rounded up to pairs
 MOST_COEFFICIENTS = 24
-_SIGNATURES = f"""import math
+KERNEL_HEADER = f"""import math
 
 import numpy as np
 
@@ -174,9 +174,30 @@ def fill_matrices(function, env, piece, state, numbers):
 @cache
 def load_fillers() -> tuple[Callable[..., None], ...]:
     """Functions that call a structure's `constants`, `geometry` and `matrices` with arrays."""
-    module = load_module("fillers", _SIGNATURES + _FILLERS)
+    module = load_module("fillers", KERNEL_HEADER + _FILLERS)
     functions = module.fill_constants, module.fill_geometry, module.fill_matrices
     return tuple(map(entry_point, functions))
+
+
+# The files of which the kernels are made, in the order of their text.
+ONE_CONTACT_PARTS = (layout, roots, steps, impacts, kernel, loop)
+CONTACTS_PARTS = (
+    layout,
+    roots,
+    steps,
+    contact_layout,
+    rows,
+    complementarity,
+    held_rows,
+    contact_impacts,
+    tangent,
+    propagators,
+    rubbing,
+    frictions,
+    closings,
+    contacts_kernel,
+    loop,
+)
 
 
 @cache
@@ -194,7 +215,7 @@ def kernel_module() -> ModuleType:
 
 def one_contact_text() -> str:
     """The source of the kernel of models with at most one contact."""
-    return kernel_text(layout, roots, steps, impacts, kernel, loop)
+    return kernel_text(*ONE_CONTACT_PARTS)
 
 
 @cache
@@ -212,26 +233,12 @@ def contacts_module() -> ModuleType:
 
 def contacts_text() -> str:
     """The source of the kernel of models with several contacts."""
-    parts = (
-        contact_layout,
-        rows,
-        complementarity,
-        held_rows,
-        contact_impacts,
-        tangent,
-        propagators,
-        rubbing,
-        frictions,
-        closings,
-    )
-    return kernel_text(layout, roots, steps, *parts, contacts_kernel, loop).replace(
-        "(ADVANCE)", "(ADVANCE_CONTACTS)"
-    )
+    return kernel_text(*CONTACTS_PARTS).replace("(ADVANCE)", "(ADVANCE_CONTACTS)")
 
 
 def kernel_text(*modules: ModuleType) -> str:
     """One source of the compiled parts of several files."""
-    return _SIGNATURES + "".join(compiled_part(module) for module in modules)
+    return KERNEL_HEADER + "".join(compiled_part(module) for module in modules)
 
 
 def load_structure(trace: Trace) -> CompiledStructure:

@@ -474,7 +474,7 @@ def follow(request: MotionRequest, progress: Progress, run: Program | None = Non
     status, numbers = _advance(request, made, now, recorder, progress)
     if run is None and status == Status.DONE and recorder.is_short:
         remember(request, made)
-    motion = _collect(request, now, status, numbers, recorder)
+    motion = collected(request, now, status, numbers, recorder)
     if motion.limit is not None and motion.time == motion.start:
         _refuse_paradox(motion)
     return Followed(motion, now, recorder)
@@ -514,7 +514,7 @@ def _advance(
             progress((time - begin) / (end - begin), WHAT)
         if status not in GOES_ON:
             if status != Status.DONE:
-                _refuse(system, status, now)
+                refuse(system, status, now)
             return status, numbers
         if recorder.total > counted + many:
             if time < checked_at + _time_scale(system, numbers) * many / MOST.rate:
@@ -582,7 +582,7 @@ def _refuse_crushed(system: System, now: KernelState, chosen: list[int]) -> None
         raise MotionError(sentence)
 
 
-def _refuse(system: System, status: int, now: KernelState) -> None:
+def refuse(system: System, status: int, now: KernelState) -> None:
     """Raise an error, with a sentence, for a status that is no regular end of a motion."""
     numbers = now.numbers
     time = time_of(numbers)
@@ -670,7 +670,7 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
     return None
 
 
-def _collect(
+def collected(
     request: MotionRequest, now: KernelState, status: int, numbers: Any, recorder: Recorder
 ) -> Motion:
     """The motion from the kernel's last state and its records."""
@@ -689,7 +689,7 @@ def _collect(
         stop = Stop.LIMIT
         limit = request.limits[events.details[-1]]
     if status == Status.STALLED:
-        # `_refuse` lets no other motion stall
+        # `refuse` lets no other motion stall
         stop = Stop.SINGULAR
         limit = request.system.model.singularity
     samples = (
