@@ -12,8 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus
-from saltus import Contact, NewtonImpact, Surface
-from saltus.errors import ParameterError
+from saltus import Contact, Friction, NewtonImpact, Surface
+from saltus.errors import MotionError, ParameterError
 from saltus.flow import sensitivities, simulate
 from saltus.systems import ContactModel, Harmonic, Load, System
 
@@ -333,7 +333,109 @@ class Signed(ContactModel):
     channels: ClassVar[tuple[str, ...]] = ("force",)
 
     def force(self, t, x, velocity, load):
-        return load.force(t) - 0.3 * np.sign(velocity)
+        return load.force(t) - 0.2 * x - 0.3 * np.sign(velocity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rubbed(ContactModel):
+    """The same as `Signed`, by a friction."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    frictions: ClassVar[tuple[Friction, ...]] = (Friction(name="rub", coordinate="x", kinetic=0.3),)
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - 0.2 * x
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controlled(ContactModel):
+    """A double integrator under a force that jumps with the sign of x' + rate x."""
+
+    rate: float = 0.7
+    force_size: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    def force(self, t, x, velocity, load):
+        return load.force(t) - self.force_size * np.sign(velocity + self.rate * x)
+
+
+@pytest.mark.parametrize("start", [{"x": 0.0, "velocity": 0.0}, {"x": 0.2, "velocity": 1.0}])
+@pytest.mark.parametrize(
+    "signal", [Harmonic(0.7), saltus.Record([0, 1, 2, 3, 60], [0, 1, -1, 0.5, 0.4])]
+)
+def test_a_force_with_the_sign_of_the_velocity_is_dry_friction(start, signal):
+    load = Load(frequency=1.1, force=signal)
+    signed = simulate(System(model=Signed(), load=load), **start, duration=25.0)
+    rubbed = simulate(System(model=Rubbed(), load=load), **start, duration=25.0)
+    assert math.isclose(signed.position, rubbed.position, abs_tol=1e-10)
+    assert math.isclose(signed.velocity, rubbed.velocity, abs_tol=1e-10)
+    for kind in ("stick", "slip"):
+        # the friction's events at the start and its rests are no events of a surface
+        times = [
+            [e.time for e in motion.events if str(e.kind) == kind and e.time > 0.0]
+            for motion in (signed, rubbed)
+        ]
+        assert np.allclose(*times, rtol=0.0, atol=1e-9)
+
+
+def test_derivatives_while_it_sticks_are_those_of_dry_friction():
+    load = Load(frequency=1.1, force=Harmonic(0.7))
+    path = "load.force.amplitude"
+    found = [
+        sensitivities(
+            System(model=model, load=load), x=0.2, velocity=1.0, parameters=(path,), duration=23.0
+        )
+        for model in (Signed(), Rubbed())
+    ]
+    assert str(found[0].motion.events[-1].kind) in {"stick", "slip", "crossing"}
+    assert np.allclose(found[0].state, found[1].state, rtol=0.0, atol=1e-9)
+    assert np.allclose(found[0].parameters, found[1].parameters, rtol=0.0, atol=1e-9)
+
+
+def test_a_motion_slides_along_a_function_as_filippov_has_it():
+    """Once on x' = -rate x it stays there, x = x_0 exp(-rate t), while the force can hold it."""
+    system = System(model=Controlled(), load=Load(force=0.2))
+    motion = simulate(system, x=1.0, velocity=0.0, duration=12.0)
+    stick = next(event for event in motion.events if str(event.kind) == "stick")
+    assert [str(event.kind) for event in motion.events] == ["stick"]
+    # until then x'' = 0.2 - 1: x' + 0.7 x = 0.7 - 0.8 t - 0.28 t^2
+    time = (-0.8 + math.sqrt(0.8**2 + 4.0 * 0.28 * 0.7)) / (2.0 * 0.28)
+    assert math.isclose(stick.time, time, abs_tol=1e-13)
+    place = 1.0 - 0.4 * time**2
+    expected = place * math.exp(-0.7 * (12.0 - time))
+    assert math.isclose(motion.position, expected, abs_tol=1e-13)
+    assert math.isclose(motion.velocity, -0.7 * expected, abs_tol=1e-13)
+
+
+def test_a_function_between_sides_that_lead_away_is_refused():
+    @dataclass(frozen=True, kw_only=True)
+    class Away(ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+
+        def force(self, t, x, velocity, load):
+            return np.sign(velocity)
+
+    with pytest.raises(MotionError, match="is not unique"):
+        simulate(System(model=Away()), x=0.0, velocity=0.0, duration=1.0)
+
+
+def test_orbits_that_slide_are_refused_in_one_sentence():
+    @dataclass(frozen=True, kw_only=True)
+    class Declared(Signed):
+        surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="rub", function="speed"),)
+
+        def speed(self, t, x, velocity, load):
+            return velocity
+
+        def force(self, t, x, velocity, load, sides):
+            return load.force(t) - 0.2 * x - 0.3 * sides.rub
+
+    system = System(model=Declared(), load=Load(frequency=1.1, force=Harmonic(0.5)))
+    with pytest.raises(MotionError, match="slides along a surface"):
+        saltus.find_orbit(system, x=0.0)
 
 
 def test_ensembles_have_the_motions_of_each():

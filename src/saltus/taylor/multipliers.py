@@ -138,7 +138,7 @@ def _row_of_gap(trace: Any, name: str, gap: Expr) -> HeldRow:
     entries = [differentiate(gap, Expr("coordinate", (), i)) for i in range(trace.dof)]
     if all(entry is number(0.0) for entry in entries):
         raise TraceError(f"{trace.model}: the gap of {name!r} depends on no coordinate")
-    return _row(trace, gap, entries, _time_derivative(trace, gap))
+    return _row(trace, gap, entries, time_derivative(trace, gap))
 
 
 def _friction_row(trace: Any, model: Any, part: Any, t: Any, q: Any, v: Any, load: Any) -> HeldRow:
@@ -185,7 +185,7 @@ def _kept(model: Any, part: Any, t: Any, q: Any, load: Any) -> Any:
 @comparing_symbols(refused=False)
 def _rate_of(trace: Any, root: Expr) -> Expr:
     """The time derivative of an expression of time and coordinates."""
-    return _rate(trace, root, _time_derivative(trace, root))
+    return _rate(trace, root, time_derivative(trace, root))
 
 
 def _row(trace: Any, value: Expr, entries: list[Expr], drift: Expr) -> HeldRow:
@@ -206,7 +206,7 @@ def _rate(trace: Any, root: Expr, drift: Expr) -> Expr:
     return total
 
 
-def _time_derivative(trace: Any, root: Expr) -> Expr:
+def time_derivative(trace: Any, root: Expr) -> Expr:
     """The partial derivative of an expression to the time; the records that it reads are noted."""
     for node in ordered([root]):
         if node.op == "record":

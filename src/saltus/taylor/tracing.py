@@ -51,13 +51,14 @@ from saltus.taylor.memory import (
     mode_block,
     without_modes,
 )
-from saltus.taylor.multipliers import held_motion
+from saltus.taylor.multipliers import held_motion, time_derivative
 from saltus.taylor.switches import Switches, called, pointwise
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
 FREQUENCY = "load.frequency"
+NO_SHARE = number(2.0)  # of the sides of a function along which no motion slides
 MOST_BITS = (
     62  # of contacts, and two for each friction, surface and switch, in the number of a mode
 )
@@ -257,7 +258,7 @@ class Trace:
                 f" most {(MOST_BITS - count) // 2 - first} can be followed beside its parts"
             )
         empty = [number(0.0)] * more
-        margins = [x for function in functions for x in (function, number(1.0))]
+        margins = [x for function in functions for x in (function, NO_SHARE)]
         series = self.reactions
         last = count + 2 * first
         held = last + count + first if self.rows else last
@@ -272,6 +273,57 @@ class Trace:
         self.ground_speeds = self.ground_speeds + empty
         self.friction_coordinates += (-1 - self.dof,) * more
         self.switches = tuple(called(function, names, self.parameters) for function in functions)
+
+    def let_slide(self) -> None:
+        """Let the equations hold along functions too, with 0 for a side: there the accelerations
+        are the mean of both sides by which the function stays at 0 (Filippov),
+
+            h'(s) = (p + m s) / 2,    s = -p / m,
+
+        with the sum p and the difference m of its rates on the sides +1 and -1. That s stands in
+        the place of the second margin.
+        """
+        found = dict[Expr, Any]()
+        declared = len(self.friction_coordinates) - len(self.switches)
+        for k in self.functions:
+            side = Expr("slide", (), k)
+            place = len(self.signs) + 2 * k
+            if k >= declared and k not in self.jumping:
+                continue
+            if any(side in ordered([differentiate(a, side)]) for a in self.acceleration):
+                continue  # no mean of both sides
+            above, below = (
+                self.rate_along(
+                    substitute(self.reactions[place], {side: s}),
+                    [substitute(a, {side: s}) for a in self.acceleration],
+                )
+                for s in (1.0, -1.0)
+            )
+            apart = above - below
+            if apart is number(0.0):
+                continue
+            share = -((above + below) * apart) / (apart * apart + side * side)
+            self.reactions[place + 1] = share
+            found[side] = side + (1.0 - side * side) * share
+        if found:
+            for roots in (self.acceleration, self.reactions):
+                shares = {len(self.signs) + 2 * k + 1 for k in self.functions}
+                for i, root in enumerate(roots):
+                    if roots is self.acceleration or i not in shares:
+                        roots[i] = substitute(root, found)
+            self.margins = {name: substitute(x, found) for name, x in self.margins.items()}
+
+    def rate_along(self, root: Expr, accelerations: list[Expr]) -> Expr:
+        """The time derivative of an expression of the state along the motion."""
+        total = time_derivative(self, root)
+        moving = self.dof - self.first_order
+        for i, acceleration in enumerate(accelerations[: self.dof]):
+            q, v = (Expr(op, (), i) for op in ("coordinate", "velocity"))
+            rate = v if i < moving else acceleration
+            total = total + differentiate(root, q) * rate
+            if i < moving:
+                total = total + differentiate(root, v) * acceleration
+        return total
 
     def append_tangent(self, paths: tuple[str, ...]) -> None:
         """Append the tangent's columns as further coordinates; coordinate dof + j dof + d is u_d of
@@ -432,6 +484,7 @@ def trace(
         first = len(result.friction_coordinates)
         result.jumping = frozenset(first + place for place in switches.jumping)
         result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
+        result.let_slide()
     if energy:
         result.margins["kinetic_energy"] = combine(
             "add", ask_user(model, "kinetic_energy", t, q, v, side, load), 0.0
@@ -572,7 +625,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         else combine("add", model.value_of_function(part, t, q, v, load), 0.0)
         for part in model.surfaces
     ]
-    beside = [x for function in functions for x in (function, number(1.0))]
+    beside = [x for function in functions for x in (function, NO_SHARE)]
     if local < result.dof:
         q, v = local_parts(q, v, local)
     a, slides = (

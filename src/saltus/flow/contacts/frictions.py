@@ -51,6 +51,8 @@ ALIKE = 1e-12
 # A coefficient of a function is rounding if its term in the natural time is a smaller share of the
 # largest one.
 VANISHES = 1e-13
+# A motion is at 0 of a function if this is a smaller share of its terms in the natural time.
+IS_ON = 1e-12
 
 
 @lean_jit
@@ -63,7 +65,7 @@ def hold_frictions(motion):
         motion.parameters[first - 2 - motion.frictions.shape[0] + k] = (
             1.0 * slides if slides != 2 else 0.0
         )
-        if slides != 0:
+        if slides != 0 or is_function(motion, k):
             continue
         if motion.multipliers > 0:
             idle = motion.frictions[k, FrictionColumn.IDLE]
@@ -98,7 +100,7 @@ def is_to_read(motion, k):
     """Whether the side of a function is to be chosen: it has just been reached, or may have
     jumped."""
     row = motion.frictions[k]
-    found = row[FrictionColumn.REACHED] == 3 or row[FrictionColumn.STRUCK] == FrictionImpact.JUMPED
+    found = row[FrictionColumn.REACHED] > 0 or row[FrictionColumn.STRUCK] == FrictionImpact.JUMPED
     return found and is_function(motion, k)
 
 
@@ -126,14 +128,14 @@ def side_ahead(motion, k):
     row = motion.frictions[k]
     series = motion.margin_series[motion.contacts.shape[0] + 2 * k]
     row[FrictionColumn.SKIP] = 0
-    if row[FrictionColumn.REACHED] != 3 and series[0] != 0.0:
-        return 1 if series[0] > 0.0 else -1
     unit = time_scale(motion)
     size = 0.0
     power = 1.0
     for i in range(1, motion.order + 1):
         power *= unit
         size = max(size, abs(series[i]) * power)
+    if row[FrictionColumn.REACHED] == 0 and abs(series[0]) > IS_ON * size:
+        return 1 if series[0] > 0.0 else -1
     power = 1.0
     for i in range(1, motion.order + 1):
         power *= unit
@@ -144,22 +146,72 @@ def side_ahead(motion, k):
 
 
 @lean_jit
+def some_slide(motion, k):
+    """Whether the motion slides along another function."""
+    found = False
+    for other in range(motion.frictions.shape[0]):
+        slides = motion.frictions[other, FrictionColumn.SLIDES]
+        found = found or (other != k and is_function(motion, other) and slides == 0)
+    return found
+
+
+@lean_jit
+def stays(motion, k, t):
+    """Whether a motion that has slid along a function is still at its 0, by the size of the
+    function's terms on a side."""
+    row = motion.frictions[k]
+    row[FrictionColumn.SLIDES] = 1
+    hold_frictions(motion)
+    expand(motion, t, 1.0, motion.order)
+    series = motion.margin_series[motion.contacts.shape[0] + 2 * k]
+    unit = time_scale(motion)
+    size = 0.0
+    power = 1.0
+    for i in range(1, motion.order + 1):
+        power *= unit
+        size = max(size, abs(series[i]) * power)
+    row[FrictionColumn.SLIDES] = 0
+    return abs(series[0]) <= IS_ON * size or row[FrictionColumn.REACHED] > 0
+
+
+@lean_jit
 def choose_sides(motion, t):
     """Choose the sides of the functions that are to be read: those to which the motion moves on.
+
+    Where both sides push the motion back it slides along the function, if no other one does.
 
     0 if there are none, or if both sides of one lead away from it; else 1, or 2 if one has changed.
     """
     changed = 1
     agrees = False
-    for _ in range(1 + 2 * motion.frictions.shape[0]):
+    turned = 0  # those that have changed, as bits
+    for k in range(motion.frictions.shape[0]):
+        row = motion.frictions[k]
+        if is_to_read(motion, k) and row[FrictionColumn.SLIDES] == 0 and not stays(motion, k, t):
+            row[FrictionColumn.SLIDES] = 1
+            changed = 2
+    for _ in range(2 + 3 * motion.frictions.shape[0]):
         hold_frictions(motion)
         expand(motion, t, 1.0, motion.order)
         agrees = True
         for k in range(motion.frictions.shape[0]):
             row = motion.frictions[k]
-            ahead = side_ahead(motion, k) if is_to_read(motion, k) else 0
-            if ahead == -row[FrictionColumn.SLIDES] and ahead != 0:
+            slides = row[FrictionColumn.SLIDES]
+            if not is_to_read(motion, k):
+                continue
+            if slides == 0:
+                within = abs(motion.margin_series[motion.contacts.shape[0] + 2 * k + 1, 0]) < 1.0
+                if not within:
+                    return 0
+                continue
+            ahead = side_ahead(motion, k)
+            if ahead == -slides:
                 row[FrictionColumn.SLIDES] = ahead
+                if turned >> k & 1:
+                    row[FrictionColumn.SLIDES] = 0
+                    if some_slide(motion, k):
+                        return 0
+                turned |= 1 << k
                 agrees = False
                 changed = 2
         if agrees:
@@ -177,7 +229,7 @@ def lead_one_way(motion, t):
     for k in range(motion.frictions.shape[0]):
         row = motion.frictions[k]
         skip = row[FrictionColumn.SKIP]
-        if is_to_read(motion, k) and skip > 0:
+        if is_to_read(motion, k) and skip > 0 and row[FrictionColumn.SLIDES] != 0:
             row[FrictionColumn.SLIDES] *= -1
             hold_frictions(motion)
             expand(motion, t, 1.0, motion.order)
@@ -284,13 +336,16 @@ def friction_step_size(motion, count, natural, longest):
     tol = motion.tolerance
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for k in range(motion.frictions.shape[0]):
+        if is_function(motion, k):
+            slides = motion.frictions[k, FrictionColumn.SLIDES] == 0
+            place = count + 2 * k + (1 if slides else 0)
+            natural = guard_step(motion, place, natural, longest)
+            continue
         if motion.frictions[k, FrictionColumn.SLIDES] == 0 and not leans(motion, k):
             r = motion.margin_series[count + 2 * k : count + 2 * k + 2]
             size = max(margin_size(motion, k), abs(r[0, 0]))
             if size > 0.0:
                 natural = min(natural, step_size(r, motion.order, size, sharp))
-        if is_function(motion, k):
-            natural = guard_step(motion, count + 2 * k, natural, longest)
     return natural
 
 
@@ -312,7 +367,15 @@ def first_friction(motion, count, h, whole):
         for b in range(0 if slides == 2 or (slides == 0 and leans(motion, k)) else 2):
             known = skip
             guard = motion.gap_series
-            if slides == 0:
+            if slides == 0 and is_function(motion, k):
+                # the share of its sides with which it slides, up to the side +1 or -1
+                known = 0
+                for i in range(order + 1):
+                    guard[i] = (2.0 * b - 1.0) * motion.margin_series[count + 2 * k + 1, i]
+                guard[0] += 1.0
+                if guard[0] < 0.0:
+                    return k, 0.0, b, False
+            elif slides == 0:
                 known = skip if motion.frictions[k, FrictionColumn.MARGIN] == b else 0
                 guard = motion.margin_series[count + 2 * k + b]
                 beyond = known == 0 and guard[0] < 0.0
@@ -351,10 +414,10 @@ def reach_ground_speed(motion, count, t, k, which, later):
     if motion.columns > 0:
         expand(motion, t, 1.0, 1)
         row = -1  # of the margins, whose series is the guard
-        if which < 2:
+        if is_function(motion, k):
+            row = count + 2 * k + (1 if which < 2 else 0)
+        elif which < 2:
             row = count + 2 * k + which
-        elif is_function(motion, k):
-            row = count + 2 * k
         elif motion.multipliers > 0 and not crossed:
             row = row_series(motion, count + k)
         if row >= 0:
@@ -380,6 +443,7 @@ def reach_ground_speed(motion, count, t, k, which, later):
         motion.slide_rates[k] = 0.0
     elif which == 2:
         motion.velocities[rest] = ground_speed(motion, k)
+    later = later or is_function(motion, k)
     motion.frictions[k, FrictionColumn.REACHED] = 3 if which == 2 else 1 + which if later else 4
 
 
@@ -399,9 +463,12 @@ def undecided(motion):
         turns = turns or motion.frictions[k, FrictionColumn.REACHED] > 0
     for k in range(motion.frictions.shape[0]):
         if is_surface(motion, k):
-            if motion.frictions[k, FrictionColumn.REACHED] == 3:
+            reached = motion.frictions[k, FrictionColumn.REACHED]
+            if reached == 3:
                 motion.frictions[k, FrictionColumn.SLIDES] *= -1
                 motion.frictions[k, FrictionColumn.SKIP] = 1
+            elif reached > 0:  # what slid along it leaves it
+                motion.frictions[k, FrictionColumn.SLIDES] = 1 if reached != 2 else -1
             continue
         rate = friction_rate(motion, k)
         slides = motion.frictions[k, FrictionColumn.SLIDES]
@@ -532,7 +599,7 @@ def record_slides(motion, before, t):
         before //= 4
         # the side that a motion leaves a surface to, on which it was, is no passage of it
         on_side = is_surface(motion, k)
-        on_side = on_side and motion.frictions[k, FrictionColumn.REACHED] != 3
+        on_side = on_side and motion.frictions[k, FrictionColumn.REACHED] == 0
         if slides != was and slides != 2 and was != 2 and not on_side:
             kind = (
                 EventCode.SLIP
@@ -541,7 +608,7 @@ def record_slides(motion, before, t):
                 if slides == 0
                 else EventCode.REVERSAL
             )
-            if is_surface(motion, k):
+            if is_surface(motion, k) and slides == -was:
                 kind = EventCode.CROSSING
             record_contact_event(motion, kind, 1 << (motion.contacts.shape[0] + k), t)
             note_shifts(motion, motion.shifts)
@@ -631,7 +698,11 @@ def held_by(motion, row):
             else -1
         )
     k = row - count
-    if motion.frictions[k, FrictionColumn.SLIDES] != 0 or leans(motion, k):
+    if (
+        motion.frictions[k, FrictionColumn.SLIDES] != 0
+        or is_function(motion, k)
+        or leans(motion, k)
+    ):
         return -1
     return motion.frictions[k, FrictionColumn.COORDINATE]
 

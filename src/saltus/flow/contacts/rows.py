@@ -29,6 +29,7 @@ from saltus.flow.contacts.layout import (
     FrictionImpact,
     NoPress,
     first_row,
+    is_function,
     is_surface,
 )
 from saltus.taylor import lean_jit
@@ -100,6 +101,8 @@ def is_held(motion, r):
     if r < count:
         row = motion.contacts[r]
         return row[ContactColumn.CLOSED] == 1 and row[ContactColumn.IDLE] == 0
+    if is_function(motion, r - count):
+        return False
     friction = motion.frictions[r - count]
     return friction[FrictionColumn.SLIDES] == 0 and friction[FrictionColumn.IDLE] == 0
 

@@ -593,9 +593,9 @@ def refuse(system: System, status: int, now: KernelState) -> None:
     if status == Status.NOT_UNIQUE and now.undecided:
         names = " and ".join(repr(name) for name in now.undecided)
         raise MotionError(
-            f"the motion slides along {names} at time {time:.9g}, or is not unique: the forces on its"
-            " two sides both push the motion to it, or both away, which is not followed so far; a"
-            " force that jumps with the sign of a velocity is a Friction"
+            f"at time {time:.9g} the motion is at 0 of {names}, and how it goes on is not known: both"
+            " sides lead away, so that it is not unique, or it would slide along several functions at"
+            " once, or along one in whose side the force is not linear; start beside it"
         )
     in_rows = system.model.has_multipliers
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and in_rows:

@@ -20,6 +20,7 @@ import numpy as np
 from saltus.continuation import Bounds, Cut, End, TestFunction, Zero
 from saltus.errors import MotionError, SaltusError
 from saltus.flow import (
+    EventCode,
     Motion,
     MotionRequest,
     RowValues,
@@ -116,6 +117,11 @@ class WholeMotionEquations(OrbitEquations):
             or twice.limit is not None
         ):
             return None
+        if slides_along(twice):
+            raise MotionError(
+                "the motion slides along a surface that is a function, and such orbits are not"
+                " followed so far; where it is dry friction, give the model a Friction"
+            )
         end = twice.start + motion.duration
         within = (twice.start < twice.events.times) & (twice.events.times < end)
         if not within.any() and 0 in twice.sliding.values():
@@ -428,7 +434,7 @@ class WholeMotionEquations(OrbitEquations):
             return None
         motion = found.motion
         parameters = found.parameters.copy()
-        if motion.limit is not None or found.undefined is not None:
+        if motion.limit is not None or found.undefined is not None or slides_along(motion):
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
@@ -555,6 +561,16 @@ class WholeMotionEquations(OrbitEquations):
                 0, SegmentColumn.LEAST_MARGIN : SegmentColumn.LEAST_MARGIN + len(self.margins)
             ] = [least[name] for name in self.margins]
         return extremes
+
+
+def slides_along(motion: Motion) -> bool:
+    """Whether a motion slides along a function: one sticks to it, or leaves it."""
+    model = motion.system.model
+    if not model.has_switches:
+        return False
+    codes = motion.events.codes
+    surfaces = codes[:, 1] >> (len(model.contacts) + len(model.frictions))
+    return bool(np.any(np.isin(codes[:, 0], (EventCode.STICK, EventCode.SLIP)) & (surfaces != 0)))
 
 
 def _raised(path: str, by: complex, at: str, value: Any) -> Any:
