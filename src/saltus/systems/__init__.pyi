@@ -90,6 +90,7 @@ from .states import states_beside as states_beside
 from .states import unit_of_time as unit_of_time
 from .states import within_window as within_window
 from .structure import mode_sums as mode_sums
+from .system import OWN_TIME as OWN_TIME
 from .system import System as System
 from .system import check_system as check_system
 from .system_units import NaturalUnits as NaturalUnits

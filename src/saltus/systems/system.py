@@ -34,6 +34,9 @@ from saltus.systems.serial import (
 )
 from saltus.systems.system_units import units_of_gaps
 
+OWN_TIME = "own time"  # that of a system with which numbers
+# what a copy with other numbers remembers of the system that it is a copy of
+HANDED_OVER = ("structure", OWN_TIME)
 PARTS = ("model", "load", "impact")  # of a system, in the order of its numbers
 
 
@@ -157,7 +160,7 @@ class System:
         """
         memory = vars(self).get("_memory")
         if isinstance(memory, dict) and differ_in_numbers(self, other, changes):
-            kept = {name: memory[name] for name in ("structure",) if name in memory}
+            kept = {name: memory[name] for name in HANDED_OVER if name in memory}
             if "numbers" in memory:
                 kept["shared numbers"] = {
                     name: memory["numbers"][name]
@@ -165,6 +168,10 @@ class System:
                     if getattr(self, name) is getattr(other, name)
                 }
             vars(other)["_memory"] = kept
+            own, others = self._in_gaps, other._in_gaps
+            within = None if own is None else vars(own).get("_memory")
+            if isinstance(within, dict) and OWN_TIME in within and others is not None:
+                vars(others)["_memory"] = {OWN_TIME: within[OWN_TIME]}
 
     @property
     def numbers_in_order(self) -> list[float]:

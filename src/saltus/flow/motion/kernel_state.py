@@ -46,6 +46,7 @@ from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
 from saltus.systems import (
     CLOSED_BELOW,
+    OWN_TIME,
     inert_frictions,
     slowest_own_time,
     time_without_period,
@@ -68,6 +69,10 @@ SLOW_LOAD = 1e4
 # what `SLOW_LOAD` asks. It spares most systems their own time, which takes ten times as long to
 # find as a short motion.
 NEVER_SLOW = 1e3
+# The time of a system is not looked for again in a copy with other numbers if the system's own one
+# is longer than the load's by this factor and by this power of the largest ratio between numbers.
+FAR_FROM_SLOW = 10.0
+POWER_OF_RATIO = 3
 NO_COORDINATE = -1  # of a contact whose gap is a row
 NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
 
@@ -96,8 +101,35 @@ def longest_time(system: System, length: float = math.inf, run: Program | None =
     """
     if run is not None and 0.0 < length * _highest_rate(run) <= NEVER_SLOW:
         return _without_period(system)
+    if run is None or not 0.0 < length < math.inf:
+        return _remembered_time(system)
+    numbers = run.env[0][: len(run.trace.parameters)].copy()
+    # made here, or handed over by a system of which this is a copy with other numbers
+    time, of_numbers = system._remembered(OWN_TIME, lambda: (_remembered_time(system), numbers))
+    ratio = _largest_ratio(of_numbers, numbers)
+    if ratio == 1.0:
+        return float(time)
+    if time > FAR_FROM_SLOW * ratio**POWER_OF_RATIO * length / (2.0 * math.pi):
+        return _without_period(system)
+    return _remembered_time(system)
+
+
+def _remembered_time(system: System) -> float:
     found: float = system._remembered(longest_time, lambda: _own_time(system))
     return found
+
+
+def _largest_ratio(some: np.ndarray, others: np.ndarray) -> float:
+    """The largest ratio between numbers and others, 1 for the same ones alone; inf where signs
+    differ.
+    """
+    if np.array_equal(some, others):
+        return 1.0
+    if not np.array_equal(np.sign(some), np.sign(others)):
+        return math.inf
+    held = some != 0.0
+    apart = np.abs(np.log(np.abs(some[held])) - np.log(np.abs(others[held])))
+    return max(math.exp(min(float(apart.max()), 100.0)), math.nextafter(1.0, 2.0))
 
 
 def natural_times(system: System) -> dict[str, float | None]:
