@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
-equal, measure, reference, report = (
-    __import__(name) for name in ("equal", "measure", "reference", "report")
+equal, harmonic_balance, measure, reference, report = (
+    __import__(name) for name in ("equal", "harmonic_balance", "measure", "reference", "report")
 )
 from auto import case, diagram, exact, program, section, verdicts  # noqa: E402
 from peers.peer import AbsentError  # noqa: E402
@@ -366,3 +366,25 @@ def test_what_the_smallest_steps_do_not_reach_is_extrapolated_at_first_order() -
     assert at_error(steps, 5e-4) == (pytest.approx(2.0), True)
     assert at_error(steps, 1e-5) == (pytest.approx(100.0), False)
     assert math.isnan(at_error({"fails": "over 60 s"}, 1e-5)[0])
+
+
+def test_harmonic_balance_has_the_closed_form_of_a_linear_oscillator(monkeypatch) -> None:
+    monkeypatch.setattr(harmonic_balance, "STOP", 0.0)
+    balance = harmonic_balance.Balance(5)
+    places = balance.curve()
+    frequency = harmonic_balance.SEEN
+    answer = harmonic_balance.FORCE / complex(
+        1.0 - frequency**2, harmonic_balance.DAMPING * frequency
+    )
+    assert balance.largest(places) == pytest.approx(abs(answer), rel=1e-6)
+
+
+def test_the_jacobian_of_harmonic_balance_is_that_of_differences() -> None:
+    balance = harmonic_balance.Balance(4)
+    place = np.append(0.3 * np.cos(np.arange(9.0)), 1.1)
+    _, derivatives = balance.evaluate(place)
+    for i, column in enumerate(derivatives.T):
+        step = np.zeros(10)
+        step[i] = 1e-6
+        ahead, behind = (balance.evaluate(place + sign * step)[0] for sign in (1, -1))
+        np.testing.assert_allclose(column, (ahead - behind) / 2e-6, atol=1e-4)
