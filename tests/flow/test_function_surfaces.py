@@ -410,6 +410,57 @@ def test_a_motion_slides_along_a_function_as_filippov_has_it():
     assert math.isclose(motion.velocity, -0.7 * expected, abs_tol=1e-13)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Thermostat(ContactModel):
+    """A heater that is on below a temperature, which is a coordinate of first order."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("warmth",)
+    first_order: ClassVar[tuple[str, ...]] = ("warmth",)
+    surfaces: ClassVar[tuple[Surface, ...]] = (
+        Surface(name="low", coordinate="warmth", position=19.0),
+    )
+
+    def force(self, t, warmth, velocity, load, sides):
+        return -0.1 * (warmth - 10.0) + 3.0 * (1.0 - sides.low) / 2.0
+
+
+def test_a_thermostat_without_memory_stays_at_its_temperature():
+    """On, the temperature is 40 - 22 exp(-t / 10), which is 19 at 10 log(22 / 21)."""
+    motion = simulate(System(model=Thermostat()), warmth=18.0, duration=50.0)
+    assert [(str(event.kind), event.contact) for event in motion.events] == [("stick", "low")]
+    assert math.isclose(motion.events[0].time, 10.0 * math.log(22.0 / 21.0), abs_tol=1e-13)
+    assert math.isclose(motion.position, 19.0, abs_tol=1e-13)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Copied(ContactModel):
+    """`Thrown`, with a copy of its velocity as a coordinate of first order, whose surface it passes
+    at impacts too."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("height", "rate")
+    first_order: ClassVar[tuple[str, ...]] = ("rate",)
+    contacts: ClassVar[tuple[Contact, ...]] = (Contact(name="floor", coordinate="height"),)
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="up", coordinate="rate"),)
+
+    def force(self, t, q, velocity, load, sides):
+        pull = -9.81 - 0.02 * sides.up * q[1] ** 2
+        return pull, pull
+
+    def after_impact(self, contact, q, velocity):
+        return (-0.8 * q[1],)
+
+
+def test_a_coordinate_of_first_order_jumps_through_a_surface_at_an_impact():
+    law = NewtonImpact(0.8)
+    copied = simulate(
+        System(model=Copied(), impact=law), height=1.0, velocity=(0.0, 0.0), rate=0.0, duration=4.0
+    )
+    thrown = simulate(System(model=Thrown(), impact=law), height=1.0, velocity=0.0, duration=4.0)
+    assert len(copied.impacts) == len(thrown.impacts) > 3
+    assert np.allclose(copied.impacts.time, thrown.impacts.time, rtol=0.0, atol=1e-12)
+    assert math.isclose(copied.position[0], thrown.position, abs_tol=1e-12)
+
+
 def test_a_function_between_sides_that_lead_away_is_refused():
     @dataclass(frozen=True, kw_only=True)
     class Away(ContactModel):

@@ -137,7 +137,11 @@ def _own_values(
                 speeds = [
                     0.0 if traced.rows else friction.ground_speed for friction in model.frictions
                 ]
-                places = [surface.position for surface in model.surfaces]
+                first = len(model.frictions)
+                places = [
+                    0.0 if first + k in traced.functions else surface.position
+                    for k, surface in enumerate(model.surfaces)
+                ]
                 switches = [0.0] * len(traced.switches)
                 found.append(("ground_speeds", [*speeds, *places, *switches]))
             else:

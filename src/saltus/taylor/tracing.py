@@ -619,13 +619,22 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     frictions = twin.contact_model.frictions
     local = getattr(model, "local_count", result.dof)
     parts = (*frictions, *model.surfaces)
+    names = model.coordinates
+    # these may jump, and a motion may slide along them
+    first_order = getattr(model, "own_class", model).first_order
     functions = [
-        number(1.0)
-        if part.function is None
-        else combine("add", model.value_of_function(part, t, q, v, load), 0.0)
+        combine("add", model.value_of_function(part, t, q, v, load), 0.0)
+        if part.function is not None
+        else combine("sub", q[names.index(part.coordinate)] if len(names) > 1 else q, part.position)
+        if part.coordinate in first_order
+        else None
         for part in model.surfaces
     ]
-    beside = [x for function in functions for x in (function, NO_SHARE)]
+    beside = [
+        x
+        for function in functions
+        for x in (number(1.0) if function is None else function, NO_SHARE)
+    ]
     if local < result.dof:
         q, v = local_parts(q, v, local)
     a, slides = (
@@ -654,20 +663,18 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     speeds = (
         # in a row the speed of the ground is part of the drift
         *(0.0 if model.has_multipliers else friction.ground_speed for friction in frictions),
-        *(surface.position for surface in model.surfaces),
+        *(
+            part.position if function is None else 0.0  # which is part of the function
+            for part, function in zip(model.surfaces, functions, strict=True)
+        ),
     )
     result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
-    places = [
-        result.dof
-        if getattr(part, "function", None) is not None
-        else 0
-        if model.has_multipliers and k < len(frictions)
-        else model.coordinates.index(part.coordinate)
-        for k, part in enumerate(parts)
+    own = [0 if model.has_multipliers else names.index(part.coordinate) for part in frictions]
+    passed = [
+        -1 - (names.index(part.coordinate) if function is None else result.dof)
+        for part, function in zip(model.surfaces, functions, strict=True)
     ]
-    result.friction_coordinates = tuple(
-        p if k < len(frictions) else -1 - p for k, p in enumerate(places)
-    )
+    result.friction_coordinates = (*own, *passed)
     result.mass = [
         combine("add", x, 0.0)
         for i, row in enumerate(mass_rows(model, q, t, load))

@@ -14,6 +14,8 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 
 from __future__ import annotations
 
+import numpy as np
+
 from saltus.flow.contacts.complementarity import eliminate, friction_rate
 from saltus.flow.contacts.held_rows import all_rows_stand, guard_step, onto, some_idle, stop_row
 from saltus.flow.contacts.impacts import friction_mobility, record_contact_event
@@ -37,6 +39,7 @@ from saltus.flow.kernel.steps import (
     columns_at_event,
     expand,
     move_columns,
+    state_size,
     step_size,
     time_scale,
 )
@@ -48,10 +51,10 @@ from saltus.taylor import lean_jit
 # than this, in units of what presses (`note_press`). So is a margin of a friction that can only
 # just stick when its speed becomes that of the ground. In both cases the next coefficients decide.
 ALIKE = 1e-12
-# A coefficient of a function is rounding if its term in the natural time is a smaller share of the
+# A coefficient of a function is rounding if its term (`span_of_terms`) is a smaller share of the
 # largest one.
 VANISHES = 1e-13
-# A motion is at 0 of a function if this is a smaller share of its terms in the natural time.
+# A motion is at 0 of a function if this is a smaller share of its terms.
 IS_ON = 1e-12
 
 
@@ -122,13 +125,23 @@ def note_jumps(motion):
 
 
 @lean_jit
+def span_of_terms(motion):
+    """A time in which the terms of the present series are told from rounding: the natural one, if
+    the series reach as far."""
+    size = state_size(motion, 0, motion.own)
+    span = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    unit = time_scale(motion)
+    return min(unit, span) if unit > 0.0 else span if span < np.inf else 1.0
+
+
+@lean_jit
 def side_ahead(motion, k):
     """The side of a function just behind the present instant, by the series on its present side:
     0 if it stays at 0. Notes how many of the first coefficients are 0."""
     row = motion.frictions[k]
     series = motion.margin_series[motion.contacts.shape[0] + 2 * k]
     row[FrictionColumn.SKIP] = 0
-    unit = time_scale(motion)
+    unit = span_of_terms(motion)
     size = 0.0
     power = 1.0
     for i in range(1, motion.order + 1):
@@ -164,7 +177,7 @@ def stays(motion, k, t):
     hold_frictions(motion)
     expand(motion, t, 1.0, motion.order)
     series = motion.margin_series[motion.contacts.shape[0] + 2 * k]
-    unit = time_scale(motion)
+    unit = span_of_terms(motion)
     size = 0.0
     power = 1.0
     for i in range(1, motion.order + 1):

@@ -566,7 +566,7 @@ class WholeMotionEquations(OrbitEquations):
 def slides_along(motion: Motion) -> bool:
     """Whether a motion slides along a function: one sticks to it, or leaves it."""
     model = motion.system.model
-    if not model.has_switches:
+    if not (model.surfaces or model.has_switches):
         return False
     codes = motion.events.codes
     surfaces = codes[:, 1] >> (len(model.contacts) + len(model.frictions))
