@@ -592,8 +592,8 @@ def _rates_at(motion: Motion, time: float) -> np.ndarray:
     if side == 0:
         return np.zeros(2 * velocity.size)
     acceleration: Any
-    slides = system.model.surfaces and 0 in motion.sides.values()
-    by_series = slides or system.model.has_switches
+    along = bool(system.model.surfaces) and 0 in motion.sides.values()
+    by_series = along or system.model.has_switches
     if system.model.has_multipliers or (by_series and motion.dense is not None):
         return _rates_of_series(motion, time)
     if system.model.holds_coordinates:
