@@ -100,6 +100,8 @@ class MotionError(SaltusError, RuntimeError):
     saltus.errors.MotionError: the motion from rest at contact at time 0 is not unique: ...
     """
 
+    status: int | None = None  # the kernel's reason, of a motion that it could not continue
+
 
 class SweepError(SaltusError, RuntimeError):
     """A sweep that cannot go on, or that ended without some of its chunks; what was computed is

@@ -811,12 +811,19 @@ def test_a_ball_that_a_table_crushes_at_a_ceiling_is_refused_by_name(e):
 def test_other_verbs_refuse_distances_in_one_sentence():
     system = rotor()
     for verb in (
-        lambda: saltus.simulate_many(system, x=[0.3], y=[0.2], velocity=(0.0, 0.0), periods=1),
-        lambda: saltus.classify(system, x=0.3, y=0.2, velocity=(0.0, 0.0)),
+        lambda: saltus.to_jax(system, periods=1),
+        lambda: saltus.orbits.is_symmetric(system),
         lambda: saltus.page(system, x=0.3, y=0.2, velocity=(0.0, 0.0), path="none.html"),
     ):
         with pytest.raises(ParameterError, match="does not follow contacts of a distance"):
             verb()
+
+
+def test_derivatives_of_ensembles_are_refused_in_one_sentence():
+    with pytest.raises(ParameterError, match="one motion at a time"):
+        saltus.simulate_many(
+            rotor(), x=[0.3], y=[0.2], velocity=(0.0, 0.0), periods=1, sensitivities=()
+        )
 
 
 def test_parts_with_both_or_neither_are_refused():

@@ -15,19 +15,6 @@ SWEEP = "cycles without a load are not swept yet"
 DIAGRAM = "are not drawn in diagrams yet"
 
 DISTANCES = "does not follow contacts of a distance"
-NOT_BESIDE_DISTANCES = (
-    "ensemble",
-    "its extrema",
-    "sweep",
-    "verdict",
-    "attractors",
-    "basins",
-    "diagram",
-    "exponents",
-    "of an ensemble",
-    "fit",
-    "page",
-)
 SEVERAL_COORDINATES = (
     "smooth",
     "smooth, square wave",
@@ -41,6 +28,7 @@ SEVERAL_COORDINATES = (
     "own, friction in a contact",
     "own, curved gaps",
     "own, first order",
+    "own, two feet that rub",
 )
 REFUSED = {
     **{(name, "of an ensemble"): MANY for name in SEVERAL_COORDINATES},
@@ -54,7 +42,7 @@ REFUSED = {
     ("own, first order", "page"): FIRST_ORDER,
     ("belt, no load", "sweep"): SWEEP,
     ("belt, no load", "diagram"): DIAGRAM,
-    **{("own, two feet that rub", verb): DISTANCES for verb in NOT_BESIDE_DISTANCES},
+    ("own, two feet that rub", "page"): DISTANCES,
     ("own, switches", "page"): SURFACES,
     ("own, switches", "of an ensemble"): MANY,
 }
@@ -72,8 +60,5 @@ REASONS = {
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
     SWEEP: "Cycles without a load are not swept yet; `continue_orbit` follows them.",
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
-    DISTANCES: (
-        "Contacts of a `distance` and frictions of a `rate` are followed by `simulate`,"
-        " `sensitivities`, `find_orbit`, `continue_orbit` and `energies` so far."
-    ),
+    DISTANCES: "A page cannot show contacts of a `distance` and frictions of a `rate` yet.",
 }

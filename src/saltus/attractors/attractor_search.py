@@ -318,7 +318,8 @@ class KnownAttractors:
         """Add the mirror image of every attractor of a system with that symmetry: it is an
         attractor as well.
         """
-        if not is_symmetric(self.system):
+        # symmetries of distances are not looked for
+        if self.system.model.has_multipliers or not is_symmetric(self.system):
             return
         for label in range(len(self.members)):
             image = (

@@ -32,7 +32,9 @@ def with_clock(system: System) -> System:
     ParameterError
         Something that is no system, or a load of records or pulses, which never repeats.
     """
-    check_system(system, "the search of attractors", several_contacts=True, switches=True)
+    check_system(
+        system, "the search of attractors", several_contacts=True, multipliers=True, switches=True
+    )
     check_periodic(system)
     if system.load.frequency is not None:
         return system

@@ -342,7 +342,7 @@ def _check(
     check_count("starts", starts, 1)
     check_count("seed", seed, 0)
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
-    check_system(system, "fit", several_contacts=True, switches=True)
+    check_system(system, "fit", several_contacts=True, multipliers=True, switches=True)
     _search(system, data, parameters, functions, tol)
 
 

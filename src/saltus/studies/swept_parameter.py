@@ -110,7 +110,9 @@ class SweepRequest:
     start: np.ndarray = field(init=False)  # (d,)
 
     def __post_init__(self) -> None:
-        check_system(self.system, "frequency_sweep", several_contacts=True, switches=True)
+        check_system(
+            self.system, "frequency_sweep", several_contacts=True, multipliers=True, switches=True
+        )
         if self.system.load.frequency is None:
             raise ParameterError(
                 "cycles without a load are not swept yet; give the Load a frequency, or follow a"

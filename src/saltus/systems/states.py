@@ -15,8 +15,16 @@ import numpy as np
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
 from saltus.systems.gap_coordinates import InGapCoordinates
-from saltus.systems.gap_places import CLOSED_BELOW, held_exactly, led, normal_of, pushed, reflected
-from saltus.systems.model import Model
+from saltus.systems.gap_places import (
+    CLOSED_BELOW,
+    held_exactly,
+    led,
+    normal_of,
+    pushed,
+    reflected,
+    terms_of,
+)
+from saltus.systems.model import Model, ask
 from saltus.systems.system import System
 from saltus.systems.system_units import ANGLES, natural_units, time_without_period
 
@@ -394,7 +402,7 @@ def within_window(
     rest = rest_state(system)
     states = np.asarray((points * window.half + (window.centre - rest)) * shrunk + rest)
     states, inner = on_this_side(system, states), system.in_gap_coordinates
-    if not system.model.contacts:
+    if not system.model.contacts or system.model.has_multipliers:
         return states
     bounds = np.asarray(window)
     rows: Any = inner.model
@@ -419,6 +427,8 @@ def rest_state(system: System, last: np.ndarray | None = None) -> np.ndarray:
     if (inner := system.in_gap_coordinates) is not system:
         return from_gaps(system, rest_state(inner))
     state = np.zeros(2 * len(names))
+    if model.has_multipliers:
+        return _above_distances(system, state, 1.0)
     if model.sides:
         state[0] = float(model.contact)
     for i, name in enumerate(names):
@@ -457,6 +467,8 @@ def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
         states[...] = from_gaps(system, on_this_side(inner, in_gaps(system, states)))
         return states
     names = system.model.coordinates
+    if system.model.has_multipliers:
+        return _above_distances(system, states)
     if system.dependent:
         return reflected(system, states)
     if len(system.model.sides) == 1:
@@ -476,6 +488,65 @@ def on_this_side(system: System, states: np.ndarray) -> np.ndarray:
     return states
 
 
+# The most reflections of a state at the contacts that it is beyond: a few are enough where there is
+# room.
+REFLECTIONS = 100
+
+
+def _above_distances(system: System, states: np.ndarray, share: float = 2.0) -> np.ndarray:
+    """States (..., d) at phase 0, changed in place: those beyond contacts that multipliers hold are
+    reflected at the farthest, along its row, until they are beyond none; or with a share of 1 moved
+    onto it."""
+    count = len(system.model.coordinates)
+    found = states.reshape(-1, states.shape[-1])
+    for _ in range(REFLECTIONS):
+        position = found[:, :count].T.astype(complex)
+        gaps = np.real(_distances(system, position))
+        worst = gaps.argmin(axis=0)
+        beyond = np.flatnonzero(gaps.min(axis=0, initial=math.inf) < 0.0)
+        if not beyond.size:
+            break
+        rows = np.zeros((count, len(found)))
+        for i in range(count):
+            beside = position.copy()
+            beside[i] += 1e-100j
+            slopes = np.imag(_distances(system, beside)) / 1e-100
+            rows[i] = slopes[worst, np.arange(len(found))]
+        depth = gaps[worst, np.arange(len(found))]
+        size = np.sum(rows * rows, axis=0)
+        moved = -share * depth / np.where(size > 0.0, size, 1.0) * rows
+        found[beyond, :count] += moved[:, beyond].T
+    states[...] = found.reshape(states.shape)
+    return states
+
+
+def _distances(system: System, position: np.ndarray) -> np.ndarray:
+    """The gaps of contacts that multipliers hold, or of coordinates beside these, at time 0 and
+    positions (coordinates, n), (contacts, n)."""
+    model: Any = system.model
+    known = dict(zip(model.coordinates, position, strict=True))
+    q = position[0] if len(position) == 1 else tuple(position)
+    gaps = []
+    for part in model.contacts:
+        if part.distance is not None:
+            gap = ask(model, part.distance, 0.0, q, system.load)
+        else:
+            kept = sum(
+                factor
+                * (
+                    known[name]
+                    if name in known
+                    else getattr(system.load, name)(0.0)
+                    if name in model.channels
+                    else ask(model, name, q)
+                )
+                for name, factor in terms_of(part).items()
+            )
+            gap = part.sign * (kept - part.position)
+        gaps.append(np.broadcast_to(gap, position.shape[1:]))
+    return np.array(gaps).reshape(len(gaps), position.shape[1])
+
+
 def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.ndarray:
     """States (..., d) moved by shifts, such that closed contacts stay closed and no coordinate goes
     beyond a contact.
@@ -487,6 +558,8 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
         return from_gaps(
             system, states_beside(inner, begin, in_gaps(system, states + shifts) - begin)
         )
+    if system.model.has_multipliers:
+        return on_this_side(system, states + shifts)
     names = system.model.coordinates
     units = natural_units(system).state
     moved = on_this_side(system, states + shifts)
@@ -512,6 +585,8 @@ def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
     at once. Sums of coordinates are moved back by more than the rounding within which they count as
     closed.
     """
+    if system.model.has_multipliers:
+        return states.copy()
     inner = system.in_gap_coordinates
     moved = in_gaps(system, states).copy()
     names = inner.model.coordinates
@@ -539,6 +614,8 @@ def held_by_contacts(system: System, states: np.ndarray) -> np.ndarray:
     """
     names = system.model.coordinates
     held = np.zeros(states.shape, dtype=bool)
+    if system.model.has_multipliers:  # starts are taken onto what is held
+        return held
     for contact in system.model.contacts:
         place = names.index(contact.coordinate)
         closed = (np.asarray(contact.gap(states[..., place])) == 0.0) & (

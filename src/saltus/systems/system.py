@@ -535,8 +535,8 @@ def check_system(
         held += [part.name for part in system.model.frictions if part.rate is not None]
         raise ParameterError(
             f"{asking} does not follow contacts of a distance and frictions of a rate so far, and"
-            f" {type(system.model).__name__} has {', '.join(held)}; simulate,"
-            " sensitivities, find_orbit, continue_orbit and energies do",
+            f" {type(system.model).__name__} has {', '.join(held)}; simulate, simulate_many,"
+            " find_orbit and find_attractors do",
             "system",
         )
     if not switches and system.model.has_switches:

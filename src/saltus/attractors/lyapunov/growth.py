@@ -176,7 +176,7 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
     ParameterError
         The error has the name of the argument.
     """
-    check_system(system, function, several_contacts=True, switches=True)
+    check_system(system, function, several_contacts=True, multipliers=True, switches=True)
     check_periodic(system)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)

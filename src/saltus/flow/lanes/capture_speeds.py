@@ -45,7 +45,8 @@ def capture_speeds(
         raise ParameterError(
             f'until="rest" proves nothing about {asked[0]}; leave out either it or stop_at', "until"
         )
-    if system.model.frictions or system.model.surfaces or system.model.has_switches:
+    model = system.model
+    if model.frictions or model.surfaces or model.has_switches or model.has_multipliers:
         return 0.0  # nothing is proved about sticking frictions and about motions through surfaces
     if system.model.contacts:
         return np.where(keeps_rest(system, columns), math.inf, 0.0)

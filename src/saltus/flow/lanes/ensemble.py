@@ -28,6 +28,7 @@ from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.memory import JOB
+from saltus.flow.lanes.one_by_one import followed_one_by_one
 from saltus.flow.lanes.options import (
     EnsembleOptions,
     Sample,
@@ -132,7 +133,9 @@ def simulate_many(
     >>> ends.impact_count.values, float(ends.theta[2])
     (array([39, 39, 39]), -0.23568059529931645)
     """
-    check_system(system, "simulate_many", several_contacts=True, switches=True, jumps=True)
+    check_system(
+        system, "simulate_many", several_contacts=True, multipliers=True, switches=True, jumps=True
+    )
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     options = EnsembleOptions(
         tol=tol,
@@ -186,7 +189,9 @@ def run_ensemble(
     own = system
     given = inputs
     system, inputs = system.in_gap_coordinates, inputs.in_gaps(system)
-    driver = compile_driver_aside(system.model.holds_coordinates)
+    driver = None
+    if not system.model.has_multipliers:
+        driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
     if run.structure.several and any(path.startswith("model.") for path in inputs.parameters):
         # the table of eigenmodes has the model's numbers
@@ -213,6 +218,9 @@ def run_ensemble(
         16.0 * len(options.sample) * kept * inputs.size,
         f"samples of {kept} periods of {inputs.size} motions",
     )
+    if system.model.has_multipliers:
+        alone = followed_one_by_one(own, given, options, jobs, kept, side, progress)
+        return EnsembleResult(own, given, options, jobs, alone)
     lanes = compiled_lanes(system, run, options, kept, inputs.parameters)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)

@@ -78,7 +78,7 @@ def to_dataset(result: EnsembleResult) -> xarray.Dataset:
     writer = _Writer(system.model, inputs)
     _add_ends(writer, result)
     _add_stops(writer, result)
-    if system.model.contacts:
+    if system.model.contacts and not system.model.has_multipliers:
         _add_gains(writer, system, inputs)
     _add_samples(writer, result)
     if result.options.paths is not None:

@@ -292,7 +292,7 @@ def sensitivities(
         time=time,
         side=side,
         stop_at=stop_at,
-        dense=dense,
+        dense=dense or system.model.has_multipliers,  # whose accelerations are those of steps
         sensitivities=paths,
     )
     return derivatives_of(request, None, progress)

@@ -514,7 +514,11 @@ def _advance(
             progress((time - begin) / (end - begin), WHAT)
         if status not in GOES_ON:
             if status != Status.DONE:
-                refuse(system, status, now)
+                try:
+                    refuse(system, status, now)
+                except MotionError as error:
+                    error.status = status
+                    raise
             return status, numbers
         if recorder.total > counted + many:
             if time < checked_at + _time_scale(system, numbers) * many / MOST.rate:

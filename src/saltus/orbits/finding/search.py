@@ -227,7 +227,7 @@ def search_orbits(
     >>> len(found.orbits)
     1
     """
-    check_system(system, "search_orbits", several_contacts=True, switches=True)
+    check_system(system, "search_orbits", several_contacts=True, multipliers=True, switches=True)
     check_count("max_period", max_period, 1)
     if repelling is not None:
         check_count("repelling", repelling, 0)

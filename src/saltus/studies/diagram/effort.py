@@ -20,7 +20,7 @@ def check_diagram(
     """The bounds as two numbers; raises a ParameterError for arguments with which the study would
     fail later.
     """
-    check_system(system, "a diagram", several_contacts=True, switches=True)
+    check_system(system, "a diagram", several_contacts=True, multipliers=True, switches=True)
     if system.load.frequency is None:
         raise ParameterError(
             "cycles under a load without a frequency are not drawn in diagrams yet; give the Load"
