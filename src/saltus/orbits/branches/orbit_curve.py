@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -246,7 +246,7 @@ def torus(point: OrbitPoint) -> float:
             values = np.where(
                 np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0
             )
-            first, second = np.triu_indices(len(values), 1)
+            first, second = _pairs(len(values))
             product = float(np.prod(values[first] * values[second] - 1.0).real)
     return (
         0.0
@@ -255,6 +255,13 @@ def torus(point: OrbitPoint) -> float:
         if math.isfinite(product)
         else math.nan
     )
+
+
+@cache
+def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The places of both numbers of all pairs of so many."""
+    first, second = np.triu_indices(count, 1)
+    return first, second
 
 
 def complex_pairs(orbit: PeriodicOrbit) -> np.ndarray:

@@ -699,6 +699,8 @@ class OrbitEquations(ABC):
         """The map whose eigenvalues are the multipliers, but for those that contacts make 0."""
         chain = evaluation.monodromy()
         following = self.following
+        if not following.size:  # of most orbits; the copies take longer than the eigenvalues
+            return chain
         return np.delete(np.delete(chain, following, axis=0), following, axis=1)
 
     def system_at(self, values: np.ndarray) -> System:
