@@ -489,6 +489,67 @@ def test_orbits_that_slide_are_refused_in_one_sentence():
         saltus.find_orbit(system, x=0.0)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Bodies(ContactModel):
+    """Two bodies that hit, with drag and a damper with two slopes."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        Contact(name="between", coordinate={"y": 1.0, "x": -1.0}),
+    )
+    surfaces: ClassVar[tuple[Surface, ...]] = (Surface(name="fast", function="speed"),)
+
+    def speed(self, t, q, velocity, load):
+        return velocity[1] - 0.5 * velocity[0]
+
+    def force(self, t, q, velocity, load, sides):
+        damped = (0.3 + 0.2 * sides.fast) * self.speed(t, q, velocity, load)
+        drag = 0.1 * velocity[0] * abs(velocity[0])
+        return load.force(t) - q[0] - drag + 0.5 * damped, -0.5 * q[1] - damped
+
+
+@dataclass(frozen=True, kw_only=True)
+class InGap(ContactModel):
+    """The same, written with the gap z = y - x in the place of y."""
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "z")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    contacts: ClassVar[tuple[Contact, ...]] = (Contact(name="between", coordinate="z"),)
+
+    def mass_matrix(self, q):
+        return [[2.0, 1.0], [1.0, 1.0]]
+
+    def force(self, t, q, velocity, load):
+        (x, z), (u, w) = q, velocity
+        speed = w + 0.5 * u
+        damped = np.where(speed > 0.0, 0.5, 0.1) * speed
+        on_x = load.force(t) - x - 0.1 * u * abs(u) + 0.5 * damped
+        on_y = -0.5 * (x + z) - damped
+        return on_x + on_y, on_y
+
+
+def test_functions_of_bodies_that_touch_are_those_of_their_own_coordinates():
+    load, law = Load(frequency=1.2, force=Harmonic(1.0)), NewtonImpact(0.6)
+    own = simulate(
+        System(model=Bodies(), load=load, impact=law),
+        x=0.0,
+        y=0.5,
+        velocity=(0.0, 0.0),
+        duration=20.0,
+    )
+    gap = simulate(
+        System(model=InGap(), load=load, impact=law),
+        x=0.0,
+        z=0.5,
+        velocity=(0.0, 0.0),
+        duration=20.0,
+    )
+    assert len(own.impacts) == len(gap.impacts) > 3
+    assert [event.kind for event in own.events] == [event.kind for event in gap.events]
+    assert np.allclose(own.position, [gap.position[0], sum(gap.position)], rtol=0.0, atol=1e-11)
+
+
 def test_ensembles_have_the_motions_of_each():
     starts = np.linspace(-0.5, 0.8, 5)
     for system in (CAR, TRACED_CAR):
