@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import saltus
 from saltus import Contact, Friction, NewtonImpact, Surface
-from saltus.errors import MotionError, ParameterError
+from saltus.errors import MotionError, ParameterError, TraceError
 from saltus.flow import sensitivities, simulate
 from saltus.systems import ContactModel, Harmonic, Load, System
 
@@ -580,3 +580,21 @@ def test_a_surface_needs_a_method():
         Surface(name="s", function="missing", position=1.0)
     with pytest.raises(ParameterError, match="got neither"):
         Surface(name="s")
+
+
+def test_a_mass_matrix_has_no_switches():
+    @dataclass(frozen=True, kw_only=True)
+    class Heavy(ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        contacts: ClassVar[tuple[Contact, ...]] = (
+            Contact(name="wall", coordinate="x", position=-1.0),
+        )
+
+        def mass_matrix(self, q):
+            return 1.0 + abs(q)
+
+        def force(self, t, x, velocity, load):
+            return -x
+
+    with pytest.raises(TraceError, match="absolute in its mass matrix"):
+        System(model=Heavy())

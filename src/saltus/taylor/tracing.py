@@ -792,6 +792,12 @@ def _check(result: Trace) -> None:
                     f"{result.model}.gap may depend on the coordinate, the side and the parameters"
                     " only"
                 )
+    for node in ordered([*result.mass, *result.rows, *result.coefficients]):
+        if node.op in POINTWISE:
+            raise TraceError(
+                f"{result.model} uses {node.op} in its mass matrix, or in a distance or a rate; only"
+                " its force may have switches: give these as smooth functions"
+            )
     _check_abs(result, expanded)
 
 
