@@ -36,7 +36,8 @@ def eigenmodes_of(structure: Any, spacing: int, derivatives: bool = False) -> np
     before. Then follow numbers for each set of closed contacts and of surfaces on whose side +1 it
     is. They are lambda, how far a mode reaches in units of the state, the rows of the inverse of
     the eigenvectors, the eigenvectors' coordinates, and the factors of the inputs; then the
-    reactions of the contacts by eigenmodes and by inputs. The real and the imaginary part of a mode
+    reactions of the contacts by eigenmodes, which are measured from where constant inputs hold
+    them, and by inputs. The real and the imaginary part of a mode
     have rows of their own.
 
     Parameters
@@ -76,7 +77,7 @@ def _table(structure: Any, spacing: int) -> np.ndarray:
             for i, s in enumerate(surfaces)
             if (2 * (bits >> len(contacts) + i & 1) - 1) * s.sign > 0
         ]
-        block = _block(first_order_form(structure, closed, pressed))
+        block = _block(first_order_form(structure, closed, pressed), len(structure.channels))
         if block is None:
             return np.zeros(0)
         blocks.append(block)
@@ -151,7 +152,8 @@ def first_order_form(
     return rates[:, : 2 * n], rates[:, 2 * n :], reactions[:, : 2 * n], reactions[:, 2 * n :]
 
 
-def _block(form: Any) -> np.ndarray | None:
+def _block(form: Any, channels: int) -> np.ndarray | None:
+    """The numbers of one set of closed contacts and pressed surfaces."""
     a, b, reactions, by_inputs = form
     free = np.flatnonzero(np.abs(a[: len(a) // 2]).sum(axis=1))
     moving = np.append(free, len(a) // 2 + free)
@@ -184,9 +186,32 @@ def _block(form: Any) -> np.ndarray | None:
     assert row == count
     inputs = table["to"] @ b
     held = reactions @ back
+    by_inputs = by_inputs - _at_rest(table["value"][:count], inputs[:count], held, channels)
     return np.concatenate(
-        [x.ravel() for x in (*table.values(), back[: size // 2], inputs, held, by_inputs)]
+        [
+            np.asarray(x, dtype=float).ravel()
+            for x in (*table.values(), back[: size // 2], inputs, held, by_inputs)
+        ]
     )
+
+
+def _at_rest(values: np.ndarray, inputs: np.ndarray, held: np.ndarray, channels: int) -> np.ndarray:
+    """By how much reactions follow more from inputs that are constant, if modes with losses are
+    measured from where these hold them: (contacts, inputs), in the kernel's own numbers.
+    """
+    more = np.zeros((len(held), inputs.shape[1]), dtype=np.longdouble)
+    row = 0
+    while row < len(values):
+        real, imaginary = values[row].astype(np.longdouble)
+        width = 1 if imaginary == 0.0 else 2
+        if real < 0.0:
+            drives = inputs[row : row + width].astype(np.longdouble)
+            turned = np.array([[real, imaginary], [-imaginary, real]])[:width, :width]
+            rest = turned @ drives / (real**2 + imaginary**2)
+            more += held[:, row : row + width].astype(np.longdouble) @ rest
+        row += width
+    more[:, :channels] = 0.0
+    return np.asarray(more)
 
 
 def decoupled(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

@@ -192,7 +192,8 @@ def push_columns(motion, order, h):
             imaginary = table[values + 2 * row + 1]
             width = 1 if imaginary == 0.0 else 2
             for i in range(width):
-                drive_mode(motion, inputs + (row + i) * given, states + i, order, j)
+                constant = drive_mode(motion, inputs + (row + i) * given, states + i, order, j)
+                motion.mode_series[states + i, 0] += constant
             if width == 1:
                 push_real(motion, real, j, row, order, h)
             else:

@@ -60,6 +60,7 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory
+from saltus.flow.kernel.roots import value_and_slope
 from saltus.flow.kernel.steps import (
     columns_at_event,
     expand,
@@ -166,6 +167,10 @@ def follow_segment(motion, begin, end, carried, row, slopes, units, seen):
         move(motion, h, motion.own if carried else motion.dof)
         if last:
             if carried:
+                if power == 0 and row[SegmentPlan.KIND] == EventCode.RELEASE:
+                    reaction, rate = value_and_slope(motion.margin_series[contact], order, h)
+                    motion.excursion[0] = reaction
+                    motion.excursion[1] = rate
                 if power > 0:
                     state_remainders(motion, contact, power, end - begin, slopes)
                 carry_columns(motion, end - begin)
@@ -365,12 +370,19 @@ def divide_guard(motion, power, h, ends, slopes):
 
 
 @lean_jit
-def guard_at_end(motion, t, kind, contact, ends, slopes):
-    """The guard of a segment's event, its rate, and its derivatives along the columns."""
+def guard_at_end(motion, t, kind, contact, carried, ends, slopes):
+    """The guard of a segment's event, its rate, and its derivatives along the columns.
+
+    The reaction of a structure is that of its eigenmodes where these were followed: computed from
+    the state it is a small difference of large forces.
+    """
     fill_slopes(motion)
     if kind == EventCode.RELEASE:
         ends[SegmentEnd.GUARD] = motion.margin_series[contact, 0]
         ends[SegmentEnd.RATE] = motion.margin_series[contact, 1]
+        if carried:
+            ends[SegmentEnd.GUARD] = motion.excursion[0]
+            ends[SegmentEnd.RATE] = motion.excursion[1]
         ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE]
         columns_at_event(motion, EventCode.RELEASE, contact, t, 1.0)
         for j in range(motion.columns):
@@ -459,7 +471,7 @@ def follow_with(numbers, parts, request, results):
                 velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
                 ends[s, SegmentEnd.RATE] = motion.signs[contact] * velocity
             else:
-                guard_at_end(motion, end, kind, contact, ends[s], columns[s, 2 * own])
+                guard_at_end(motion, end, kind, contact, carried, ends[s], columns[s, 2 * own])
                 ends[s, SegmentEnd.BY_START] = start_slope(motion, ends[s], columns[s, 2 * own])
                 if power > 0:
                     divide_guard(motion, power, end - begin, ends[s], columns[s, 2 * own])

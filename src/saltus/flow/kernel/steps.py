@@ -527,8 +527,8 @@ def mode_arrays(numbers, table):
 
 @lean_jit
 def drive_mode(motion, factors, row, order, column):
-    """Put the series of what drives a row of the eigenmodes into a row; `factors` is the place of
-    the first input's.
+    """Put the series of what drives a row of the eigenmodes into a row, without what is constant
+    until the next event, which is returned; `factors` is the place of the first input's.
 
     It drives the motion if `column` is -1, else that column of the tangent: the derivatives of the
     inputs to its parameter.
@@ -546,10 +546,31 @@ def drive_mode(motion, factors, row, order, column):
         factor = table[factors + c]
         for k in range(order + 2):
             driven[k] += factor * inputs[series + c * spacing + k]
-    if column < 0:
-        driven[0] += table[factors + channels]
+    constant = table[factors + channels] if column < 0 else 0.0
     for i in range(motion.local):
-        driven[0] += table[factors + channels + 1 + i] * motion.coordinates[held + i]
+        constant += table[factors + channels + 1 + i] * motion.coordinates[held + i]
+    return constant
+
+
+@lean_jit
+def measured_from_rest(motion, values, j, width, one, two):
+    """Measure an eigenmode from where the constants `one` and `two` that drive it hold it, if it
+    has losses; otherwise let them drive it.
+
+    The fast ones are nearly there, and reactions would be small differences of their large values.
+    """
+    series = motion.mode_series
+    driven = 2 * motion.own
+    real = motion.eigenmodes[values + 2 * j]
+    imaginary = motion.eigenmodes[values + 2 * j + 1]
+    if not real < 0.0:
+        series[driven, 0] += one
+        series[driven + 1, 0] += two
+        return
+    square = real * real + imaginary * imaginary
+    series[j, 0] += (real * one + imaginary * two) / square
+    if width == 2:
+        series[j + 1, 0] += (real * two - imaginary * one) / square
 
 
 @lean_jit
@@ -714,12 +735,19 @@ def in_modes(motion, t, order):
     while j < states:
         width = 1 if table[values + 2 * j + 1] == 0.0 else 2
         enough = allowed / (table[reach + j] + SMALLEST)
+        constant = 0.0
+        other = 0.0
         for i in range(width):
-            drive_mode(motion, inputs + (j + i) * given, states + i, order, -1)
+            other = constant
+            constant = drive_mode(motion, inputs + (j + i) * given, states + i, order, -1)
             motion.mode_series[j + i, 0], terms = in_mode(
                 motion, inverse + (j + i) * states, states
             )
             enough = max(enough, NOISE * terms)
+        if width == 1:
+            measured_from_rest(motion, values, j, width, constant, 0.0)
+        else:
+            measured_from_rest(motion, values, j, width, other, constant)
         if width == 1:
             one_mode(motion, values + 2 * j, j, order, enough)
         else:
@@ -739,7 +767,8 @@ def in_modes(motion, t, order):
     for i in range(count):
         if bits >> i & 1:
             add_modes(motion, reactions + i * states, states, order, motion.margin_series[i])
-            drive_mode(motion, by_inputs + i * given, states, order, -1)
+            constant = drive_mode(motion, by_inputs + i * given, states, order, -1)
+            motion.mode_series[states, 0] += constant
             for k in range(order + 2):
                 motion.margin_series[i, k] += motion.mode_series[states, k]
     return state_size(motion, 0, own)

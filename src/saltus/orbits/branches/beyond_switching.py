@@ -64,6 +64,14 @@ class Switching:
         """A reaction that is smaller, in natural units, is 0: the rounding of elastic forces."""
         return max(TOLERANCES.touch, NEWTON.converged * float(self.equations.elastic_forces))
 
+    @cached_property
+    def at_once(self) -> float:
+        """Two events whose phases are nearer happen at once: an excursion that is not longer is
+        lost in rounding.
+        """
+        lost: float = self.equations.lost_excursion(self.point)
+        return max(TOLERANCES.switching, lost)
+
     def other_signatures(self) -> Iterator[list[Timed]]:
         """The events that the orbit may have on the other side, the likely ones first."""
         yield from self._together(False)
@@ -87,7 +95,7 @@ class Switching:
             first = events[i]
             second = events[j]
             apart = second.phase - first.phase + (self.equations.closing if j == 0 else 0.0)
-            if abs(apart) > TOLERANCES.switching:
+            if abs(apart) > self.at_once:
                 continue
             one = first.event
             other = second.event
@@ -236,7 +244,7 @@ class Switching:
                 first.event.is_impact,
                 first.event.contact,
             )
-            if same and abs(timed.phase - first.phase) < TOLERANCES.switching:
+            if same and abs(timed.phase - first.phase) <= self.at_once:
                 return np.asarray(end[SegmentEnd.NUMBERS : SegmentEnd.NUMBERS + n])
         return self._state_at(first.phase)
 

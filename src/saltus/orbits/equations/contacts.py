@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.continuation import Bounds, Cut, End, TestFunction, Units, Zero
+from saltus.continuation import NEWTON, Bounds, Cut, End, Evidence, TestFunction, Units, Zero
 from saltus.errors import MotionError
 from saltus.flow import (
     EventCode,
@@ -487,9 +487,27 @@ class ContactsEquations(OrbitEquations):
         the equations are scaled with for one contact alone, and would be rounding."""
         return self._shortest_excursion_of_cells(ahead) > SHORTEST_EXCURSION
 
+    def lost_excursion(self, point: OrbitPoint) -> float:
+        """The duration, in radians of the load, of an excursion that is too short to be resolved
+        in a structure with stiff modes; 0 if there is none.
+
+        Its guard is the gap divided by the duration cubed. Elastic forces leave a rounding in the
+        acceleration at its begin, which is divided by the duration there, once more than in a
+        reaction.
+        """
+        phases = self.split(point.solution.unknowns)[1]
+        apart = np.diff(np.append(phases, phases[:1] + self.closing))
+        released = self.plan[: len(phases), SegmentPlan.POWER] == AFTER_RELEASE
+        shortest = float(apart[released].min(initial=math.inf))
+        rounding = NEWTON.converged * self.elastic_forces
+        return shortest if shortest < math.sqrt(rounding) else 0.0
+
     def stalled(
         self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds
     ) -> Cut | End | None:
+        duration = self.lost_excursion(point)
+        if duration > TOLERANCES.switching:
+            return Cut(point, _vanishing_excursion(point, points, duration))
         if self._shortest_excursion_of_cells(point) < 2.0 * SHORTEST_EXCURSION:
             return End(OrbitEnd.TWO_AT_ONCE, point.parameter)
         limit = point.orbit.motion().limit
@@ -821,3 +839,22 @@ def _has_moving_mass(model: Any) -> bool:
         for x in (0.13, 0.21)
     )
     return getattr(model, "has_moving_walls", False) and bool(np.not_equal(one, other).any())
+
+
+def _vanishing_excursion(point: OrbitPoint, points: list[OrbitPoint], duration: float) -> Zero:
+    """The change of events at which an excursion vanishes, from the last point at which it could be
+    solved for: its duration falls as the root of the parameter's distance.
+    """
+    left = math.inf
+    for before in reversed(points):
+        longer = before.orbit.equations.lost_excursion(before)
+        if before.orbit.signature != point.orbit.signature:
+            break
+        if longer > 1.1 * duration:
+            passed = abs(point.parameter - before.parameter)
+            left = passed * duration**2 / (longer**2 - duration**2)
+            break
+    evidence = Evidence(
+        point.orbit.residual, (left,), duration, 0.0, duration, "duration of an excursion"
+    )
+    return Zero(SpecialKind.SW, point, evidence)
