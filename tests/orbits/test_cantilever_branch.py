@@ -16,11 +16,11 @@ GAP = 0.02
 ELEMENTS = 4
 
 
-def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def matrices(elements: int = ELEMENTS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, stiffness and damping of beam elements, the tip's displacement in the row before the
     last."""
-    h = 1.0 / ELEMENTS
-    size = 2 * (ELEMENTS + 1)
+    h = 1.0 / elements
+    size = 2 * (elements + 1)
     mass = np.zeros((size, size))
     stiffness = np.zeros((size, size))
     inertia = np.array(
@@ -39,7 +39,7 @@ def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             [6.0 * h, 2.0 * h**2, -6.0 * h, 4.0 * h**2],
         ]
     )
-    for i in range(ELEMENTS):
+    for i in range(elements):
         rows = slice(2 * i, 2 * i + 4)
         mass[rows, rows] += h / 420.0 * inertia
         stiffness[rows, rows] += bending / h**3
@@ -48,21 +48,21 @@ def matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return mass, stiffness, 0.02 / FIRST * stiffness + 0.02 * FIRST * mass
 
 
-def tip() -> np.ndarray:
-    return np.eye(2 * ELEMENTS)[-2]
+def tip(elements: int = ELEMENTS) -> np.ndarray:
+    return np.eye(2 * elements)[-2]
 
 
-def system(share: float, mass_unit: float = 1.0) -> saltus.System:
+def system(share: float, mass_unit: float = 1.0, elements: int = ELEMENTS) -> saltus.System:
     """The cantilever under a load with this share of its first natural frequency."""
-    mass, stiffness, damping = (matrix / mass_unit for matrix in matrices())
+    mass, stiffness, damping = (matrix / mass_unit for matrix in matrices(elements))
     stop = saltus.Contact(name="stop", coordinate="tip", position=GAP, sign=-1)
     beam = saltus.Structure(
         mass=mass,
         stiffness=stiffness,
         damping=damping,
-        points={"tip": tip()},
+        points={"tip": tip(elements)},
         contacts=[stop],
-        forces={"f": tip()},
+        forces={"f": tip(elements)},
     )
     load = saltus.Load(frequency=share * FIRST, f=saltus.Harmonic(FORCE / mass_unit))
     return saltus.System(model=beam, load=load, impact=saltus.NewtonImpact(0.0))
@@ -112,3 +112,23 @@ def test_motions_settle_on_the_branch(share: float) -> None:
     settled = saltus.find_orbit(system(share), **system(share).model.start())
     amplitudes = [orbit.amplitude for orbit in branch(0.9).at(share * FIRST) if orbit.stable]
     assert np.abs(np.array(amplitudes) - settled.amplitude).min() < 1e-10
+
+
+def test_an_excursion_vanishes_in_a_structure_of_forty_stiff_coordinates() -> None:
+    """Its stiffest mode is 7000 times as fast as the load. From below, the branch comes to the end
+    of the shortest excursion that is resolved; from above, to where the reaction is 0."""
+    found = []
+    for share in (1.0324, 1.0332):
+        whole = system(share, elements=20)
+        orbit = saltus.find_orbit(whole, **whole.model.start())
+        bounds = (1.0323 * FIRST, 1.0333 * FIRST)
+        followed = saltus.continue_orbit(orbit, "load.frequency", bounds, step=0.5)
+        assert all(str(end).startswith("bound") for end in followed.ends)
+        assert {len(orbit.signature.events) for orbit in followed.orbits} == {2, 4}
+        (change,) = followed.special
+        assert change.kind == "SW"
+        found.append(change)
+    below, above = found
+    assert below.evidence.witness == "duration of an excursion"
+    assert above.evidence.witness == "reaction of stop"
+    assert abs(below.parameter - above.parameter) < 1.5 * below.evidence.bracket < 1e-5

@@ -24,6 +24,8 @@ AFTER_RELEASE = 3  # power of the time with which the gap grows after a release
 # Distances along a branch at which orbits are looked for where an excursion from a closed contact
 # begins: its speeds grow as the distance cubed.
 BEGUN = (1e-4, 1e-3, 1e-2)
+# The guard of an excursion of no duration, by how many times the shortest one that is resolved.
+AT_BEGIN = 10.0
 MOST_TOGETHER = 2  # the most events of several contacts that may change at one point
 MOST_TOUCHES = 8  # the most contacts that are touched at once, each with an impact beyond
 
@@ -383,10 +385,23 @@ def _begun(here: Switching, events: list[Timed], known: tuple[Cycle, ...]) -> Or
     solved = curve.known(found[1], here.point.parameters)
     if solved is None:
         return None
-    if not found[0].units.vanish(solved.evaluation.residual, TOLERANCES.switching):
+    if not found[0].units.vanish(solved.evaluation.residual, _tolerances(*found)):
         return None
     begun: OrbitPoint = curve.along_kernel(solved)
     return begun
+
+
+def _tolerances(equations: Any, unknowns: np.ndarray) -> np.ndarray:
+    """How far the equations (m,) may be from 0 at an orbit at which events have come together; the
+    guard of an excursion of no duration is the rounding of elastic forces there.
+    """
+    phases = equations.split(unknowns)[1]
+    apart = np.diff(np.append(phases, phases[:1] + equations.closing))
+    released = equations.plan[: len(phases), SegmentPlan.POWER] == AFTER_RELEASE
+    tolerances = np.full(equations.size, TOLERANCES.switching)
+    begins = np.flatnonzero(released & (np.abs(apart) < TOLERANCES.switching))
+    tolerances[begins] = max(TOLERANCES.switching, AT_BEGIN * equations.resolution)
+    return tolerances
 
 
 def _with_all_impacts(point: OrbitPoint) -> OrbitPoint | None:

@@ -275,6 +275,14 @@ class ContactsEquations(OrbitEquations):
         return max(1.0, (natural.time / natural.free_time) ** 2)
 
     @cached_property
+    def resolution(self) -> float:
+        """The duration, in radians of the load, below which rounding hides an excursion: elastic
+        forces leave an error in the acceleration at its begin, and the guard of a duration h has
+        the error of a reaction divided by h.
+        """
+        return math.sqrt(NEWTON.converged * self.elastic_forces)
+
+    @cached_property
     def is_phase(self) -> np.ndarray:
         return np.arange(self.size) >= len(self._free)
 
@@ -491,16 +499,13 @@ class ContactsEquations(OrbitEquations):
         """The duration, in radians of the load, of an excursion that is too short to be resolved
         in a structure with stiff modes; 0 if there is none.
 
-        Its guard is the gap divided by the duration cubed. Elastic forces leave a rounding in the
-        acceleration at its begin, which is divided by the duration there, once more than in a
-        reaction.
+        Its guard is the gap divided by the duration cubed.
         """
         phases = self.split(point.solution.unknowns)[1]
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
         released = self.plan[: len(phases), SegmentPlan.POWER] == AFTER_RELEASE
         shortest = float(apart[released].min(initial=math.inf))
-        rounding = NEWTON.converged * self.elastic_forces
-        return shortest if shortest < math.sqrt(rounding) else 0.0
+        return shortest if shortest < self.resolution else 0.0
 
     def stalled(
         self, point: OrbitPoint, step: float, points: list[OrbitPoint], bounds: Bounds
