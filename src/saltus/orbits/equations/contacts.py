@@ -851,10 +851,11 @@ def _vanishing_excursion(point: OrbitPoint, points: list[OrbitPoint], duration: 
     solved for: its duration falls as the root of the parameter's distance.
     """
     left = math.inf
+    equations: Any = point.orbit.equations
     for before in reversed(points):
-        longer = before.orbit.equations.lost_excursion(before)
         if before.orbit.signature != point.orbit.signature:
             break
+        longer = equations.lost_excursion(before)
         if longer > 1.1 * duration:
             passed = abs(point.parameter - before.parameter)
             left = passed * duration**2 / (longer**2 - duration**2)
