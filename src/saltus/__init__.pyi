@@ -1,4 +1,5 @@
 from . import attractors as attractors
+from . import debug as debug
 from . import flow as flow
 from . import orbits as orbits
 from . import studies as studies

@@ -291,6 +291,11 @@ def test_births_of_other_laws_do_not_depend_on_the_asked_range(law, largest):
     branch = saltus.continue_orbit(orbit, "model.mu", (-0.2, largest))
     born = next(end for end in branch.ends if end.reason is saltus.orbits.OrbitEnd.EQUILIBRIUM)
     assert born.parameter == pytest.approx(0.0, abs=1e-9)
+    # all of its points are cycles: the circle r^law = mu, and no equilibrium
+    radii = np.array([0.5 * np.ptp(each.followed.extrema[0]) for each in branch.orbits])
+    parameters = np.array([point.parameter for point in branch.points])
+    assert radii.min() > 1e-4
+    np.testing.assert_allclose(radii**law.law, parameters, rtol=1e-6, atol=1e-11)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import wraps
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -157,11 +158,14 @@ def step_through(
 
 def _break(kernel: PlainKernel, name: str, when: Callable[[Any], bool]) -> None:
     """Stop in a debugger where the kernel enters a function."""
-    function = kernel.functions.get(name)
-    if not callable(function):
+    functions = [
+        known for known, value in kernel.functions.items() if isinstance(value, FunctionType)
+    ]
+    if name not in functions:
         raise ParameterError(
-            f"the kernel has no function {name!r}{near(name, kernel.functions)}", "break_in"
+            f"the kernel has no function {name!r}; {near(name, functions)}", "break_in"
         )
+    function = kernel.functions[name]
 
     @wraps(function)
     def stopped(*given: Any) -> Any:

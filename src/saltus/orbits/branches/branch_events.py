@@ -144,8 +144,11 @@ LAST_ORBITS = 6
 
 def _forget_where_it_turns(run: Run, born: float) -> None:
     """Drop what was found where a branch turns back at an equilibrium, at the parameter `born`:
-    beyond it its orbits are the same once more.
+    beyond it its orbits are the same once more, and those that have shrunk to it are the
+    equilibrium within rounding.
     """
+    while len(run.points) > 1 and _has_shrunk(run.points[-1]):
+        run.points.pop()
     run.special[:] = [zero for zero in run.special if not _has_shrunk(zero.point)]
     near = max(abs(point.parameter - born) for point in run.points[-LAST_ORBITS:])
     run.missed[:] = [
