@@ -323,3 +323,19 @@ def test_a_jump_of_another_quantity_is_an_arrow_and_no_ramp():
     assert broken == pytest.approx([2.45])
     arrows = [(text.xyann, text.xy) for text in axes.texts]
     assert arrows == [((2.45, 3.0), (2.45, 15.0)), ((3.55, 15.0), (3.55, 3.0))]
+
+
+def test_a_coordinate_is_its_amplitude_on_branches_and_sweeps_alike() -> None:
+    """A sweep has its state at phase 0 under this name, too."""
+    system = saltus.System(
+        model=saltus.ImpactPair(mass_ratio=0.1, damping=0.1, clearance=0.5),
+        load=saltus.Load(frequency=0.8, force=saltus.Harmonic(0.2)),
+        impact=saltus.NewtonImpact(0.6),
+    )
+    sweep = saltus.frequency_sweep(system, [0.7, 0.8], z=0.1, x=0.0, periods=20)
+    orbit = saltus.find_orbit(system, z=0.1, x=0.0)
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.79, 0.81))
+    axes = [saltus.plot((branch, sweep), quantity=name) for name in ("x", "amplitude_x")]
+    drawn = [np.concatenate([line.get_ydata() for line in each.lines]) for each in axes]
+    np.testing.assert_array_equal(*drawn)
+    assert axes[0].get_ylabel() == axes[1].get_ylabel() == r"$\max_\tau |x|$"

@@ -476,7 +476,7 @@ def chosen_quantity(quantity: str | None, known: Iterable[str], usual: str) -> s
     known = [*known]
     if quantity is None:
         return usual
-    for name in (quantity, f"amplitude_{quantity}"):
+    for name in (f"amplitude_{quantity}", quantity):
         if name in known:
             return name
     raise ParameterError(
