@@ -598,3 +598,43 @@ def test_a_mass_matrix_has_no_switches():
 
     with pytest.raises(TraceError, match="absolute in its mass matrix"):
         System(model=Heavy())
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda x, v: -x - 0.2 * v * np.where(np.sign(v) * x > 0.0, 1.0, 0.0),
+        lambda x, v: -x - 0.2 * np.sign(x - 0.1 * np.sign(v)),
+        lambda x, v: -x - 0.2 * np.sign(np.sign(v)),
+    ],
+)
+def test_a_switch_of_a_value_that_jumps_is_refused(force):
+    """It passes 0 without a root, where the inner sign changes."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Nested(saltus.ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        channels: ClassVar[tuple[str, ...]] = ()
+
+        def force(self, t, x, velocity, load):
+            return force(x, velocity)
+
+    with pytest.raises(TraceError, match="depends on a value that jumps"):
+        saltus.simulate(saltus.System(model=Nested()), x=1.0, duration=6.0)
+
+
+def test_a_surface_whose_function_is_no_number_is_refused():
+    @dataclass(frozen=True, kw_only=True)
+    class Empty(saltus.ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        channels: ClassVar[tuple[str, ...]] = ()
+        surfaces: ClassVar[tuple] = (saltus.Surface(name="slow", function="limit"),)
+
+        def limit(self, t, x, velocity, load):
+            return None
+
+        def force(self, t, x, velocity, load, sides):
+            return -x - 0.1 * sides.slow
+
+    with pytest.raises(ParameterError, match=r"limit of Empty, .*must return one number, got None"):
+        saltus.simulate(saltus.System(model=Empty()), x=1.0, duration=1.0)

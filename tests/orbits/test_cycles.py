@@ -479,3 +479,14 @@ def test_a_cycle_is_the_same_in_other_units(belt, rate, length):
     assert len(two.special) == len(one.special)
     assert [end.reason for end in two.ends] == [end.reason for end in one.ends]
     assert two.at(0.2 * scale)[0].period * rate == pytest.approx(one.at(0.2)[0].period, rel=1e-11)
+
+
+@pytest.mark.parametrize("place", [1e5, 1e9])
+def test_a_wall_that_is_far_away_hides_no_cycle(place):
+    """A motion of the size 2 is small beside its distance, which is the only length that is known
+    before it is followed."""
+    far = System(model=StoppedVanDerPol(mu=1.0, place=place), impact=NewtonImpact(0.5))
+    orbit = saltus.find_orbit(far, x=0.5)
+    assert orbit.period == pytest.approx(6.663286859323130, rel=1e-10)  # of the one without a wall
+    with pytest.raises(saltus.MotionError, match="equilibrium"):
+        saltus.find_orbit(far.with_({"model.mu": -0.5}), x=0.5)

@@ -522,8 +522,21 @@ class ContactModel(Model):
         )
 
     def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
-        """The value of a surface's function."""
-        return ask(self, str(surface.function), t, q, v, load)
+        """The value of a surface's function.
+
+        Raises
+        ------
+        ParameterError
+            It is no number.
+        """
+        value = ask(self, str(surface.function), t, q, v, load)
+        if value is None or isinstance(value, (tuple, list, str, dict)):
+            raise ParameterError(
+                f"{surface.function} of {type(self).__name__}, the function of"
+                f" {called_part(surface)}, must return one number, got {shown(value)}",
+                "function",
+            )
+        return value
 
     def mass_matrix(self, theta: Any) -> Any:
         """M(q): rows of numbers, symmetric and positive definite; with one coordinate a number, or

@@ -48,7 +48,8 @@ RECORD_WIDTH = 5
 ALLOWED = (
     "+ - * /, powers, NumPy's"
     f" {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the"
-    " coordinate (the sign of the coordinate is `side`)"
+    " coordinate (the sign of the coordinate is `side`); in the force of a ContactModel also abs,"
+    " sign, maximum, minimum, where and clip of any value"
 )
 BRANCH = (
     "only an impact law may compare: where the equations change at a contact, the model is a"

@@ -2,9 +2,9 @@
 
 A wheel may hold the kernels' machine code for some levels of processors, as numba has compiled it
 where the wheel was built (`release/ship_kernels.py`). Code is read from there only if all that it
-depends on is the same: the kernel's text, which is a digest in the file's name, the version of
-Python, those of numba and llvmlite, the system, and no setting that asks numba for another
-processor. Otherwise the kernels are compiled, as without a wheel.
+depends on is the same. That is the kernel's text, of which a digest is in the file's name, the
+versions of Python, numba and llvmlite, and the system. No setting may ask numba for another
+processor, either. Otherwise the kernels are compiled, as without a wheel.
 """
 
 from __future__ import annotations

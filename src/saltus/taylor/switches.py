@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from saltus.errors import TraceError
 from saltus.systems import CONTINUOUS, Sides
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor.graph import (
@@ -79,9 +80,24 @@ class Switches:
         if all(x.op == "number" for x in (a, b)):
             return number(turned if a.value >= b.value else -turned)
         if (a, b) not in self._numbers:
+            new = combine("sub", a, b)
+            self._check_continuous(new)
             self._numbers[a, b] = len(self.functions)
-            self.functions.append(combine("sub", a, b))
+            self.functions.append(new)
         return turned * Expr("slide", (), self._first + self._numbers[a, b])
+
+    def _check_continuous(self, function: Expr) -> None:
+        """Refuse a function whose own sides may make it jump through 0, which is no root of it."""
+        for node in ordered([function]):
+            if node.op != "slide":
+                continue
+            own = node.value - self._first
+            if own < 0 or own in self.jumping:
+                raise TraceError(
+                    "a sign or a condition depends on a value that jumps where another one changes"
+                    " its sign, and is not followed: write it as one function that is continuous,"
+                    " such as v*x > 0 for sign(v)*x > 0"
+                )
 
 
 def _above(side_of: Callable[..., Expr], a: Expr, b: Expr) -> Expr:

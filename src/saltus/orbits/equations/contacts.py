@@ -139,9 +139,11 @@ class ContactsEquations(OrbitEquations):
     def read(
         cls, base: OrbitEquations, motion: MotionToRead
     ) -> tuple[OrbitEquations, np.ndarray] | None:
-        """None with frictions, dependent sums, contacts that multipliers hold or accumulations of
-        impacts, or with walls that move the mass matrix, for which there are no equations from
-        event to event."""
+        """None where there are no equations from event to event.
+
+        These are models with frictions, dependent sums, contacts that multipliers hold or walls
+        that move the mass matrix, and accumulations of impacts.
+        """
         known: Any = base.system.contact_model if isinstance(base, cls) else None
         if (
             known is None

@@ -41,12 +41,16 @@ class FindCycleSettings:
     as_near: float = 3.0
     # A motion smaller than this, in natural units, stands still.
     still: float = 1e-6
+    # One that swings in its second half by this share of its whole swing is no decaying one.
+    kept: float = 0.99
     # Impacts that change speeds by less, in natural units, are touches: a motion settles on a swing that
     # touches as the root of the distance.
     touching: float = 1e-5
 
 
 SETTINGS = FindCycleSettings()
+SHRUNK = 1e-2  # A solution smaller than this share of the motion is none of its cycles.
+SAMPLES = 4001  # of the second half of a small motion
 SHORTEST = 1e-6  # of a round, as a share of the time of several rounds
 
 
@@ -56,6 +60,7 @@ class Return(NamedTuple):
     state: np.ndarray
     time: float  # how long it is away
     apart: float  # how far it is away then, as a share of the motion's size
+    size: float  # the motion's, in natural units
 
 
 def natural_period(system: System) -> float:
@@ -137,7 +142,7 @@ def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Ret
     else:
         near = max(SETTINGS.as_near * float(distance.min()), SETTINGS.returned * size)
         chosen = int(np.argmax(distance <= near))
-    return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size)
+    return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size, size)
 
 
 def swing_of(base: OrbitEquations, motion: Motion) -> float:
@@ -148,26 +153,41 @@ def swing_of(base: OrbitEquations, motion: Motion) -> float:
     MotionError
         The motion stands still.
     """
-    size = float((np.ptp(motion.extrema, axis=1) / base.natural.lengths).max())
-    if not size > SETTINGS.still:
+    size = size_of(base, motion)
+    if not size > SETTINGS.still and not _keeps_swinging(base, motion, size):
         raise MotionError(
             "the motion comes to an equilibrium, which is no cycle; start farther from it"
         )
     return size
 
 
+def size_of(base: OrbitEquations, motion: Motion) -> float:
+    """The largest way of a coordinate, from its least to its largest value, in natural units."""
+    return float((np.ptp(motion.extrema, axis=1) / base.natural.lengths).max())
+
+
+def _keeps_swinging(base: OrbitEquations, motion: Motion, size: float) -> bool:
+    """Whether a motion that is small in natural units, as beside walls that are far away, swings as
+    far in its second half as in all of it, and farther than rounding.
+    """
+    places = np.linspace(0.5 * (motion.start + motion.time), motion.time, SAMPLES)
+    position = np.atleast_2d(motion.at(places)[0])
+    later = float((np.ptp(position, axis=1) / base.natural.lengths).max())
+    rounding = float((np.abs(position).max(axis=1) / base.natural.lengths).max())
+    return later > SETTINGS.kept * size and later > SETTINGS.returned * rounding
+
+
 def check_is_cycle(base: OrbitEquations, orbit: PeriodicOrbit, back: Return) -> None:
     """Refuse a solution that is an equilibrium, and a cycle that only touches a contact: motions
     without impacts lie beside it, and it is solved to the root of rounding only.
     """
-    try:
-        swing_of(base, orbit.followed)
-    except MotionError as error:  # without loss an equilibrium solves the equations, too
+    # without loss an equilibrium solves the equations, too
+    if not size_of(base, orbit.followed) > SHRUNK * back.size:
         raise MotionError(
             f"the motion comes back after {back.time:.9g}, but Newton's method finds an equilibrium"
             " near it alone: it settles slowly, or swings beside it are cycles, too; let it settle"
             " for longer (settle=...), or try another start"
-        ) from error
+        )
     impacts = orbit.followed.impacts
     jumps = np.abs(impacts.velocity_after - impacts.velocity_before)
     largest = float(jumps.max(initial=0.0))
