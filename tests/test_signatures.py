@@ -39,6 +39,7 @@ SEVERAL = {
     "data": "what was measured, or a system as a dictionary",
     "e": "a coefficient of restitution, one or a matrix of several contacts",
     "equations": "of a model in symbols, or of an orbit",
+    "function": "what is computed over a grid, or the name of a surface's method",
     "functions": (
         "quantities by name: of an orbit, of a motion, or of a motion at the times of a record"
     ),

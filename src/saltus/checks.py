@@ -534,6 +534,7 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
 
     def decorate(function: Callable[P, R]) -> Checked[P, R]:
         switches = switches_of(function)
+        shows = _has_progress(function)
         open_ended = [
             p.name
             for p in inspect.signature(function).parameters.values()
@@ -557,7 +558,9 @@ def checked_by(check: Callable[..., object]) -> Callable[[Callable[P, R]], Check
         def call(*given: Any, **named: Any) -> R:
             try:
                 bound = refuse(*given, **named)
-                return told(function, *bound.args, **bound.kwargs)
+                if shows or "progress" in named:
+                    return told(function, *bound.args, **bound.kwargs)
+                return function(*bound.args, **bound.kwargs)
             except OF_OTHER_KINDS as error:
                 _refuse_kinds(function, given, named, error)
                 raise

@@ -488,6 +488,23 @@ def test_a_woodpecker_comes_to_its_cycle():
     assert {str(each.kind) for each in in_a_cycle} == {"impact", "release", "stick", "slip"}
 
 
+def test_the_cycle_of_a_woodpecker_is_an_orbit_whose_height_falls():
+    """Nothing depends on the height, which is left out of what returns. Period and multiplier are
+    those of the test above."""
+    system = System(model=Woodpecker(), impact=NewtonImpact(e=0.0))
+    start = {"y": 0.0, "sleeve": -(SLEEVE - ROD) / LENGTH, "bird": -0.2788}
+    orbit = saltus.find_orbit(
+        system, **start, velocity=(-0.3411, 0.0, -7.4583), settle=3.0, period=0.146
+    )
+    assert abs(orbit.period - 0.145976065143752) < 1e-13
+    assert orbit.stable
+    assert abs(orbit.multipliers[0] + 0.839155653) < 1e-8
+    assert np.abs(orbit.multipliers[1:]).max() < 1e-12
+    motion = orbit.motion()
+    fallen = motion.at(motion.time)[0][0] - motion.at(motion.start)[0][0]
+    assert -0.01 < fallen < -0.001
+
+
 # --- statics, and the same contacts of coordinates ---
 
 

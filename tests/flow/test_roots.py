@@ -374,7 +374,7 @@ def test_the_leading_coefficient_is_the_first_one_above_the_rounding_of_its_seri
         start = base + int(rng.integers(-min(base, 1), 2))
         size = 10.0 ** rng.uniform(-2, 2)
         expected = first_above_rounding(c, start, ZERO, size, base)
-        assert leading(c, start, order, ZERO, size, base) == expected
+        assert leading(c, start, order, ZERO, size, base, 0.0) == expected
         seen.add(expected - start)
     assert {0, 1, 2} <= seen
 

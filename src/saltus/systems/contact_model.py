@@ -524,6 +524,13 @@ class ContactModel(Model):
     def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
         """The value of a surface's function.
 
+        Parameters
+        ----------
+        surface
+            The surface.
+        t, q, v, load
+            The time, the coordinates, their velocities and the load, as the function takes them.
+
         Raises
         ------
         ParameterError

@@ -279,7 +279,7 @@ def stack_of_cache_lines(function: Any, line: int) -> None:
 
 def functions_text(functions: Sequence[WrittenFunction]) -> str:
     """Functions as text, which is all that their code depends on besides `written_by`."""
-    return "\n".join(map(repr, functions))
+    return graph.shared_text(functions)
 
 
 @cache

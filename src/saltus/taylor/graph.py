@@ -75,12 +75,14 @@ UFUNCS = (
 
 
 class _UsersCode(threading.local):
-    """Whether a user's code runs in this thread, which may not compare symbols, and whether it may
-    have switches.
+    """Whether a user's code runs in this thread, which may not compare symbols, whether it may
+    have switches, and how expressions are written.
     """
 
     runs = False
     switches = False
+    # while expressions are written once each (`shared_text`)
+    shared: Any = None
 
 
 _USERS_CODE = _UsersCode()
@@ -256,6 +258,8 @@ class Expr:
         raise TraceError(f"a traced quantity has no {name!r}; allowed are {ALLOWED}")
 
     def __repr__(self) -> str:
+        if _USERS_CODE.shared is not None:
+            return _USERS_CODE.shared.name_of(self)
         if self.op in LEAVES:
             return self.op if self.value is None else f"{self.op}[{self.value}]"
         return f"{self.op}({', '.join(map(repr, self.args))})"
@@ -423,6 +427,40 @@ def ordered(roots: list[Expr]) -> list[Expr]:
             else:
                 order.append(node)
     return order
+
+
+class _Shared:
+    """Names of expressions that are written once, however often they are used."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[int, int] = {}
+        self.roots: list[Expr] = []
+
+    def name_of(self, node: Expr) -> str:
+        """The name of an expression, a new one at its first use."""
+        if id(node) not in self._numbers:
+            self._numbers[id(node)] = len(self.roots)
+            self.roots.append(node)
+        return f"#{self._numbers[id(node)]}"
+
+    def lines(self) -> Iterator[str]:
+        """What each name stands for."""
+        for node in ordered(list(self.roots)):
+            args = ", ".join(map(self.name_of, node.args))
+            yield f"{self.name_of(node)} = {node.op}[{node.value}]({args})"
+
+
+def shared_text(objects: Iterable[Any]) -> str:
+    """Objects with expressions as text, in which each expression stands once: written out in full,
+    those of a large mass matrix would take minutes.
+    """
+    shared = _Shared()
+    _USERS_CODE.shared = shared
+    try:
+        written = [repr(each) for each in objects]
+        return "\n".join([*written, *shared.lines()])
+    finally:
+        _USERS_CODE.shared = None
 
 
 def is_steep(roots: list[Expr]) -> bool:

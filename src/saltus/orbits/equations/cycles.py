@@ -32,6 +32,7 @@ from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMoti
 from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.systems import System
+from saltus.taylor import ordered
 
 # The parts of a step at whose ends the distance from a section is compared; a part at which it
 # rises through 0 is halved so many times.
@@ -79,6 +80,14 @@ class CycleEquations(WholeMotionEquations):
     def section_along(self, motion: Motion, solution: Solution) -> tuple[Signature, np.ndarray]:
         signature, state = _section_along(self, motion, self.signature.period)
         return signature, np.append(state, solution.unknowns[-1])
+
+    @cached_property
+    def following(self) -> np.ndarray:
+        """Coordinates on which nothing depends may drift along a cycle, too, as the height of a toy
+        that slides down its rod.
+        """
+        drifting = drifting_coordinates(self._run.trace)
+        return np.union1d(super().following, drifting).astype(int)
 
     @property
     def size(self) -> int:
@@ -414,6 +423,21 @@ def _extrapolated(
         )
         value += parameters[own] * weight
     return value
+
+
+def drifting_coordinates(trace: Any) -> list[int]:
+    """The coordinates on which no equation of a trace depends, though their rates may enter; none
+    of a structure, whose modes are no expressions.
+    """
+    if trace.modes is not None:
+        return []
+    roots = [*trace.acceleration, *trace.reactions, *trace.contact_numbers]
+    roots += [*trace.margins.values(), *trace.limits.values()]
+    places = {node.value for node in ordered(roots) if node.op == "coordinate"}
+    if not trace.rows:  # the gaps are coordinates themselves
+        places |= {*trace.contact_coordinates}
+        places |= {-1 - place for place in trace.friction_coordinates if place < 0}
+    return [i for i in range(trace.dof - trace.first_order) if i not in places]
 
 
 def _section_along(
