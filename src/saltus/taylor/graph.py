@@ -259,7 +259,8 @@ class Expr:
 
     def __repr__(self) -> str:
         if _USERS_CODE.shared is not None:
-            return _USERS_CODE.shared.name_of(self)
+            name: str = _USERS_CODE.shared.name_of(self)
+            return name
         if self.op in LEAVES:
             return self.op if self.value is None else f"{self.op}[{self.value}]"
         return f"{self.op}({', '.join(map(repr, self.args))})"
