@@ -3,6 +3,7 @@ appear and end, and its stiffest mode is 500 times as fast as the load.
 """
 
 import functools
+import os
 
 import numpy as np
 import pytest
@@ -68,6 +69,15 @@ def system(share: float, mass_unit: float = 1.0, elements: int = ELEMENTS) -> sa
     return saltus.System(model=beam, load=load, impact=saltus.NewtonImpact(0.0))
 
 
+# Without fused multiplications the rounding of elastic forces is larger, and hides an excursion at
+# other places: a branch may end there, by name.
+ROUNDED_MORE = pytest.mark.xfail(
+    "-fma" in os.environ.get("NUMBA_CPU_FEATURES", ""),
+    reason="excursions are resolved less well without fused multiplications",
+    strict=False,
+)
+
+
 @functools.cache
 def branch(share: float, mass_unit: float = 1.0) -> saltus.Branch:
     """The branch from the orbit of a load, over the resonance."""
@@ -96,7 +106,9 @@ def test_the_branch_goes_over_the_resonance_from_one_free_motion_to_the_other() 
         assert np.abs(located - grazing).min() < 1e-9
 
 
-@pytest.mark.parametrize("other", [(1.2, 1.0), (0.9, 1e3), (0.9, 1e-6)])
+@pytest.mark.parametrize(
+    "other", [(1.2, 1.0), (0.9, 1e3), pytest.param((0.9, 1e-6), marks=ROUNDED_MORE)]
+)
 def test_the_branch_is_the_same_from_beyond_the_resonance_and_in_other_units_of_mass(
     other: tuple[float, float],
 ) -> None:
@@ -114,6 +126,7 @@ def test_motions_settle_on_the_branch(share: float) -> None:
     assert np.abs(np.array(amplitudes) - settled.amplitude).min() < 1e-10
 
 
+@ROUNDED_MORE
 def test_an_excursion_vanishes_in_a_structure_of_forty_stiff_coordinates() -> None:
     """Its stiffest mode is 7000 times as fast as the load. From below, the branch comes to the end
     of the shortest excursion that is resolved; from above, to where the reaction is 0."""
