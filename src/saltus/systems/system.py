@@ -168,10 +168,11 @@ class System:
                     if getattr(self, name) is getattr(other, name)
                 }
             vars(other)["_memory"] = kept
-            own, others = self._in_gaps, other._in_gaps
-            within = None if own is None else vars(own).get("_memory")
-            if isinstance(within, dict) and OWN_TIME in within and others is not None:
-                vars(others)["_memory"] = {OWN_TIME: within[OWN_TIME]}
+            in_gaps = self._in_gaps
+            other_in_gaps = other._in_gaps
+            within = None if in_gaps is None else vars(in_gaps).get("_memory")
+            if isinstance(within, dict) and OWN_TIME in within and other_in_gaps is not None:
+                vars(other_in_gaps)["_memory"] = {OWN_TIME: within[OWN_TIME]}
 
     @property
     def numbers_in_order(self) -> list[float]:

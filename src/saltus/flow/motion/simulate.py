@@ -225,14 +225,15 @@ def _plan(system: System, key: Any, asked: tuple[Any, ...]) -> MotionPlan:
     for plan in last:
         if all(map(is_, plan.asked, asked)):
             return plan
-    known, period = _checked, system.load.period
+    checked_before = _checked
+    period = system.load.period
     if (
-        known.plan is not None
-        and known.period == period
-        and all(map(is_, known.plan.asked, asked))
-        and known.key == key
+        checked_before.plan is not None
+        and checked_before.period == period
+        and all(map(is_, checked_before.plan.asked, asked))
+        and checked_before.key == key
     ):
-        made = known.plan._replace(again=[])
+        made = checked_before.plan._replace(again=[])
         last[:] = [made]
         return made
     periods, duration, tol, time, side, stop_at, dense, whole = asked
