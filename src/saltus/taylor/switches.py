@@ -76,7 +76,8 @@ class Switches:
             if len(factors) == 1 and factors[0].value < 0.0:
                 turned, a = -1.0, a.args[1 - a.args.index(factors[0])]
         if (b, a) in self._numbers or a is number(0.0):
-            turned, a, b = -turned, b, a
+            turned = -turned
+            a, b = b, a
         if all(x.op == "number" for x in (a, b)):
             return number(turned if a.value >= b.value else -turned)
         if (a, b) not in self._numbers:
