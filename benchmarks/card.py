@@ -1,7 +1,7 @@
 """What a card gains: throughput, a chart, a basin and the fragility of a block, beside the lanes of
 the same machine; first whether both agree.
 
-    python benchmarks/card.py            # on a machine with a card, under four minutes
+    python benchmarks/card.py            # on a machine with a card, some five minutes
     python benchmarks/card.py --small    # a thousandth of the work, to try the script
 
 Agreement of more models is a test: `python -m pytest -m gpu tests/flow/test_cuda.py`.
@@ -105,7 +105,8 @@ def main() -> None:
     chart = {"parameters": columns, "theta": 0.3, "until": ("rest",), "periods": PERIODS}
     measured("a chart of 10^6 cells", given.device, system=metainterface(0.9), **chart)
     shaken_blocks(given.device, 10**5 // shrunk)
-    measured("a basin of 4000 x 4000", given.device, periods=50, **grid(4000 // shrunk))
+    # A call takes ten million motions at most.
+    measured("a basin of 3000 x 3000", given.device, periods=50, **grid(3000 // shrunk))
 
 
 if __name__ == "__main__":

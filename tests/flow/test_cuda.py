@@ -117,14 +117,11 @@ def both_layers(count, rng):
     return layers(e=(0.1, 0.1)), columns, {"theta_1": start[0], "theta_2": -start[1]}
 
 
-@pytest.mark.parametrize(
-    "cases", [between_stops, pytest.param(both_layers, marks=pytest.mark.thorough)]
-)
-def test_models_with_several_contacts_agree(cases, monkeypatch, host):
-    """Ends and what is counted, in all motions that a change of the start by 1e-9 moves by less
-    than 1e-7.
+def agree_with_several_contacts(cases, monkeypatch, host, count):
+    """Compare ends and what is counted, in all motions that a change of the start by 1e-9 moves by
+    less than 1e-7.
     """
-    system, columns, state = cases(100, np.random.default_rng(7))
+    system, columns, state = cases(count, np.random.default_rng(7))
     many = {"periods": 12, "parameters": columns, "tol": TOL, **ALL, **EARLY}
     lanes = saltus.simulate_many(system, **state, **many)
     moved = saltus.simulate_many(
@@ -142,6 +139,13 @@ def test_models_with_several_contacts_agree(cases, monkeypatch, host):
         assert (lanes[counted].values == threads[counted].values)[calm].all(), counted
     difference = np.abs(end_state(lanes, system) - end_state(threads, system))
     assert difference[calm].max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "cases", [between_stops, pytest.param(both_layers, marks=pytest.mark.thorough)]
+)
+def test_models_with_several_contacts_agree(cases, monkeypatch, host):
+    agree_with_several_contacts(cases, monkeypatch, host, 100)
 
 
 # --- launches ----------------------------------------------------------------
@@ -387,14 +391,25 @@ def test_a_file_may_name_the_device(tmp_path, monkeypatch):
         study.answer(ask, ask.function.check)
 
 
-@pytest.mark.gpu
-def test_a_card_agrees_with_the_lanes(monkeypatch):
+@pytest.fixture
+def card():
+    """A card of this machine."""
     try:
-        card = devices.card()
+        return devices.card()
     except SaltusError as error:
         pytest.skip(f"no card was seen: {error}")
-    for name in ("paper", "records", "rocking"):
-        agree(name, monkeypatch, card, count=1000, **ALL, **EARLY)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("name", [name for name in FAMILIES if name != "pair"])
+def test_a_card_agrees_with_the_lanes(name, monkeypatch, card):
+    agree(name, monkeypatch, card, count=1000, **ALL, **EARLY)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("cases", [between_stops, both_layers])
+def test_a_card_agrees_on_models_with_several_contacts(cases, monkeypatch, card):
+    agree_with_several_contacts(cases, monkeypatch, card, 1000)
 
 
 def test_the_doctor_tells_the_rate_of_a_card(monkeypatch, host):
