@@ -11,11 +11,13 @@ with h = u or h = a - b. A motion is followed on these sides as on those of a `S
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import TraceError
-from saltus.systems import CONTINUOUS, Sides
+from saltus.systems import Sides
 from saltus.systems import substitute as substitute_numbers
 from saltus.taylor.graph import (
     POINTWISE,
@@ -25,22 +27,36 @@ from saltus.taylor.graph import (
     comparing_symbols,
     number,
     ordered,
+    substitute,
     switching,
 )
 
 OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "**"}
 LONGEST_NAME = 40  # of a formula in the name of an event
+ODD = ("sinh", "tanh", "atan")  # functions that have the sign of their operand
+TINY = 1e-300  # keeps 0 / 0 away, and is lost in the square of any number above 1e-142
 
 
 class Switches:
-    """The switches of some expressions, with leaves "slide" from a number on for their sides."""
+    """The switches of some expressions, with leaves "slide" from a number on for their sides.
 
-    def __init__(self, first: int) -> None:
+    Functions that have one sign are one switch: factors that are positive, or constant, and powers
+    are left out, as in k u, u / w, u^3, u exp(w) and tanh(u), which have the sign of u. `known` are
+    those of surfaces that the model declares, by the numbers of their leaves.
+    """
+
+    def __init__(self, first: int, known: Mapping[int, Expr]) -> None:
         self._first = first
         self._numbers: dict[tuple[Expr, ...], int] = {}
         self._made: dict[int, Expr] = {}
         self.functions: list[Expr] = []
         self.jumping: set[int] = set()  # those at which values may jump
+        # absolute values, s u: they are 0 where their side changes
+        self.sizes: set[Expr] = set()
+        for place, function in known.items():
+            sign, core = _sign_and_core(function, self.sizes)
+            if core is not None and sign is number(1.0):
+                self._numbers[_difference(core)] = place - first
 
     def written(self, roots: Iterable[Expr]) -> list[Expr]:
         """The expressions on the sides of their switches."""
@@ -55,41 +71,41 @@ class Switches:
         """A node whose operands are on their sides."""
         rule = RULES.get(node.op)
         if rule is not None:
-            side_of = self.side_of if node.op in CONTINUOUS else self.jumping_side_of
-            return as_expr(rule(side_of, *args))
+            return as_expr(rule(self, *args))
         return combine(node.op, *args) if args else node
 
-    def jumping_side_of(self, function: Expr, other: Any = 0.0) -> Expr:
-        """`side_of` where values may jump."""
-        side = self.side_of(function, other)
+    def size_of(self, value: Expr) -> Expr:
+        """The absolute value."""
+        size = self._side_of(value) * value
+        if size.op == "mul" and any(node.op == "slide" for node in ordered([size.args[0]])):
+            self.sizes.add(size)
+        return size
+
+    def side_of(self, function: Expr, other: Any = 0.0) -> Expr:
+        """The sign of a difference, at which values may jump."""
+        side = self._side_of(combine("sub", function, other))
         self.jumping |= {node.value - self._first for node in ordered([side]) if node.op == "slide"}
         return side
 
-    def side_of(self, function: Expr, other: Any = 0.0) -> Expr:
-        """The sign of a difference."""
-        a, b = function, as_expr(other)
-        if b is number(0.0) and a.op == "sub":
-            a, b = a.args
-        turned = 1.0
-        if a.op == "mul" and b is number(0.0):
-            factors = [x for x in a.args if x.op == "number"]
-            if len(factors) == 1 and factors[0].value < 0.0:
-                turned, a = -1.0, a.args[1 - a.args.index(factors[0])]
+    def _side_of(self, value: Expr) -> Expr:
+        """The sign of a value."""
+        sign, core = _sign_and_core(value, self.sizes)
+        if core is None:
+            return sign
+        a, b = _difference(core)
         if (b, a) in self._numbers or a is number(0.0):
-            turned = -turned
+            sign = -sign
             a, b = b, a
-        if all(x.op == "number" for x in (a, b)):
-            return number(turned if a.value >= b.value else -turned)
         if (a, b) not in self._numbers:
             new = combine("sub", a, b)
             self._check_continuous(new)
             self._numbers[a, b] = len(self.functions)
             self.functions.append(new)
-        return turned * Expr("slide", (), self._first + self._numbers[a, b])
+        return sign * Expr("slide", (), self._first + self._numbers[a, b])
 
     def _check_continuous(self, function: Expr) -> None:
         """Refuse a function whose own sides may make it jump through 0, which is no root of it."""
-        for node in ordered([function]):
+        for node in ordered([substitute(function, dict.fromkeys(self.sizes, 1.0))]):
             if node.op != "slide":
                 continue
             own = node.value - self._first
@@ -101,9 +117,66 @@ class Switches:
                 )
 
 
-def _above(side_of: Callable[..., Expr], a: Expr, b: Expr) -> Expr:
+def _difference(function: Expr) -> tuple[Expr, Expr]:
+    """The two values whose difference a function is."""
+    if function.op == "sub":
+        return function.args[0], function.args[1]
+    return function, number(0.0)
+
+
+def _sign_and_core(value: Expr, sizes: set[Expr]) -> tuple[Expr, Expr | None]:
+    """A constant sign and a function, whose product has the sign of a value wherever that is not 0;
+    without a function the sign is constant.
+    """
+    sign = number(1.0)
+    powers: dict[Expr, int] = {}
+    waiting = [value]
+    while waiting:
+        node = waiting.pop()
+        if node.op in ("mul", "div"):
+            divided = node.op == "div" and not (
+                _is_constant(node.args[1]) or _is_positive(node.args[1], sizes)
+            )
+            if not divided:
+                waiting += [node.args[1], node.args[0]]
+                continue
+        if node.op in ODD:
+            waiting.append(node.args[0])
+        elif node.op == "number":
+            sign = sign * float(np.sign(node.value) or 1.0)
+        elif _is_constant(node):
+            # exactly +1 or -1, but 0 for 0
+            sign = sign * (node / np.sqrt(node * node + TINY))
+        elif not _is_positive(node, sizes):
+            powers[node] = powers.get(node, 0) + 1
+    core: Expr | None = None
+    for node, power in powers.items():
+        if power % 2 == 1:
+            core = node if core is None else core * node
+    return sign, core
+
+
+def _is_constant(node: Expr) -> bool:
+    """Whether an expression has numbers and parameters alone."""
+    return all(x.args or x.op in ("number", "parameter") for x in ordered([node]))
+
+
+def _is_positive(node: Expr, sizes: set[Expr]) -> bool:
+    """Whether an expression is seen to be nowhere negative, where it is a number at all."""
+    if node.op in ("exp", "cosh", "sqrt") or node in sizes:
+        return True
+    if node.op == "pow" and node.args[1].op == "number":
+        return not float(node.args[1].value).is_integer()
+    if node.op == "number":
+        return bool(node.value >= 0.0)
+    if node.op == "mul" and node.args[0] is node.args[1]:
+        return True
+    return node.op in ("add", "mul", "div") and all(_is_positive(x, sizes) for x in node.args)
+
+
+def _above(switches: Switches, a: Expr, b: Expr) -> Expr:
     """1 where a > b, else 0."""
-    return 0.5 * (1.0 + side_of(a, b))
+    return 0.5 * (1.0 + switches.side_of(a, b))
 
 
 def _chosen(_: Any, condition: Expr, one: Expr, other: Expr) -> Expr:
@@ -111,15 +184,25 @@ def _chosen(_: Any, condition: Expr, one: Expr, other: Expr) -> Expr:
     return condition * one + (1.0 - condition) * other
 
 
+def _larger(switches: Switches, a: Expr, b: Expr) -> Expr:
+    """The larger one."""
+    return 0.5 * (a + b + switches.size_of(a - b))
+
+
+def _smaller(switches: Switches, a: Expr, b: Expr) -> Expr:
+    """The smaller one."""
+    return 0.5 * (a + b - switches.size_of(a - b))
+
+
 RULES: dict[str, Callable[..., Any]] = {
-    "absolute": lambda side_of, u: side_of(u) * u,
-    "sign": lambda side_of, u: side_of(u),
-    "maximum": lambda side_of, a, b: 0.5 * (a + b + side_of(a, b) * (a - b)),
-    "minimum": lambda side_of, a, b: 0.5 * (a + b - side_of(a, b) * (a - b)),
+    "absolute": Switches.size_of,
+    "sign": Switches.side_of,
+    "maximum": _larger,
+    "minimum": _smaller,
     "greater": _above,
     "greater_equal": _above,
-    "less": lambda side_of, a, b: _above(side_of, b, a),
-    "less_equal": lambda side_of, a, b: _above(side_of, b, a),
+    "less": lambda switches, a, b: _above(switches, b, a),
+    "less_equal": lambda switches, a, b: _above(switches, b, a),
     "where": _chosen,
 }
 

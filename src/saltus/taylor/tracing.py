@@ -4,7 +4,7 @@ the numbers beside them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -274,14 +274,15 @@ class Trace:
         self.friction_coordinates += (-1 - self.dof,) * more
         self.switches = tuple(called(function, names, self.parameters) for function in functions)
 
-    def let_slide(self) -> None:
+    def let_slide(self, sizes: set[Expr]) -> None:
         """Let the equations hold along functions too, with 0 for a side: there the accelerations
         are the mean of both sides by which the function stays at 0 (Filippov),
 
             h'(s) = (p + m s) / 2,    s = -p / m,
 
         with the sum p and the difference m of its rates on the sides +1 and -1. That s stands in
-        the place of the second margin.
+        the place of the second margin. The absolute values `sizes` stay as they are, as they are 0
+        with their functions.
         """
         found = dict[Expr, Any]()
         declared = len(self.friction_coordinates) - len(self.switches)
@@ -290,20 +291,25 @@ class Trace:
             place = len(self.signs) + 2 * k
             if k >= declared and k not in self.jumping:
                 continue
-            if any(side in ordered([differentiate(a, side)]) for a in self.acceleration):
-                continue  # no mean of both sides
+            own = {size: size for size in sizes if side in ordered([size.args[0]])}
+            means = [_mean_of_sides(a, side, own) for a in self.acceleration]
+            mean = [each for each in means if each is not None]
+            if len(mean) < len(means):
+                continue
             above, below = (
                 self.rate_along(
                     substitute(self.reactions[place], {side: s}),
-                    [substitute(a, {side: s}) for a in self.acceleration],
+                    [substitute(a, own | {side: s}) for a in mean],
                 )
                 for s in (1.0, -1.0)
             )
             apart = above - below
             if apart is number(0.0):
                 continue
+            self.acceleration = mean
             share = -((above + below) * apart) / (apart * apart + side * side)
             self.reactions[place + 1] = share
+            found |= own
             found[side] = side + (1.0 - side * side) * share
         if found:
             for roots in (self.acceleration, self.reactions):
@@ -467,7 +473,8 @@ def trace(
         )
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
-    switches = Switches(len(result.friction_coordinates))
+    declared = {k: result.reactions[len(result.signs) + 2 * k] for k in result.functions}
+    switches = Switches(len(result.friction_coordinates), declared)
     if several:
         result.acceleration = switches.written(result.acceleration)
         result.reactions = switches.written(result.reactions)
@@ -484,7 +491,7 @@ def trace(
         first = len(result.friction_coordinates)
         result.jumping = frozenset(first + place for place in switches.jumping)
         result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
-        result.let_slide()
+        result.let_slide(switches.sizes)
     if energy:
         result.margins["kinetic_energy"] = combine(
             "add", ask_user(model, "kinetic_energy", t, q, v, side, load), 0.0
@@ -494,6 +501,25 @@ def trace(
         result.append_tangent(paths)
         check_size(result)
     return result
+
+
+def _mean_of_sides(root: Expr, side: Expr, sizes: Iterable[Expr]) -> Expr | None:
+    """An expression of a side that is linear in it, and has the given values on both sides; None
+    where its formula of one side may be no number on the other one.
+
+    The absolute values `sizes` do not count, which are 0 where the side changes.
+    """
+    plain = substitute(root, {size: Expr("slide", (), -1 - i) for i, size in enumerate(sizes)})
+    if side not in ordered([differentiate(plain, side)]):
+        return root
+    for node in ordered([plain]):
+        if node.op in ("sqrt", "log", "pow", "div") and side in ordered([node.args[-1]]):
+            return None
+        if node.op in ("sqrt", "log", "pow") and side in ordered([node.args[0]]):
+            return None
+    kept: dict[Expr, Any] = {size: size for size in sizes}
+    above, below = (substitute(root, kept | {side: s}) for s in (1.0, -1.0))
+    return 0.5 * (above + below) + 0.5 * side * (above - below)
 
 
 def _edges(model: Any, contact: Expr | None, coordinates: tuple[Expr, ...]) -> dict[str, Any]:

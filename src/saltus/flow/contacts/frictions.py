@@ -188,6 +188,19 @@ def stays(motion, k, t):
 
 
 @lean_jit
+def note_other_side(motion, k, t):
+    """Note how a motion that has slid along a function would move on the other side, for the
+    natural scales: at the release the terms of the accelerations cancel."""
+    row = motion.frictions[k]
+    row[FrictionColumn.SLIDES] *= -1
+    hold_frictions(motion)
+    expand(motion, t, 1.0, 0)
+    for i in range(motion.own - motion.first_order):
+        motion.press = max(motion.press, abs(motion.acceleration_series[i, 0]))
+    row[FrictionColumn.SLIDES] *= -1
+
+
+@lean_jit
 def choose_sides(motion, t):
     """Choose the sides of the functions that are to be read: those to which the motion moves on.
 
@@ -203,6 +216,8 @@ def choose_sides(motion, t):
         if is_to_read(motion, k) and row[FrictionColumn.SLIDES] == 0 and not stays(motion, k, t):
             row[FrictionColumn.SLIDES] = 1
             changed = 2
+        if is_function(motion, k) and 0 < row[FrictionColumn.REACHED] < 3:
+            note_other_side(motion, k, t)
     for _ in range(2 + 3 * motion.frictions.shape[0]):
         hold_frictions(motion)
         expand(motion, t, 1.0, motion.order)

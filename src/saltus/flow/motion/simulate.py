@@ -600,7 +600,8 @@ def refuse(system: System, status: int, now: KernelState) -> None:
         raise MotionError(
             f"at time {time:.9g} the motion is at 0 of {names}, and how it goes on is not known: both"
             " sides lead away, so that it is not unique, or it would slide along several functions at"
-            " once, or along one in whose side the force is not linear; start beside it"
+            " once, or along one whose sign stands in a root, a logarithm, a power or a denominator"
+            " of the force; start beside it"
         )
     in_rows = system.model.has_multipliers
     if status in (Status.NOT_UNIQUE, Status.NO_IMPACT) and in_rows:
