@@ -11,7 +11,6 @@ FIRST_ORDER = "a page cannot show coordinates of first order yet"
 EXTREMA = "give system.in_gap_coordinates"
 MANY = "lyapunov_many works on models with one coordinate"
 
-SWEEP = "cycles without a load are not swept yet"
 DIAGRAM = "are not drawn in diagrams yet"
 
 DISTANCES = "does not follow contacts of a distance"
@@ -40,7 +39,6 @@ REFUSED = {
     ("own, with surfaces", "page"): SURFACES,
     ("own, friction in a contact", "page"): RUBBING,
     ("own, first order", "page"): FIRST_ORDER,
-    ("belt, no load", "sweep"): SWEEP,
     ("belt, no load", "diagram"): DIAGRAM,
     ("own, two feet that rub", "page"): DISTANCES,
     ("own, switches", "page"): SURFACES,
@@ -58,7 +56,6 @@ REASONS = {
     ),
     MANY: "`lyapunov_many` is for models with one coordinate; `lyapunov_spectrum` takes any.",
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
-    SWEEP: "Cycles without a load are not swept yet; `continue_orbit` follows them.",
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
     DISTANCES: "A page cannot show contacts of a `distance` and frictions of a `rate` yet.",
 }

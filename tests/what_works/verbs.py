@@ -157,7 +157,9 @@ def branch(tried: Tried, folder: Path) -> None:
 def sweep(tried: Tried, folder: Path) -> None:
     """A sweep has the amplitude of the stable orbit on which the motion settles."""
     values = [tried.parameter, 1.001 * tried.parameter]
-    found = saltus.frequency_sweep(tried.system, values, periods=400, **tried.start)
+    found = saltus.frequency_sweep(
+        tried.system, values, path=tried.path, periods=400, **tried.start
+    )
     up = found.amplitude.values[0]
     assert np.isfinite(found.amplitude).all()
     assert abs(up[0] - tried.orbit.amplitude) < 1e-5 * tried.orbit.amplitude

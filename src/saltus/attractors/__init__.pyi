@@ -22,3 +22,4 @@ from .saddle_manifolds import Manifold as Manifold
 from .saddle_manifolds import plane_window as plane_window
 from .saddle_manifolds import unstable_manifold as unstable_manifold
 from .stroboscopic_section import approached_orbit as approached_orbit
+from .stroboscopic_section import check_periodic as check_periodic

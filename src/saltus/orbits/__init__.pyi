@@ -17,6 +17,9 @@ from .finding.from_motion import orbit_from as orbit_from
 from .finding.from_motion import orbits_near_returns as orbits_near_returns
 from .finding.from_motion import solved_near as solved_near
 from .finding.search import Search as Search
+from .finding.settled_cycle import SettledKind as SettledKind
+from .finding.settled_cycle import Settlement as Settlement
+from .finding.settled_cycle import settled_on as settled_on
 from .orbit import PeriodicOrbit as PeriodicOrbit
 from .orbits_as_json import as_json as as_json
 from .orbits_as_json import from_json as from_json

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from saltus.attractors import check_periodic
 from saltus.checks import check_axis, check_count, check_number, checked_by
 from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow import (
@@ -35,6 +36,7 @@ from saltus.flow import (
 )
 from saltus.progress import Progress, part_of, silent
 from saltus.result import provenance
+from saltus.studies.swept_cycles import EQUILIBRIUM, recurrence_without_load
 from saltus.systems import (
     System,
     arguments_of,
@@ -42,6 +44,7 @@ from saltus.systems import (
     check_path,
     check_system,
     driven_displacements,
+    natural_units,
     read_start,
 )
 
@@ -49,6 +52,7 @@ if TYPE_CHECKING:
     import xarray
 
 DIRECTIONS = ("up", "down")
+FREQUENCY = "load.frequency"
 # Columns of a sweep over both directions: what is read of the recurrence at each value, the unit and
 # the text of each.
 COLUMNS: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
@@ -59,6 +63,12 @@ COLUMNS: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
         "forcing periods after which it repeats itself; 0 where it does not",
     ),
     "periods": (lambda row: row.periods[0], "1", "forcing periods that it was followed"),
+}
+# The same without a load.
+COLUMNS_WITHOUT_LOAD: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = {
+    "impact_count": COLUMNS["impact_count"],
+    "period": (COLUMNS["period"][0], "1", "the time after which it repeats itself; 0 without one"),
+    "periods": (COLUMNS["periods"][0], "1", "natural periods that it was followed"),
 }
 
 
@@ -113,12 +123,8 @@ class SweepRequest:
         check_system(
             self.system, "frequency_sweep", several_contacts=True, multipliers=True, switches=True
         )
-        if self.system.load.frequency is None:
-            raise ParameterError(
-                "cycles without a load are not swept yet; give the Load a frequency, or follow a"
-                " cycle with find_orbit and continue_orbit",
-                "load.frequency",
-            )
+        if self.is_free:
+            self._check_without_load()
         check_path(self.system, self.path)
         given = check_axis("values", self.values, either_way=True)
         falling = bool(given[0] > given[-1])
@@ -150,6 +156,32 @@ class SweepRequest:
             read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__),
         )
 
+    @property
+    def is_free(self) -> bool:
+        """Whether the load has no period, so that it is cycles of any period that are swept."""
+        return self.system.load.frequency is None
+
+    def _check_without_load(self) -> None:
+        """Refuse what has no meaning without a load that varies."""
+        check_periodic(self.system)
+        if self.path == FREQUENCY:
+            raise ParameterError(
+                "the load has no frequency to sweep; give it one, or name another parameter, such "
+                "as path='model.belt_speed', over which cycles without a load are swept",
+                "path",
+            )
+        if not self.stop_early:
+            raise ParameterError(
+                "without a load there are no forcing periods for which a value could be kept; leave"
+                " out stop_early=False",
+                "stop_early",
+            )
+
+    @property
+    def columns(self) -> dict[str, tuple[Callable[[Recurrence], Any], str, str]]:
+        """What is read of the motion at each value."""
+        return COLUMNS_WITHOUT_LOAD if self.is_free else COLUMNS
+
     def proved_speeds(self, values: np.ndarray) -> np.ndarray:
         """The speeds of capture at these values, (n,), proved together: a single proof takes as
         long as that of a hundred.
@@ -157,7 +189,7 @@ class SweepRequest:
         columns = {self.path: values}
         return (
             captured_between(self.system, columns, columns)
-            if self.stop_early
+            if self.stop_early and not self.is_free
             else np.full(len(values), np.nan)
         )
 
@@ -167,6 +199,8 @@ class SweepRequest:
         """What becomes of states at phase 0, (n, d), with the speeds of capture, (n,), and
         parameters of their own.
         """
+        if self.is_free:
+            return recurrence_without_load(system, states, self.periods, parameters, self.tol)
         return find_recurrence(
             system,
             states,
@@ -199,6 +233,10 @@ class SweepRequest:
         """The motion on which a value was left: one period of it or, if it has none, `max_period`
         forcing periods, but no more than each value is kept for."""
         system = self.system.with_({self.path: float(value)})
+        if self.is_free:
+            lasting = float(rows.period[i]) or natural_units(system).time
+            start = arguments_of(system, rows.last[i])
+            return simulate(system, **start, duration=lasting, tol=self.tol)
         periods = int(rows.period[i]) or min(self.max_period, self.periods)
         return simulate(system, **arguments_of(system, rows.last[i]), periods=periods, tol=self.tol)
 
@@ -216,6 +254,24 @@ class SweepRequest:
             ranges = {self.coordinate_names[0]: (float(row.lowest[0]), float(row.highest[0]))}
             return {each.name: each.over(ranges) for each in self.extremes} | found
         return {each.name: each.of(motion) for each in self.extremes} | found
+
+    def outcome_of(self, row: Recurrence) -> str:
+        """The word for what a value was left on.
+
+        That all of it sticks when the time is up says nothing where it may slip in every period: what
+        goes on sticking is periodic. A part that moves beside it would change the word.
+        """
+        outcome = Ending(int(row.outcome[0]))
+        if self.is_free and outcome is Ending.PERIODIC and not row.period[0]:
+            return EQUILIBRIUM
+        if outcome is Ending.HELD and self.system.model.frictions:
+            outcome = Ending.UNDECIDED
+        return outcome.name.lower()
+
+    def kind_of(self, row: Recurrence) -> tuple[Any, ...]:
+        """What changes at a jump alone: the impacts and the period or, where the period is any time,
+        what the motion was left on."""
+        return row.impact_count[0], self.outcome_of(row) if self.is_free else row.period[0]
 
     def amplitude_of(self, value: float, rows: Recurrence, i: int) -> float:
         """The amplitude of the motion on which a value was left: of the coordinate or, of several,
@@ -258,6 +314,11 @@ def frequency_sweep(
     motion starts from the last state at the value before. If the values fall, the sweep goes down
     and then up.
 
+    Under a load without a frequency, on which nothing acts that varies with time, it is cycles that
+    are swept over a parameter that `path` names: a mass on a belt over the belt's speed. `period` is
+    then a time, `periods` counts natural periods, the state is that in which a value was left, and
+    `outcome` may be `equilibrium`. An equilibrium that repels is left.
+
     With `stop_early`, each value is kept until the motion repeats itself. Without, it is kept for
     exactly `periods` forcing periods: with periods=1 and many values the parameter changes slowly
     and steadily. Values change at phase 0 of the load, so that the phase of a harmonic does not
@@ -271,13 +332,14 @@ def frequency_sweep(
     Parameters
     ----------
     system
-        What moves, under a load with a frequency.
+        What moves, under a load with a frequency or a constant one.
     values
         Values of the parameter, increasing or falling.
     path
         Dotted path of the parameter.
     periods
-        Forcing periods at each value: the most with `stop_early`, else exactly so many.
+        Forcing periods at each value: the most with `stop_early`, else exactly so many. Without a
+        load natural periods, 2 pi natural times each.
     stop_early
         Whether a value is left as soon as the motion repeats itself.
     max_period
@@ -307,7 +369,8 @@ def frequency_sweep(
     Raises
     ------
     ParameterError
-        An argument without meaning; a load without a frequency; a start beyond a contact.
+        An argument without meaning; a load that does not repeat; `load.frequency` swept or
+        `stop_early=False` without a load; a start beyond a contact.
 
     Examples
     --------
@@ -435,7 +498,7 @@ def _jumps(
     least = dict[str, float]()
     for name, run in runs.items():
         least[name] = SETTINGS.least_step * run.amplitude.max(initial=0.0)
-        for i in _candidates(run):
+        for i in _candidates(asked, run):
             first, last = run.values[i : i + 2].tolist()
             a, b = run.amplitude[i : i + 2].tolist()
             steps.append(
@@ -495,14 +558,14 @@ def _parts(low: float, last: float, step: float) -> list[float]:
     return values
 
 
-def _candidates(run: _OneWay) -> list[int]:
+def _candidates(asked: SweepRequest, run: _OneWay) -> list[int]:
     """The steps of the amplitude that are large compared with those around them, or at which
     impacts or the period change.
     """
     sizes = run.amplitude
     reach = SETTINGS.neighbours // 2
     steps = np.abs(np.diff(sizes))
-    kinds = [(row.impact_count[0], row.period[0]) for row in run.rows]
+    kinds = [asked.kind_of(row) for row in run.rows]
     other = np.array([one != following for one, following in pairwise(kinds)], dtype=bool)
     around = [np.delete(steps, i)[max(0, i - reach) : i + reach] for i in range(steps.size)]
     usual = np.array([np.median(near) if near.size else 0.0 for near in around])
@@ -524,12 +587,12 @@ def _dataset(
     driven = driven_displacements(asked.system)
     names = model.coordinates
     unit = unit_of(asked.system, driven[0])
-    columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = dict(COLUMNS)
+    columns: dict[str, tuple[Callable[[Recurrence], Any], str, str]] = dict(asked.columns)
     for i, state in enumerate(state_names(names)):
         columns[state] = (
             partial(_state_of, i),
             model.unit_of(names[i % len(names)]),
-            f"{state} at phase 0",
+            f"{state} where it was left" if asked.is_free else f"{state} at phase 0",
         )
     table = {key: np.full((2, count), np.nan) for key in columns}
     outcome = np.full((2, count), "", dtype=f"<U{max(len(each.name) for each in Ending)}")
@@ -548,7 +611,7 @@ def _dataset(
             ]
     for run, values, words in zip(runs, zip(*table.values(), strict=True), outcome, strict=True):
         places = np.searchsorted(asked.grid, run.values)
-        words[places] = [Ending(int(row.outcome[0])).name.lower() for row in run.rows]
+        words[places] = [asked.outcome_of(row) for row in run.rows]
         for column, (read, _, _) in zip(values, columns.values(), strict=True):
             column[places] = [read(row) for row in run.rows]
     over = ("direction", "value")

@@ -203,19 +203,34 @@ def _cycle(
             "period=..., or let it settle first"
         )
     progress(0.99, "solving for the orbit")
-    start = arguments_of(base.system, on_this_side(base.system, found.state))
-    orbit = orbit_from(base, start, 1, found.time)
-    shorter = None if orbit is None else round_within(orbit)
-    if orbit is not None and shorter is not None:
-        orbit = orbit_from(base, orbit.equations.start(orbit.solution), 1, shorter) or orbit
-    if orbit is not None and orbit.admissible:
-        check_is_cycle(base, orbit, found)
+    orbit = cycle_from(base, found)
+    if orbit is not None:
         progress(1.0, "done")
         return orbit
     raise MotionError(
         f"Newton's method finds no cycle near the motion, which comes back after {found.time:.9g};"
         " try another start, another period=..., or let it settle first (settle=...)"
     )
+
+
+def cycle_from(base: OrbitEquations, found: Return) -> PeriodicOrbit | None:
+    """The cycle near a state to which a motion comes back, over its least period; None where
+    Newton's method finds none.
+
+    Raises
+    ------
+    MotionError
+        It finds an equilibrium, or a cycle that only touches a contact.
+    """
+    start = arguments_of(base.system, on_this_side(base.system, found.state))
+    orbit = orbit_from(base, start, 1, found.time)
+    shorter = None if orbit is None else round_within(orbit)
+    if orbit is not None and shorter is not None:
+        orbit = orbit_from(base, orbit.equations.start(orbit.solution), 1, shorter) or orbit
+    if orbit is None or not orbit.admissible:
+        return None
+    check_is_cycle(base, orbit, found)
+    return orbit
 
 
 def _at_phase_0(
@@ -315,6 +330,13 @@ def _polish(
     progress(0.99, "solving for the orbit")
     orbit = orbit_from(base, state, periods)
     if orbit is not None and orbit.admissible:
+        if orbit.creeps:
+            raise MotionError(
+                "the motion creeps to where it sticks for good, slower and slower, as it could at "
+                "any state beyond: the largest multiplier there, "
+                f"{abs(orbit.multipliers[0]):.9g}, is 1 within its own accuracy, and this is not "
+                "an isolated orbit"
+            )
         progress(1.0, "done")
         return orbit
     when = "from the start" if passed is None else f"after {passed} forcing periods"
