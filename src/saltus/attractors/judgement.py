@@ -14,7 +14,7 @@ import numpy as np
 
 from saltus.attractors.lyapunov.growth import LargestExponents
 from saltus.attractors.nonperiodic import regular_motion
-from saltus.attractors.stroboscopic_section import is_unforced
+from saltus.attractors.stroboscopic_section import creeping_orbit, is_unforced
 from saltus.enumerations import NumberedSentence
 from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period, simulate
 from saltus.progress import Progress, part_of, silent
@@ -95,6 +95,13 @@ class Reason(NumberedSentence):
     CYCLE = (
         20,
         "it goes round a cycle in the time {time:.12g}, with the largest multiplier {multiplier:.6g}",
+    )
+    CREEPS = (
+        21,
+        (
+            "it creeps to where it sticks for good, slower and slower: the largest multiplier there"
+            " is 1 within its own accuracy"
+        ),
     )
     ROUNDING = (
         19,
@@ -306,7 +313,7 @@ def judge(
     companions settle does not fall, there is no such attractor.
 
     Where nothing that acts on a system varies with time, nothing is judged: the answer is undecided
-    (`reason_unforced`). A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after
+    (`reason_unforced`); so it is where a motion creeps to sticking (`creeping_orbit`). A motion is periodic if its exponent is surely below 0, or if it is found to repeat itself after
     a long period. It is on a torus if its exponent may be 0 and the conditions of `regular_motion`
     hold.
 
@@ -365,10 +372,10 @@ class _Judgement:
         self.states = np.full((n, settings.companions, system.dimension), np.nan)
         for row, given in enumerate(states):
             self.states[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
-        # an entry for each question: a `Reason` where nothing that acts varies, so that nothing is
-        # looked for; else -1
-        self.unforced = np.array([self._unforced(row) for row in range(n)], dtype=int)
-        self.open = self.unforced < 0  # whether companions are still to be followed
+        # an entry for each question: a `Reason` where it is known why nothing is to be looked for,
+        # as nothing that acts varies or the motion creeps; else -1
+        self.foreseen = np.array([self._foreseen(row, states[row]) for row in range(n)], dtype=int)
+        self.open = self.foreseen < 0  # whether companions are still to be followed
         # whether the exponent is surely above, or below 0
         self.positive, self.negative = np.zeros((2, n), dtype=bool)
         # whether no companion is left; whether long periods were tried
@@ -385,10 +392,15 @@ class _Judgement:
         # Number of companions that settled in each round, and the round's exposure.
         self.history = np.zeros((2, settings.rounds + 1, n))
 
-    def _unforced(self, row: int) -> int:
-        """The number of the reason of a question on which nothing acts that varies; else -1."""
+    def _foreseen(self, row: int, states: np.ndarray) -> int:
+        """The number of the reason of a question on which nothing acts that varies, or whose last
+        states (m, d) creep; else -1.
+        """
         numbers = {path: float(values[row]) for path, values in self.parameters.items()}
-        reason = reason_unforced(self.system.with_(numbers) if numbers else self.system)
+        system = self.system.with_(numbers) if numbers else self.system
+        reason = reason_unforced(system)
+        if reason is None and creeping_orbit(system, states) is not None:
+            reason = Reason.CREEPS
         return -1 if reason is None else int(reason)
 
     def go_on_from(self, earlier: EarlierJudgement) -> None:
@@ -529,7 +541,7 @@ class _Judgement:
 
         Near bifurcations exponents are near 0, and motions settle slowly.
         """
-        chosen = chosen & (self.unforced < 0)
+        chosen = chosen & (self.foreseen < 0)
         rows = np.flatnonzero(chosen & ~self.positive & ~self.all_gone & ~self.looked)
         if not rows.size:
             return
@@ -594,9 +606,9 @@ class _Judgement:
         ):
             ending[chosen] = kind
             reason[chosen] = why
-        without = self.unforced >= 0
+        without = self.foreseen >= 0
         ending[without] = Ending.UNDECIDED
-        reason[without] = self.unforced[without]
+        reason[without] = self.foreseen[without]
         with np.errstate(divide="ignore", invalid="ignore"):
             life = np.where(
                 lasts, (self.exposure - self.before) / 3.0, self.exposure / self.settled_count

@@ -143,6 +143,9 @@ class CertificateSettings:
     slow: float = 1e-3
     approach: int = 64  # Forcing periods over which such a motion must come nearer to it.
     neutral: float = 1e-9  # A multiplier this near to 1 does not show that an orbit attracts.
+    # The longest step in a forcing period, in natural units, of a motion that may creep: in n
+    # periods a step becomes as short as 1/n^2.
+    step: float = 1e-4
 
 
 SETTINGS = CertificateSettings()
@@ -166,6 +169,11 @@ class Certificate:
             return f"no admissible orbit solves the equations there (residual {orbit.residual:.1g})"
         if orbit.grazes:
             return "the orbit there touches the contact without speed, and has no multipliers"
+        if orbit.creeps:
+            return (
+                "it creeps to where it sticks for good: the largest multiplier there, "
+                f"{abs(orbit.multipliers[0]):.9g}, is 1 within its own accuracy"
+            )
         if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - SETTINGS.neutral:
             return (
                 "the orbit there does not attract: its largest multiplier is "
@@ -253,6 +261,19 @@ def approached_orbit(
     quarter = max(1, len(apart) // 4)
     is_near = apart[0] <= within * orbit.size / orbit.equations.natural.length
     return orbit if is_near and apart[-quarter:].max() < apart[:quarter].max() else None
+
+
+def creeping_orbit(system: System, states: np.ndarray) -> PeriodicOrbit | None:
+    """The orbit towards which a motion with these last states (kept, d) at phase 0 creeps, slower and
+    slower, to stick there for good; None if it does not.
+    """
+    if not system.model.frictions or len(states) < 2:
+        return None
+    last = np.abs((states[-1] - states[-2]) / natural_units(system).state).max()
+    if not last < SETTINGS.step:  # also for nan
+        return None
+    orbit = solved_orbit(system, states[-1], 1)
+    return orbit if orbit is not None and orbit.creeps else None
 
 
 def solved_orbit(

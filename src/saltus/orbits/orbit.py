@@ -495,14 +495,38 @@ class PeriodicOrbit(Result):
             matrices.append(evaluation.jacobian(-1.0))
         return not any(_free(self.equations.in_units(matrix))[0].size for matrix in matrices)
 
+    @cached_property
+    def creeps(self) -> bool:
+        """Whether it is where a motion creeps to sticking for good: within its own accuracy lies one
+        that sticks for good, which has the multiplier 1.
+
+        The motion may stand anywhere beyond. Towards the border of these places it comes as 1/n in
+        n periods, and no orbit on its way is one: the return map has a double root there, which
+        rounding leaves as an orbit whose multiplier is below 1 by the root of rounding.
+        """
+        equations = self.equations
+        if not equations.system.model.frictions or self.symmetric or not equations.has_forcing:
+            return False
+        if not (np.abs(self.multipliers - 1.0) < TOLERANCES.creeping).any():
+            return False
+        evaluation = self.solution.evaluation
+        _, lengths, right = np.linalg.svd(equations.in_units(evaluation.jacobian()))
+        left_over = np.abs(evaluation.residual / equations.units.residuals).max()
+        away = TOLERANCES.doubt * max(left_over, np.finfo(float).eps) / max(lengths[-1], left_over)
+        for way in (away, -away):
+            place = self.solution.unknowns + way * right[-1] * equations.units.unknowns
+            beside = equations.evaluate(place, self.solution.values)
+            if beside is not None and _sticks(equations.return_map(beside)):
+                return True
+        return False
+
     @property
     def stable(self) -> bool:
-        """Whether it does not graze and all multipliers lie inside the unit circle by more than
-        rounding: not at an LP or PD.
+        """Whether it does not graze or creep and all multipliers lie inside the unit circle by more
+        than rounding: not at an LP or PD.
         """
-        return (
-            bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all()) and not self.grazes
-        )
+        inside = bool((np.abs(self.multipliers) < 1.0 - TOLERANCES.on_circle).all())
+        return inside and not self.grazes and not self.creeps
 
     def start(self) -> dict[str, Any]:
         """The arguments of `simulate` that start a motion on the orbit: just after its first impact
@@ -724,6 +748,14 @@ def solve(
     if found is None:
         return None
     return Solution(found.place, values, found.evaluation, found.iterations, units)
+
+
+def _sticks(chain: np.ndarray) -> bool:
+    """Whether a return map keeps one direction as it is, to rounding alone."""
+    if not np.isfinite(chain).all():
+        return False
+    apart = np.abs(np.linalg.eigvals(chain) - 1.0)
+    return bool(apart.min(initial=math.inf) < TOLERANCES.kept)
 
 
 def _free(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -200,6 +200,12 @@ class OrbitTolerances:
     # value of the parameter, such as those of a mass that no wall and no spring holds. Near a fold
     # it is as near only within 1e-14 of the fold's parameter.
     isolated: float = 1e-7
+    # A multiplier this near to 1 may be that of a motion that creeps to sticking for good.
+    creeping: float = 1e-3
+    # How much farther than its residual says an orbit may be from the one that is meant.
+    doubt: float = 10.0
+    # A direction that sticking keeps has the multiplier 1 but for the rounding of eigenvalues.
+    kept: float = 1e-13
     load: float = 1e-12  # Values of a load and of its mirror image half a period later.
 
 
