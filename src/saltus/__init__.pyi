@@ -92,6 +92,7 @@ from .systems import energy_gain as energy_gain
 from .systems import register as register
 from .systems.contact_model import Contact as Contact
 from .systems.contact_model import Friction as Friction
+from .systems.contact_model import Relay as Relay
 from .systems.contact_model import Surface as Surface
 from .systems.from_symbols import from_sympy as from_sympy
 from .systems.impact_laws import InelasticImpact as InelasticImpact

@@ -1,5 +1,6 @@
 from .contact_model import CONTINUOUS as CONTINUOUS
 from .contact_model import ContactModel as ContactModel
+from .contact_model import Relay as Relay
 from .contact_model import called_part as called_part
 from .contact_model import eliminated as eliminated
 from .contact_model import mass_and_force as mass_and_force
@@ -93,6 +94,7 @@ from .structure import mode_sums as mode_sums
 from .system import OWN_TIME as OWN_TIME
 from .system import System as System
 from .system import check_system as check_system
+from .system import modes_of_model as modes_of_model
 from .system_units import NaturalUnits as NaturalUnits
 from .system_units import natural_units as natural_units
 from .system_units import slowest_own_time as slowest_own_time

@@ -256,6 +256,12 @@ class Surface:
     function
         In place of a coordinate: the name of the model's method whose sign is s, as `rebound(t, q,
         velocity, load)`.
+    after_event
+        The name of the model's method by which the state is reset where s becomes +1, as
+        `fired(t, q, velocity, load)`. It returns all coordinates and all velocities after the
+        event, of the kinds that it takes; velocities of coordinates of first order are not read.
+        By default nothing jumps. A reset in the other direction is that of another surface, whose
+        function has the other sign.
 
     Examples
     --------
@@ -270,9 +276,10 @@ class Surface:
     stiffness: Number = 0.0
     damping: Number = 0.0
     function: str | None = None
+    after_event: str | None = None
 
     def __post_init__(self) -> None:
-        _check_texts(self, "name")
+        _check_texts(self, "name", *(() if self.after_event is None else ("after_event",)))
         _check_function(self, "function", position=0.0, sign=1, stiffness=0.0, damping=0.0)
         _check_sign(self)
         _check_numbers(self, "position", "stiffness", "damping")
@@ -290,6 +297,57 @@ class Surface:
         value = np.asarray(position.value if isinstance(position, Jet) else position)
         above = value > self.position if below else value >= self.position
         return self.sign * np.where(above, 1.0, -1.0)[()]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relay:
+    """A relay with hysteresis, one of a model's `surfaces`: its side s is remembered, and does not
+    follow from the state alone.
+
+        s becomes +1 where the function `on` rises through 0, and -1 where `off` does.
+
+    Between the two it keeps its side: a thermostat, a valve, a controller that is held at its
+    limit. The model's `force` reads s by the relay's name, +1 while it is on and -1 while it is
+    off. A motion is told its side at the start, `relays={"heater": True}`, unless one of the
+    functions is positive there.
+
+    Parameters
+    ----------
+    name
+        Its name, such as "heater", in events and in the argument `sides` of `force`.
+    on, off
+        The names of two methods of the model, as `too_cold(t, q, velocity, load)`. They are not
+        positive at one state both.
+    after_event
+        The name of the model's method by which the state is reset where the relay goes on, as that
+        of a `Surface`.
+
+    Examples
+    --------
+    >>> saltus.Relay(name="heater", on="too_cold", off="too_warm").off
+    'too_warm'
+    """
+
+    name: str
+    on: str
+    off: str
+    after_event: str | None = None
+
+    # what every surface has
+    coordinate: ClassVar[None] = None
+    position: ClassVar[float] = 0.0
+    sign: ClassVar[int] = 1
+    stiffness: ClassVar[float] = 0.0
+    damping: ClassVar[float] = 0.0
+
+    def __post_init__(self) -> None:
+        own = () if self.after_event is None else ("after_event",)
+        _check_texts(self, "name", "on", "off", *own)
+
+    @property
+    def function(self) -> str:
+        """The function at which it goes on."""
+        return self.on
 
 
 # the largest imaginary part by which derivatives to a number of a model are taken
@@ -329,7 +387,7 @@ def _check_numbers(part: Contact | Friction | Surface, *names: str) -> None:
             raise ParameterError(f"{name} of {called_part(part)} {problem}", name)
 
 
-def _check_texts(part: Contact | Friction | Surface, *names: str) -> None:
+def _check_texts(part: Contact | Friction | Surface | Relay, *names: str) -> None:
     """Refuse anything but texts in the fields of a part of a model."""
     for name in names:
         value = getattr(part, name)
@@ -369,7 +427,7 @@ def _check_sign(part: Contact | Surface) -> None:
         )
 
 
-def called_part(part: Contact | Friction | Surface) -> str:
+def called_part(part: Contact | Friction | Surface | Relay) -> str:
     """What a part of a model is called in a sentence."""
     return f"the {type(part).__name__.lower()} {shown(part.name)}"
 
@@ -401,7 +459,7 @@ class ContactModel(Model):
        A friction that sticks holds the velocity of its coordinate, or of a sum of several;
     5. `surfaces`, a tuple of `Surface`. Then `force` takes a further argument, r(t, q, v, load,
        sides), and reads `sides.stop`,
-       +1 or -1, of the surface "stop";
+       +1 or -1, of the surface "stop". A `Relay` among them remembers its side;
     6. optionally `after_impact`, by which the coordinates of first order jump at impacts,
        `transfers` (whether an impact passes
        speed on to the other contacts of its group, as a crossing does) and `singularity`, a name
@@ -513,6 +571,16 @@ class ContactModel(Model):
         return bool(switches_of_force(self) - CONTINUOUS)
 
     @property
+    def relays(self) -> tuple[Relay, ...]:
+        """Those of its surfaces that are relays."""
+        return tuple(part for part in self.surfaces if isinstance(part, Relay))
+
+    @property
+    def resets(self) -> tuple[str, ...]:
+        """The names of the surfaces at whose events its state jumps."""
+        return tuple(part.name for part in self.surfaces if part.after_event is not None)
+
+    @property
     def holds_coordinates(self) -> bool:
         """Whether contacts or frictions may hold its coordinates one by one, while the others move
         on, or it has surfaces, or its force has switches.
@@ -521,7 +589,9 @@ class ContactModel(Model):
             switches_of_force(self)
         )
 
-    def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
+    def value_of_function(
+        self, surface: Surface | Relay, t: Any, q: Any, v: Any, load: Any, name: str | None = None
+    ) -> Any:
         """The value of a surface's function.
 
         Parameters
@@ -530,16 +600,19 @@ class ContactModel(Model):
             The surface.
         t, q, v, load
             The time, the coordinates, their velocities and the load, as the function takes them.
+        name
+            The function's name, of a relay, which has two.
 
         Raises
         ------
         ParameterError
             It is no number.
         """
-        value = ask(self, str(surface.function), t, q, v, load)
+        name = name or str(surface.function)
+        value = ask(self, name, t, q, v, load)
         if value is None or isinstance(value, (tuple, list, str, dict)):
             raise ParameterError(
-                f"{surface.function} of {type(self).__name__}, the function of"
+                f"{name} of {type(self).__name__}, the function of"
                 f" {called_part(surface)}, must return one number, got {shown(value)}",
                 "function",
             )
@@ -928,7 +1001,14 @@ def sides_for(
             return known[surface.coordinate]
         return sum(factor * value_of(name) for name, factor in surface.coordinate.items())
 
-    return (Sides({each.name: each.side(kept(each), below) for each in model.surfaces}),)
+    def side_of(surface: Surface | Relay) -> Any:
+        """The side of a surface; a relay, whose side no state tells, is on where `on` sets it."""
+        if isinstance(surface, Relay):
+            value = model.value_of_function(surface, t, q, v, load)
+            return np.where(np.asarray(getattr(value, "value", value)) >= 0.0, 1.0, -1.0)[()]
+        return surface.side(kept(surface), below)
+
+    return (Sides({each.name: side_of(each) for each in model.surfaces}),)
 
 
 def held_entry(entry: Any, i: int, j: int, free: Sequence[Any]) -> Any:

@@ -26,6 +26,7 @@ from saltus.systems.contact_model import (
     Contact,
     ContactModel,
     Friction,
+    Relay,
     Surface,
     called_part,
     solved_motion,
@@ -385,10 +386,12 @@ class InGapCoordinates(ContactModel):
         ]
         return as_given(found)
 
-    def value_of_function(self, surface: Surface, t: Any, q: Any, v: Any, load: Any) -> Any:
+    def value_of_function(
+        self, surface: Surface | Relay, t: Any, q: Any, v: Any, load: Any, name: str | None = None
+    ) -> Any:
         """The value of a surface's function, of the model's own coordinates."""
         own, rates = self.own_values(t, load, q, v)
-        return super().value_of_function(surface, t, own, rates, load)
+        return super().value_of_function(surface, t, own, rates, load, name)
 
     def _of_sums(self, t: Any, theta: Any, velocity: Any, load: Any) -> list[tuple[Any, Any, Any]]:
         """For each dependent sum s its rounding B q + n - s, its rate B q' + n', and B q_0'' +

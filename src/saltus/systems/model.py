@@ -11,7 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError, SaltusError, TraceError, near, shown
 
 if TYPE_CHECKING:
-    from saltus.systems.contact_model import Contact, Friction, Surface
+    from saltus.systems.contact_model import Contact, Friction, Relay, Surface
 
 
 class MarginKind(StrEnum):
@@ -190,6 +190,18 @@ class Model:
     def force_jumps(self) -> bool:
         """Whether its force has switches of its own at which it may jump."""
         return False
+
+    @property
+    def relays(self) -> tuple[Relay, ...]:
+        """Those of its surfaces that are relays; a `ContactModel` may have some."""
+        return ()
+
+    @property
+    def resets(self) -> tuple[str, ...]:
+        """The names of the surfaces at whose events its state jumps; a `ContactModel` may have
+        some.
+        """
+        return ()
 
     @property
     def friction_limits(self) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from saltus.systems.contact_model import (
     Contact,
     ContactModel,
     Friction,
+    Relay,
     Surface,
     sides_for,
 )
@@ -222,7 +223,7 @@ def _check_first_order(model: Model) -> None:
             else "no coordinate of first order, such as first_order = ('voltage',)"
         )
         raise ParameterError(f"{kind} defines after_impact and has {what}: leave it out", "model")
-    parts: tuple[Contact | Friction | Surface, ...] = (
+    parts: tuple[Contact | Friction | Surface | Relay, ...] = (
         *model.contacts,
         *model.frictions,
         *model.surfaces,
@@ -384,7 +385,7 @@ def check_contact_model(model: ContactModel) -> bool:
             raise ParameterError(
                 f"{kind} has {count} {what}, and at most {most} can be followed", "model"
             )
-    parts: tuple[Contact | Surface, ...] = (*contacts, *model.surfaces)
+    parts: tuple[Contact | Surface | Relay, ...] = (*contacts, *model.surfaces)
     names = [*(part.name for part in parts), *(friction.name for friction in frictions)]
     if len(set(names)) < len(names):
         raise ParameterError(
@@ -395,6 +396,10 @@ def check_contact_model(model: ContactModel) -> bool:
     for contact in parts:
         if isinstance(contact, Contact) and contact.distance is not None:
             _check_method(model, contact, contact.distance, DISTANCE)
+            continue
+        if isinstance(contact, Relay):
+            _check_method(model, contact, contact.on, RATE)
+            _check_method(model, contact, contact.off, RATE)
             continue
         if isinstance(contact, Surface) and contact.function is not None:
             _check_method(model, contact, contact.function, RATE)
@@ -420,14 +425,47 @@ def check_contact_model(model: ContactModel) -> bool:
                 )
     _check_frictions(model)
     _check_mass(model)
+    placed = [part for part in (*parts, *frictions) if part.coordinate is not None]
+    sums = any(not isinstance(part.coordinate, str) for part in placed)
+    _check_resets(model, sums)
     if model.has_multipliers:
         _check_surfaces(model)
         return False
-    placed = [part for part in (*parts, *frictions) if part.coordinate is not None]
-    sums = any(not isinstance(part.coordinate, str) for part in placed)
     if model.rubs_in_contacts and not sums:
         check_paradox(model)
     return sums
+
+
+def _check_resets(model: ContactModel, sums: bool) -> None:
+    """Refuse a reset that gives no state, and one beside parts that are no single coordinates."""
+    kind = type(model).__name__
+    if model.resets and (sums or model.has_multipliers):
+        what = "a distance or a rate" if model.has_multipliers else "a sum of coordinates"
+        raise ParameterError(
+            f"the surface {model.resets[0]!r} of {kind} has an after_event beside {what}: there a"
+            " reset of the state is not followed so far",
+            "model",
+        )
+    for surface in model.surfaces:
+        if surface.after_event is not None:
+            _check_reset(model, surface, surface.after_event)
+
+
+def _check_reset(model: ContactModel, surface: Any, name: str) -> None:
+    """Refuse a reset that is no method of the model, or does not return all coordinates and all
+    velocities."""
+    size = len(model.coordinates)
+    found = _check_method(model, surface, name, RATE, resets=True)
+    if found is None:
+        return
+    wanted = "a number" if size == 1 else f"{size} numbers"
+    both = isinstance(found, (tuple, list)) and len(found) == 2
+    if not both or any(_size_of(part) != wanted for part in found):
+        raise ParameterError(
+            f"{type(model).__name__}.{name} must return the coordinates and the velocities after"
+            f" the event, each {wanted}, got {shown(found)}",
+            "model",
+        )
 
 
 def _check_surfaces(model: ContactModel) -> None:
@@ -448,9 +486,12 @@ DISTANCE = ("t", "q", "load")
 RATE = ("t", "q", "velocity", "load")
 
 
-def _check_method(model: ContactModel, part: Any, name: str, arguments: tuple[str, ...]) -> None:
+def _check_method(
+    model: ContactModel, part: Any, name: str, arguments: tuple[str, ...], resets: bool = False
+) -> Any:
     """Refuse a distance or a rate that is no method of the model with its arguments, and one that
-    gives no number."""
+    gives no number, but for what `resets` the state. What it answers; None where it has no
+    value."""
     kind = type(model).__name__
     method = getattr(model, name, None)
     takes_them = callable(method) and not hasattr(ContactModel, name)
@@ -470,8 +511,9 @@ def _check_method(model: ContactModel, part: Any, name: str, arguments: tuple[st
     load = DeclaredLoad(Load(frequency=1.0), model)
     given = {"t": t, "q": place, "velocity": speed, "load": load}
     found = _asked(model, name, *(given[each] for each in arguments))
-    if found is not None and _is_row(found):
+    if found is not None and _is_row(found) and not resets:
         raise ParameterError(f"{kind}.{name} must return a number, got {shown(found)}", "model")
+    return found
 
 
 def _check_frictions(model: ContactModel) -> None:

@@ -503,6 +503,15 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
         ) from None
 
 
+def modes_of_model(system: System) -> tuple[str, ...]:
+    """The names of the relays of a system's model, and of the surfaces that reset its state."""
+    model = system.model
+    found: tuple[str, ...] = system._remembered(
+        "modes", lambda: (*(part.name for part in model.relays), *model.resets)
+    )
+    return found
+
+
 def check_system(
     system: Any,
     asking: str,
@@ -513,13 +522,15 @@ def check_system(
     multipliers: bool = False,
     switches: bool = False,
     jumps: bool = False,
+    modes: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that
     `asking` is for.
 
     Without `sums` each contact and surface must be of a single coordinate; without `multipliers`
     none may be a `distance`, and no friction a `rate`; without `switches` no surface a `function`,
-    and the force must have no switches of its own; without `jumps` none at which it may jump.
+    and the force must have no switches of its own; without `jumps` none at which it may jump;
+    without `modes` no surface remembers its side or resets the state.
 
     Raises
     ------
@@ -538,6 +549,12 @@ def check_system(
             f"{asking} does not follow contacts of a distance and frictions of a rate so far, and"
             f" {type(system.model).__name__} has {', '.join(held)}; simulate, simulate_many,"
             " find_orbit and find_attractors do",
+            "system",
+        )
+    if not modes and (kept := modes_of_model(system)):
+        raise ParameterError(
+            f"{asking} does not follow relays, and surfaces with an after_event, so far, and"
+            f" {type(system.model).__name__} has {kept[0]!r}; simulate and sensitivities do",
             "system",
         )
     if not switches and system.model.has_switches:

@@ -12,6 +12,7 @@ from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
     Harmonic,
+    Relay,
     System,
     Transient,
     ask,
@@ -124,6 +125,10 @@ class Trace:
     positions: list[Expr] = field(default_factory=list)
     # for each contact, the coordinates of first order after an impact on it
     jumps: list[Expr] = field(default_factory=list)
+    # for each surface that resets the state, the coordinates, then the velocities, after its event
+    resets: list[Expr] = field(default_factory=list)
+    resetting: tuple[int, ...] = ()  # the rows of these surfaces, among frictions and surfaces
+    relays: frozenset[int] = frozenset()  # the rows of surfaces that remember their side
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
     ground_speeds: list[Expr] = field(default_factory=list)
@@ -175,14 +180,15 @@ class Trace:
 
     @property
     def contact_numbers(self) -> list[Expr]:
-        """The mass matrix, E, positions, jumps, coefficients of frictions in contacts, speeds of
-        grounds, rows of multipliers: what events need.
+        """The mass matrix, E, positions, jumps, resets, coefficients of frictions in contacts,
+        speeds of grounds, rows of multipliers: what events need.
         """
         return [
             *self.mass,
             *self.restitution,
             *self.positions,
             *self.jumps,
+            *self.resets,
             *self.coefficients,
             *self.ground_speeds,
             *self.rows,
@@ -289,7 +295,7 @@ class Trace:
         for k in self.functions:
             side = Expr("slide", (), k)
             place = len(self.signs) + 2 * k
-            if k >= declared and k not in self.jumping:
+            if (k >= declared and k not in self.jumping) or k in (*self.relays, *self.resetting):
                 continue
             own = {size: size for size in sizes if side in ordered([size.args[0]])}
             means = [_mean_of_sides(a, side, own) for a in self.acceleration]
@@ -479,6 +485,7 @@ def trace(
         result.acceleration = switches.written(result.acceleration)
         result.reactions = switches.written(result.reactions)
         result.jumps = [pointwise(root) for root in result.jumps]
+        result.resets = [pointwise(root) for root in result.resets]
     if sides:
         _trace_contact(result, twin, t, coordinates, velocities, side)
     _check_powers(result.acceleration, _edges(model, result.contact, coordinates))
@@ -648,13 +655,28 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     names = model.coordinates
     # these may jump, and a motion may slide along them
     first_order = getattr(model, "own_class", model).first_order
+    first = len(frictions)
     functions = [
-        combine("add", model.value_of_function(part, t, q, v, load), 0.0)
+        combine("add", _function_of(model, part, first + number, (t, q, v, load)), 0.0)
         if part.function is not None
         else combine("sub", q[names.index(part.coordinate)] if len(names) > 1 else q, part.position)
         if part.coordinate in first_order
         else None
+        for number, part in enumerate(model.surfaces)
+    ]
+    result.relays = frozenset(
+        first + number for number, part in enumerate(model.surfaces) if isinstance(part, Relay)
+    )
+    result.resetting = tuple(
+        first + number
+        for number, part in enumerate(model.surfaces)
+        if part.after_event is not None
+    )
+    result.resets = [
+        combine("add", x, 0.0)
         for part in model.surfaces
+        if part.after_event is not None
+        for x in _after_event(model, part.after_event, (t, q, v, load))
     ]
     beside = [
         x
@@ -731,6 +753,29 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         )
         found += [Expr("mode", (), i) for i in range(local, result.dof)]
     return found
+
+
+def _after_event(model: Any, name: str, at: tuple[Any, ...]) -> list[Any]:
+    """All coordinates and all velocities after an event; 0 for those of coordinates of first order,
+    which follow from the state."""
+    size = len(model.coordinates)
+    rows = [
+        list(row) if isinstance(row, (tuple, list)) else [row]
+        for row in ask_user(model, name, *at)
+    ]
+    moving = size - len(getattr(model, "own_class", model).first_order)
+    return [*rows[0], *rows[1][:moving], *[0.0] * (size - moving)]
+
+
+def _function_of(model: Any, part: Any, row: int, at: tuple[Any, ...]) -> Any:
+    """The function whose sign is the side of a surface. That of a relay reads its own side s: while
+    it is off it is `on`, and while it is on it is minus `off`.
+    """
+    if not isinstance(part, Relay):
+        return model.value_of_function(part, *at)
+    side = Expr("slide", (), row)
+    on, off = (model.value_of_function(part, *at, name) for name in (part.on, part.off))
+    return 0.5 * (1.0 - side) * on - 0.5 * (1.0 + side) * off
 
 
 def _trace_multipliers(

@@ -28,6 +28,7 @@ from saltus.flow.contacts.layout import (
     first_flag,
     ground_speed,
     is_function,
+    is_relay,
     is_sum,
     is_surface,
 )
@@ -147,7 +148,8 @@ def side_ahead(motion, k):
     for i in range(1, motion.order + 1):
         power *= unit
         size = max(size, abs(series[i]) * power)
-    if row[FrictionColumn.REACHED] == 0 and abs(series[0]) > IS_ON * size:
+    beside = row[FrictionColumn.REACHED] == 0 or is_relay(motion, k)
+    if beside and abs(series[0]) > IS_ON * size:
         return 1 if series[0] > 0.0 else -1
     power = 1.0
     for i in range(1, motion.order + 1):
@@ -257,6 +259,8 @@ def lead_one_way(motion, t):
     for k in range(motion.frictions.shape[0]):
         row = motion.frictions[k]
         skip = row[FrictionColumn.SKIP]
+        if is_relay(motion, k):
+            continue
         if is_to_read(motion, k) and skip > 0 and row[FrictionColumn.SLIDES] != 0:
             row[FrictionColumn.SLIDES] *= -1
             hold_frictions(motion)
@@ -626,7 +630,7 @@ def record_slides(motion, before, t):
         slides = motion.frictions[k, FrictionColumn.SLIDES]
         before //= 4
         # the side that a motion leaves a surface to, on which it was, is no passage of it
-        on_side = is_surface(motion, k)
+        on_side = is_surface(motion, k) and not is_relay(motion, k)
         on_side = on_side and motion.frictions[k, FrictionColumn.REACHED] == 0
         if slides != was and slides != 2 and was != 2 and not on_side:
             kind = (

@@ -99,6 +99,7 @@ from saltus.flow.contacts.propagators import (
     columns_from_modes,
     input_step,
 )
+from saltus.flow.contacts.resets import reset_state, resets_state
 from saltus.flow.contacts.rows import has_speed, largest_pull, limits_begin, row_series
 from saltus.flow.contacts.rubbing import (
     free_pulls,
@@ -714,8 +715,11 @@ def contact_arc(motion, target):
             tear_loose(motion, hit)
     if rubs >= 0:
         fill_slopes(motion)
+        resets = resets_state(motion, rubs, which)
         reach_ground_speed(motion, count, motion.time, rubs, which, first > 0.0)
         motion.mode = Mode.CONTACT
+        if resets:
+            return reset_state(motion, rubs, motion.time)
     if limit >= 0:
         record_contact_event(motion, EventCode.LIMIT, 0, motion.time)
         motion.event_labels[motion.recorded_events - 1, 3] = limit - held

@@ -51,6 +51,9 @@ class FrictionColumn(IntEnum):
     # of a sticking friction whose row follows from others that are held: +1 or -1, the direction of
     # its static limit, which it carries; else 0
     IDLE = 7
+    # of a surface that resets the state where its side becomes +1, 1 plus the number of its reset;
+    # minus that where -1 is the side in SLIDES that the motion comes to; else 0
+    RESETS = 8
 
 
 class FrictionImpact(IntEnum):
@@ -74,6 +77,7 @@ class NoMargin(IntEnum):
 
     SURFACE = -1  # the row is that of a surface
     FUNCTION = -2  # of one that is a function, whose series is in the place of its first margin
+    RELAY = -3  # of a function that depends on its own side, which is remembered
 
 
 class SegmentPlan(IntEnum):
@@ -297,7 +301,13 @@ def is_surface(motion, k):
 @lean_jit
 def is_function(motion, k):
     """Whether it is that of a surface that is a function."""
-    return motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.FUNCTION
+    return motion.frictions[k, FrictionColumn.MARGIN] <= NoMargin.FUNCTION
+
+
+@lean_jit
+def is_relay(motion, k):
+    """Whether it is that of a relay, whose side the state does not tell."""
+    return motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.RELAY
 
 
 @lean_jit

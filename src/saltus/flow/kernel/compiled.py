@@ -21,6 +21,7 @@ from saltus.flow.contacts import (
     frictions,
     held_rows,
     propagators,
+    resets,
     rows,
     rubbing,
     tangent,
@@ -195,6 +196,7 @@ CONTACTS_PARTS = (
     rubbing,
     frictions,
     closings,
+    resets,
     contacts_kernel,
     loop,
 )

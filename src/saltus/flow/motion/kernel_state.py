@@ -456,6 +456,12 @@ class ContactState(KernelState):
             row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
             row[FrictionColumn.SLIDES] = 1
             row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED  # the kernel reads its side
+            if number - len(held) in run.trace.relays:
+                row[FrictionColumn.MARGIN] = NoMargin.RELAY
+                row[FrictionColumn.SLIDES] = request.relays[self._functions[number]]
+        for reset, k in enumerate(run.trace.resetting):
+            sign = surfaces[k - len(own_frictions)].sign
+            contacts[len(held) + k, FrictionColumn.RESETS] = sign * (1 + reset)
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
     def _close_rows(self, request: MotionRequest, run: Program, contacts: Any) -> np.ndarray:

@@ -5,7 +5,7 @@ impacts included.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -239,6 +239,7 @@ def sensitivities(
     tol: float = 1e-12,
     time: float = 0.0,
     side: int | None = None,
+    relays: Mapping[str, bool] | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
     progress: Progress = silent,
@@ -263,7 +264,7 @@ def sensitivities(
         What moves.
     parameters
         Dotted paths of the numbers to differentiate to, such as "load.frequency", "impact.e".
-    velocity, periods, duration, tol, time, side, stop_at, dense, progress, coordinates
+    velocity, periods, duration, tol, time, side, relays, stop_at, dense, progress, coordinates
         As for `simulate`.
 
     Raises
@@ -291,6 +292,7 @@ def sensitivities(
         tol=tol,
         time=time,
         side=side,
+        relays=relays,
         stop_at=stop_at,
         dense=dense or system.model.has_multipliers,  # whose accelerations are those of steps
         sensitivities=paths,
@@ -543,7 +545,13 @@ def _end_of(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
     """The checked paths of the parameters to differentiate to."""
     check_system(
-        system, "sensitivities", several_contacts=True, multipliers=True, switches=True, jumps=True
+        system,
+        "sensitivities",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        jumps=True,
+        modes=True,
     )
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 

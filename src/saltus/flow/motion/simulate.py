@@ -22,7 +22,7 @@ from saltus.checks import (
     notice_degrees,
     real_array,
 )
-from saltus.errors import MotionError, ParameterError
+from saltus.errors import MotionError, ParameterError, shown
 from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
@@ -38,7 +38,14 @@ from saltus.flow.motion.kernel_state import (
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
 from saltus.progress import Progress, shown_if_long, silent
-from saltus.systems import System, check_system, natural_units, read_start
+from saltus.systems import (
+    DeclaredLoad,
+    System,
+    check_system,
+    modes_of_model,
+    natural_units,
+    read_start,
+)
 from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.
@@ -49,6 +56,7 @@ ARGUMENTS = (
     "tol",
     "time",
     "side",
+    "relays",
     "stop_at",
     "dense",
     "progress",
@@ -138,6 +146,8 @@ class MotionRequest:
         The state in these, coordinates and then velocities, (d,).
     limits
         The margins that end the motion.
+    relays
+        The side of each relay at the start, +1 or -1, by its name.
     sensitivities
         Parameters to differentiate to; None without derivatives.
     dense_tangent
@@ -165,9 +175,16 @@ class MotionRequest:
         times: Any = None,
         sensitivities: tuple[str, ...] | None = None,
         dense_tangent: bool = True,
+        relays: Mapping[str, Any] | None = None,
     ) -> None:
         check_system(
-            system, "simulate", several_contacts=True, multipliers=True, switches=True, jumps=True
+            system,
+            "simulate",
+            several_contacts=True,
+            multipliers=True,
+            switches=True,
+            jumps=True,
+            modes=True,
         )
         # what a system remembers is forgotten where values that its classes read have changed
         key = structure_key(system)
@@ -189,6 +206,7 @@ class MotionRequest:
         self.sample_times = None if times is None else _sample_times(times, self.time)
         self.periods = periods
         self.side = side
+        self.relays = relays_at(system, relays, self.time, start)
         self.sensitivities = sensitivities
         self.dense = dense
         self.dense_tangent = dense_tangent
@@ -202,6 +220,63 @@ class MotionRequest:
         other = copy(self)
         other.nudge = (1 + row, units)
         return other
+
+
+def relays_at(
+    system: System, given: Mapping[str, Any] | None, time: float, start: np.ndarray
+) -> dict[str, int]:
+    """The side of each relay of a system at a state, coordinates and then velocities: as its
+    functions set it or, between these, as it is given.
+
+    Raises
+    ------
+    ParameterError
+        A relay is not known, its side is none or is not given, or both of its functions are
+        positive.
+    """
+    model: Any = system.model
+    if given is None and not (modes_of_model(system) and model.relays):
+        return {}
+    asked = dict(given) if isinstance(given, Mapping) else {} if given is None else None
+    known = [relay.name for relay in model.relays]
+    if asked is None or not known or not set(asked) <= set(known):
+        has = ", ".join(known) or "no relays"
+        raise ParameterError(
+            f"relays must be a dictionary from relays to whether they are on, such as"
+            f" {{'{(known or ['heater'])[0]}': True}}, got {shown(given)}; {type(model).__name__}"
+            f" has {has}",
+            "relays",
+        )
+    q, v = (half.tolist() if half.size > 1 else half.item() for half in np.split(start, 2))
+    state = tuple(tuple(x) if isinstance(x, list) else x for x in (q, v))
+    load = DeclaredLoad(system.load, model)
+    found = {}
+    for relay in model.relays:
+        side = asked.get(relay.name)
+        if side is not None and side not in (True, False, -1):
+            raise ParameterError(
+                f"the relay {relay.name!r} must be given as True or False, got {shown(side)}",
+                "relays",
+            )
+        on, off = (
+            float(model.value_of_function(relay, time, *state, load, name))
+            for name in (relay.on, relay.off)
+        )
+        if on > 0.0 and off > 0.0:
+            raise ParameterError(
+                f"{relay.on} and {relay.off}, by which the relay {relay.name!r} goes on and off,"
+                f" are both positive at the start ({on:g} and {off:g}): one state can set it to one"
+                " side only",
+                "relays",
+            )
+        if side is None and on <= 0.0 and off <= 0.0:
+            raise ParameterError(
+                f"the start does not say whether the relay {relay.name!r} is on: give"
+                f" relays={{{relay.name!r}: True}}, or False",
+                "relays",
+            )
+        found[relay.name] = 1 if on > 0.0 or (off <= 0.0 and side in (True, 1)) else -1
+    return found
 
 
 class _CheckedPlan(NamedTuple):
@@ -317,6 +392,7 @@ def simulate(
     tol: float = ...,
     time: float = ...,
     side: int | None = ...,
+    relays: Mapping[str, bool] | None = ...,
     stop_at: Iterable[str] = ...,
     dense: bool = ...,
     times: Numbers | None = ...,
@@ -336,6 +412,7 @@ def simulate(
     tol: float = ...,
     time: float = ...,
     side: int | None = ...,
+    relays: Mapping[str, bool] | None = ...,
     stop_at: Iterable[str] = ...,
     dense: bool = ...,
     times: Numbers | None = ...,
@@ -354,6 +431,7 @@ def simulate(
     tol: float = 1e-12,
     time: float = 0.0,
     side: int | None = None,
+    relays: Mapping[str, bool] | None = None,
     stop_at: Iterable[str] = (),
     dense: bool = True,
     times: Numbers | None = None,
@@ -378,6 +456,9 @@ def simulate(
         a forcing period instead.
     side
         The side, +1 or -1, to which the motion goes from rest at the contact if that is not unique.
+    relays
+        Whether each `Relay` of the model is on at the start, such as {"heater": True}; not needed
+        where its functions say it. So have `sides` of a motion the relays at its end.
     stop_at
         Margins of the model that end the motion, such as "kinematic_limit"; the model's own `stops`
         always do.
@@ -406,7 +487,8 @@ def simulate(
     '-0.235680595299 after 39 impacts'
     """
     asked = periods, duration, tol, time, side, stop_at, dense, times is None
-    if progress is silent and (known := _like_the_last(system, asked, coordinates, velocity)):
+    plain = progress is silent and relays is None
+    if plain and (known := _like_the_last(system, asked, coordinates, velocity)):
         return known
     request = MotionRequest(
         system=system,
@@ -417,6 +499,7 @@ def simulate(
         tol=tol,
         time=time,
         side=side,
+        relays=relays,
         stop_at=stop_at,
         dense=dense,
         times=times,
@@ -667,6 +750,17 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
             f"the motion passed a contact or a surface {at} without an event, which was lost in the"
             " rounding of positions that are far from 0 beside the motion: give positions from an"
             " origin nearer to it"
+        )
+    if status == Status.OUTSIDE:
+        return (
+            f"a reset of the state {at} leaves it beyond a contact, where the model has no states:"
+            f" {' or '.join(map(repr, system.model.resets))} may not take it there"
+        )
+    if status == Status.UNRESOLVED and system.model.resets:
+        return (
+            f"resets of the state accumulate {at}, at {' or '.join(map(repr, system.model.resets))},"
+            " and how the motion goes on behind them is not known; what bounces until it rests is a"
+            " Contact"
         )
     if status == Status.STALLED and not system.model.singularity:
         return (

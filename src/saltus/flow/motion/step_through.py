@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from types import FunctionType
@@ -97,6 +97,7 @@ def step_through(
     tol: float = 1e-12,
     time: float = 0.0,
     side: int | None = None,
+    relays: Mapping[str, bool] | None = None,
     stop_at: Iterable[str] = (),
     break_in: str | None = None,
     when: Callable[[Any], bool] = bool,
@@ -110,7 +111,7 @@ def step_through(
 
     Parameters
     ----------
-    system, velocity, periods, duration, tol, time, side, stop_at, coordinates
+    system, velocity, periods, duration, tol, time, side, relays, stop_at, coordinates
         As for `simulate`.
     break_in
         The name of a function of the kernel, such as "choose_closed": Python's `breakpoint` is
@@ -145,6 +146,7 @@ def step_through(
         tol=tol,
         time=time,
         side=side,
+        relays=relays,
         stop_at=stop_at,
         dense=True,
     )
