@@ -452,7 +452,7 @@ def ends(system, start, sides, end):
 def test_derivatives_of_machines_are_those_of_differences(seed):
     """Richardson's differences over the state at the start, numbers of the relays, of the resets,
     and the frequency."""
-    model, draw = random_machine(seed)
+    model, _ = random_machine(seed)
     system = System(
         model=model, load=Load(frequency=1.1, force=Harmonic(1.0)), impact=NewtonImpact(0.6)
     )
@@ -542,7 +542,9 @@ class Bouncing(ContactModel):
 
     coordinates: ClassVar[tuple[str, ...]] = ("y",)
     channels: ClassVar[tuple[str, ...]] = ("clock",)
-    contacts: ClassVar[tuple[Contact, ...]] = (Contact(name="floor", coordinate="y", position=-1.0),)
+    contacts: ClassVar[tuple[Contact, ...]] = (
+        Contact(name="floor", coordinate="y", position=-1.0),
+    )
     surfaces: ClassVar[tuple[Surface, ...]] = (
         Surface(name="table", coordinate="y", sign=-1, after_event="bounced"),
         Surface(name="late", function="late", after_event="thrown"),
@@ -576,7 +578,7 @@ def test_what_has_no_one_way_to_go_on_is_refused():
     assert [event.contact for event in motion.events] == ["late", "floor"]
     assert motion.velocity == pytest.approx(0.5 * 1.5 - 0.1, abs=1e-12)
     equal = Thermostat(below=20.0, above=20.0)
-    with pytest.raises(MotionError, match="'heater'.*both"):
+    with pytest.raises(MotionError, match=r"'heater'.*both"):
         simulate(System(model=equal), T=18.0, duration=50.0)
 
 

@@ -573,7 +573,8 @@ class ContactModel(Model):
     @property
     def relays(self) -> tuple[Relay, ...]:
         """Those of its surfaces that are relays."""
-        return tuple(part for part in self.surfaces if isinstance(part, Relay))
+        parts: tuple[Any, ...] = self.surfaces
+        return tuple(part for part in parts if isinstance(part, Relay))
 
     @property
     def resets(self) -> tuple[str, ...]:

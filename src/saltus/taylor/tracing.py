@@ -668,9 +668,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         first + number for number, part in enumerate(model.surfaces) if isinstance(part, Relay)
     )
     result.resetting = tuple(
-        first + number
-        for number, part in enumerate(model.surfaces)
-        if part.after_event is not None
+        first + number for number, part in enumerate(model.surfaces) if part.after_event is not None
     )
     result.resets = [
         combine("add", x, 0.0)
@@ -760,8 +758,7 @@ def _after_event(model: Any, name: str, at: tuple[Any, ...]) -> list[Any]:
     which follow from the state."""
     size = len(model.coordinates)
     rows = [
-        list(row) if isinstance(row, (tuple, list)) else [row]
-        for row in ask_user(model, name, *at)
+        list(row) if isinstance(row, (tuple, list)) else [row] for row in ask_user(model, name, *at)
     ]
     moving = size - len(getattr(model, "own_class", model).first_order)
     return [*rows[0], *rows[1][:moving], *[0.0] * (size - moving)]
