@@ -42,7 +42,6 @@ from saltus.systems import (
     DeclaredLoad,
     System,
     check_system,
-    modes_of_model,
     natural_units,
     read_start,
 )
@@ -132,6 +131,7 @@ class MotionPlan(NamedTuple):
     clock: Clock
     angles: list[tuple[int, str]]  # the coordinates that are angles, each with its place
     again: list[Again | None]  # how the motion is made from other starts (`remember`)
+    has_relays: bool  # whether a side is remembered, which the state does not say
 
 
 class MotionRequest:
@@ -206,7 +206,9 @@ class MotionRequest:
         self.sample_times = None if times is None else _sample_times(times, self.time)
         self.periods = periods
         self.side = side
-        self.relays = relays_at(system, relays, self.time, start)
+        self.relays: dict[str, int] = {}
+        if relays is not None or self.plan.has_relays:
+            self.relays = relays_at(system, relays, self.time, start)
         self.sensitivities = sensitivities
         self.dense = dense
         self.dense_tangent = dense_tangent
@@ -235,8 +237,6 @@ def relays_at(
         positive.
     """
     model: Any = system.model
-    if given is None and not (modes_of_model(system) and model.relays):
-        return {}
     asked = dict(given) if isinstance(given, Mapping) else {} if given is None else None
     known = [relay.name for relay in model.relays]
     if asked is None or not known or not set(asked) <= set(known):
@@ -321,7 +321,7 @@ def _plan(system: System, key: Any, asked: tuple[Any, ...]) -> MotionPlan:
     when = Clock(int(first), float(local), int(last_one), float(end), float(length))
     if dense and whole:
         _check_dense(system, when, periods, duration)
-    made = MotionPlan(asked, limits, when, _angles(system), [])
+    made = MotionPlan(asked, limits, when, _angles(system), [], bool(system.model.relays))
     fixed = isinstance(stop_at, (str, tuple))  # others may change
     last[:] = [made] if fixed else []
     if fixed and period is not None:
