@@ -1,5 +1,5 @@
 """A drill string: the stick-slip of its bit, and the speed at which it ends
-==========================================================================
+=========================================================================
 
 A motor turns the top at a constant speed; pipe and bit are discs on torsional springs. Angles are
 counted from the top, so that the rock turns backwards. The bit sticks and slips up to the speed at
