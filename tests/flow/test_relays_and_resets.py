@@ -627,7 +627,10 @@ def test_parts_that_are_none_are_refused():
 
 def test_other_questions_refuse_relays_and_resets_by_name():
     system = System(model=Neuron())
-    with pytest.raises(ParameterError, match="has 'threshold'; simulate and sensitivities do"):
+    with pytest.raises(ParameterError, match="has 'threshold'; simulate, sensitivities"):
         saltus.simulate_many(system, u=[0.0, 0.1], duration=1.0)
-    with pytest.raises(ParameterError, match="find_orbit does not follow relays"):
-        saltus.find_orbit(system, u=0.0)
+    room = System(model=Thermostat())
+    with pytest.raises(ParameterError, match="find_orbit does not follow relays so far"):
+        saltus.find_orbit(room, T=18.0)
+    with pytest.raises(ParameterError, match="simulate_many does not follow relays so far"):
+        saltus.simulate_many(room, T=[18.0, 19.0], duration=1.0)

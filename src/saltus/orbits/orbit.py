@@ -690,10 +690,12 @@ class PeriodicOrbit(Result):
 
     def __repr__(self) -> str:
         kind = "symmetric " if self.symmetric else ""
+        # a cycle of one coordinate of first order has none
+        largest = [f"largest multiplier {value:.6g}" for value in self.multipliers[:1]]
         return (
             f"PeriodicOrbit({kind}period {self.period:.9g}, {self.impact_count} impacts,"
-            f" amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'}, largest"
-            f" multiplier {self.multipliers[0]:.6g}, residual={self.residual:.1g})"
+            f" amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'},"
+            f" {(largest or ['no multipliers'])[0]}, residual={self.residual:.1g})"
         )
 
 

@@ -94,7 +94,6 @@ from .structure import mode_sums as mode_sums
 from .system import OWN_TIME as OWN_TIME
 from .system import System as System
 from .system import check_system as check_system
-from .system import modes_of_model as modes_of_model
 from .system_units import NaturalUnits as NaturalUnits
 from .system_units import natural_units as natural_units
 from .system_units import slowest_own_time as slowest_own_time

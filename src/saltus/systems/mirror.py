@@ -454,6 +454,8 @@ def _images_of_parts(
         return ()
     if any(surface.function is not None for surface in model.surfaces):
         return None  # images of functions are not looked for
+    if model.resets:
+        return None  # nor those of resets
     lengths = natural_units(system).lengths
     names = model.coordinates
 

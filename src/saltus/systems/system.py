@@ -503,13 +503,31 @@ def _parsed(text: str, parse: Callable[[str], Any], language: str) -> Any:
         ) from None
 
 
-def modes_of_model(system: System) -> tuple[str, ...]:
+def _modes_of(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The names of the relays of a system's model, and of the surfaces that reset its state."""
     model = system.model
-    found: tuple[str, ...] = system._remembered(
-        "modes", lambda: (*(part.name for part in model.relays), *model.resets)
+    found: tuple[tuple[str, ...], tuple[str, ...]] = system._remembered(
+        "modes", lambda: (tuple(part.name for part in model.relays), model.resets)
     )
     return found
+
+
+def _check_modes(system: System, asking: str, resets: bool) -> None:
+    """Refuse relays and, without `resets`, surfaces that reset the state."""
+    known, resetting = _modes_of(system)
+    kind = type(system.model).__name__
+    if known:
+        raise ParameterError(
+            f"{asking} does not follow relays so far, and {kind} has {known[0]!r}; simulate and"
+            " sensitivities do",
+            "system",
+        )
+    if resetting and not resets:
+        raise ParameterError(
+            f"{asking} does not follow surfaces with an after_event so far, and {kind} has"
+            f" {resetting[0]!r}; simulate, sensitivities and find_orbit do",
+            "system",
+        )
 
 
 def check_system(
@@ -522,7 +540,8 @@ def check_system(
     multipliers: bool = False,
     switches: bool = False,
     jumps: bool = False,
-    modes: bool = False,
+    resets: bool = False,
+    relays: bool = False,
 ) -> None:
     """Refuse anything but a System whose model has the contacts and the number of coordinates that
     `asking` is for.
@@ -530,7 +549,7 @@ def check_system(
     Without `sums` each contact and surface must be of a single coordinate; without `multipliers`
     none may be a `distance`, and no friction a `rate`; without `switches` no surface a `function`,
     and the force must have no switches of its own; without `jumps` none at which it may jump;
-    without `modes` no surface remembers its side or resets the state.
+    without `resets` no surface resets the state, and without `relays` none remembers its side.
 
     Raises
     ------
@@ -551,12 +570,8 @@ def check_system(
             " find_orbit and find_attractors do",
             "system",
         )
-    if not modes and (kept := modes_of_model(system)):
-        raise ParameterError(
-            f"{asking} does not follow relays, and surfaces with an after_event, so far, and"
-            f" {type(system.model).__name__} has {kept[0]!r}; simulate and sensitivities do",
-            "system",
-        )
+    if not (resets and relays):
+        _check_modes(system, asking, resets)
     if not switches and system.model.has_switches:
         raise ParameterError(
             f"{asking} does not follow surfaces that are functions, and forces with abs, sign, maximum"

@@ -46,7 +46,9 @@ def continuous_surfaces(
     return frozenset(
         part - frictions
         for part, place in enumerate(parts)
-        if place < 0 and _is_continuous(traced, leaves, part, -1 - place)
+        if place < 0
+        and part not in (*traced.relays, *traced.resetting)
+        and _is_continuous(traced, leaves, part, -1 - place)
     )
 
 

@@ -551,7 +551,8 @@ def _paths(system: System, parameters: Iterable[str]) -> tuple[str, ...]:
         multipliers=True,
         switches=True,
         jumps=True,
-        modes=True,
+        resets=True,
+        relays=True,
     )
     return check_names("parameters", parameters, "parameters, such as ['load.frequency']")
 

@@ -184,7 +184,8 @@ class MotionRequest:
             multipliers=True,
             switches=True,
             jumps=True,
-            modes=True,
+            resets=True,
+            relays=True,
         )
         # what a system remembers is forgotten where values that its classes read have changed
         key = structure_key(system)

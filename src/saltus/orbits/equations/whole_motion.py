@@ -523,12 +523,15 @@ class WholeMotionEquations(OrbitEquations):
         names = system.model.coordinates
         own = self.own
         state = self.start_state(unknowns, system)
+        velocity: Any = tuple(state[own:].tolist())
+        if own == 1:  # which has no velocity of its own if it is of first order
+            velocity = velocity[0] if system.model.moving else ()
         parameters = self._values.copy()
         parameters[self._places] = values
         request = MotionRequest(
             system=system,
             coordinates=dict(zip(names, state[:own].tolist(), strict=True)),
-            velocity=float(state[own]) if own == 1 else tuple(state[own:].tolist()),
+            velocity=velocity,
             **self._lasting(unknowns),
             tol=self.tol,
             time=self.section_time(values),

@@ -168,7 +168,9 @@ def find_orbit(
 
 def _check(system: System, parameters: Iterable[str], given: dict[str, Any]) -> None:
     """Refuse arguments without meaning."""
-    check_system(system, "find_orbit", several_contacts=True, multipliers=True, switches=True)
+    check_system(
+        system, "find_orbit", several_contacts=True, multipliers=True, switches=True, resets=True
+    )
     for name, value in given.items():
         if value is None and name != "max_period":
             continue
