@@ -142,3 +142,22 @@ def test_curves_of_folds_and_symmetry_breakings_pass_those_of_other_branches():
         curve = saltus.continue_special(special, "load.force.amplitude", (24.9, 26.1))
         (found,) = curve.at("load.force.amplitude", 25.0)
         assert found.frequency == pytest.approx(expected, abs=1e-8)
+
+
+def test_a_grazing_at_the_instant_of_a_jump_is_one():
+    """At its damped frequency an oscillator under a square wave turns by half a turn between jumps, at
+    which it rests: its amplitude is (1 + E) / (1 - E) that of the force, E = exp(-c pi / (2 Omega)).
+    """
+    damping = 0.2
+    frequency = math.sqrt(1.0 - damping**2 / 4.0)
+    decay = math.exp(-damping * math.pi / (2.0 * frequency))
+    system = System(
+        model=WallOscillator(wall=(1.0 + decay) / (1.0 - decay), damping=damping),
+        load=Load(frequency=frequency, force=Square(0.9)),
+        impact=VelocityReduction(0.5),
+    )
+    branch = saltus.continue_orbit(
+        saltus.find_orbit(system, x=0.0), "load.force.amplitude", (0.8, 1.1)
+    )
+    (point,) = (each for each in branch.special if str(each.kind) == "GR")
+    assert point.parameter == pytest.approx(1.0, abs=1e-10)
