@@ -532,7 +532,7 @@ class WholeMotionEquations(OrbitEquations):
             system=system,
             coordinates=dict(zip(names, state[:own].tolist(), strict=True)),
             velocity=velocity,
-            **self._lasting(unknowns),
+            **cast("dict[str, Any]", self._lasting(unknowns)),
             tol=self.tol,
             time=self.section_time(values),
             side=None,
