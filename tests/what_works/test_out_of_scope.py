@@ -40,7 +40,7 @@ class Hertzian(Falling):
 
 
 class HertzianStop(saltus.ContactModel):
-    """Hertz's force behind a surface, where it begins, and without a series there."""
+    """Hertz's force behind a surface, where it begins, without a switch of its own."""
 
     coordinates = ("x",)
     surfaces = (Surface(name="sphere", coordinate="x", position=0.2),)
@@ -82,6 +82,13 @@ class DraggedByForce(Switching):
 
     def law(self, x, velocity):
         return 0.2 * abs(velocity) * velocity
+
+
+class RootedDrag(Switching):
+    """A root of the speed, whose slope is infinite where the motion turns."""
+
+    def law(self, x, velocity):
+        return 3.0 * x + 0.1 * np.sign(velocity) * np.sqrt(abs(velocity))
 
 
 class WithMax(Switching):
@@ -175,11 +182,12 @@ SHAKEN = Load(frequency=0.8, push=saltus.Harmonic(0.5))
         (lambda: System(model=FastSide()), "x_velocity"),
         (lambda: System(model=HertzianStop()), "at the surface 'sphere'"),
         (lambda: System(model=RootedStop()), "has no Taylor series"),
+        (lambda: System(model=RootedDrag(), load=PUSHED), "steps shrink to nothing"),
     ],
 )
 def test_what_is_out_of_scope_is_refused_in_one_sentence(made, words):
     with pytest.raises(saltus.SaltusError) as refusal:
-        saltus.simulate(made(), x=0.1, duration=1.0)
+        saltus.simulate(made(), x=0.1, duration=5.0)
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
 

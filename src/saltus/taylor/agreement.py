@@ -149,6 +149,8 @@ def _own_values(
                 found.append(("acceleration", value if len(q) > 1 else [value]))
                 if traced.gap is not None:
                     found.append(("gap", [model.gap(x, side)]))
+        if any(np.iscomplexobj(value) for _, own in found for value in own):
+            return []  # a power of a negative number, on the side that `np.where` does not take
         return [(part, np.array([float(value) for value in own])) for part, own in found]
     # a user's code may raise anything; what cannot be asked with floats is known as traced alone
     except Exception:

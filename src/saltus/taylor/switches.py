@@ -51,8 +51,9 @@ class Switches:
         self._made: dict[int, Expr] = {}
         self.functions: list[Expr] = []
         self.jumping: set[int] = set()  # those at which values may jump
-        # absolute values, s u: they are 0 where their side changes
-        self.sizes: set[Expr] = set()
+        self.sizes: set[Expr] = set()  # absolute values, s u
+        # these, and others that are 0 where their side changes
+        self.kept: set[Expr] = set()
         for place, function in known.items():
             sign, core = _sign_and_core(function, self.sizes)
             if core is not None and sign is number(1.0):
@@ -72,6 +73,8 @@ class Switches:
         rule = RULES.get(node.op)
         if rule is not None:
             return as_expr(rule(self, *args))
+        if node.op in ("pow", "sqrt"):
+            return self._power(node.op, *args)
         return combine(node.op, *args) if args else node
 
     def size_of(self, value: Expr) -> Expr:
@@ -79,11 +82,40 @@ class Switches:
         size = self._side_of(value) * value
         if size.op == "mul" and any(node.op == "slide" for node in ordered([size.args[0]])):
             self.sizes.add(size)
+            self.kept.add(size)
         return size
+
+    def part_of(self, value: Expr, way: float) -> Expr:
+        """A value where its sign is `way`, else 0."""
+        part = 0.5 * (1.0 + way * self._side_of(value)) * value
+        if part.op == "mul" and any(node.op == "slide" for node in ordered([part.args[0]])):
+            self.kept.add(part)
+        return part
+
+    def _power(self, op: str, base: Expr, *exponent: Expr) -> Expr:
+        """A power or a root, which has no series on a side on which its base is 0: there it is that
+        of 1, times 0."""
+        there = number(1.0)
+        if exponent and exponent[0].op == "number" and exponent[0].value <= 0.0:
+            return combine(op, base, *exponent)
+        for side in [node for node in ordered([base]) if node.op == "slide"]:
+            for way in (1.0, -1.0):
+                if substitute(base, {side: way}) is number(0.0):
+                    there = there * (0.5 * (1.0 - way * side))
+        if there is number(1.0):
+            return combine(op, base, *exponent)
+        return there * combine(op, base + (1.0 - there), *exponent)
 
     def side_of(self, function: Expr, other: Any = 0.0) -> Expr:
         """The sign of a difference, at which values may jump."""
-        side = self._side_of(combine("sub", function, other))
+        value = combine("sub", function, other)
+        for known in [node for node in ordered([value]) if node.op == "slide"]:
+            if any(substitute(value, {known: way}) is number(0.0) for way in (1.0, -1.0)):
+                raise TraceError(
+                    "a sign or a condition depends on a value that is 0 on a whole side, such as"
+                    " np.maximum(x, 0) where x < 0: let it depend on x itself"
+                )
+        side = self._side_of(value)
         self.jumping |= {node.value - self._first for node in ordered([side]) if node.op == "slide"}
         return side
 
@@ -105,7 +137,7 @@ class Switches:
 
     def _check_continuous(self, function: Expr) -> None:
         """Refuse a function whose own sides may make it jump through 0, which is no root of it."""
-        for node in ordered([substitute(function, dict.fromkeys(self.sizes, 1.0))]):
+        for node in ordered([substitute(function, dict.fromkeys(self.kept, 1.0))]):
             if node.op != "slide":
                 continue
             own = node.value - self._first
@@ -181,16 +213,35 @@ def _above(switches: Switches, a: Expr, b: Expr) -> Expr:
 
 def _chosen(_: Any, condition: Expr, one: Expr, other: Expr) -> Expr:
     """What a condition, 1 or 0, chooses."""
-    return condition * one + (1.0 - condition) * other
+    against = 1.0 - condition
+    return condition * _only_where(condition, one) + against * _only_where(against, other)
+
+
+def _only_where(condition: Expr, root: Expr) -> Expr:
+    """An expression whose powers, roots and logarithms are those of 1 where a condition is 0, as
+    they may be no numbers there."""
+    made: dict[int, Expr] = {}
+    for node in ordered([root]):
+        args = [made[id(argument)] for argument in node.args]
+        if node.op in ("pow", "sqrt", "log") and not _is_constant(node.args[0]):
+            args[0] = condition * args[0] + (1.0 - condition)
+        made[id(node)] = combine(node.op, *args) if args else node
+    return made[id(root)]
 
 
 def _larger(switches: Switches, a: Expr, b: Expr) -> Expr:
     """The larger one."""
+    for one, other in ((a, b), (b, a)):
+        if other is number(0.0):
+            return switches.part_of(one, 1.0)
     return 0.5 * (a + b + switches.size_of(a - b))
 
 
 def _smaller(switches: Switches, a: Expr, b: Expr) -> Expr:
     """The smaller one."""
+    for one, other in ((a, b), (b, a)):
+        if other is number(0.0):
+            return switches.part_of(one, -1.0)
     return 0.5 * (a + b - switches.size_of(a - b))
 
 

@@ -280,15 +280,15 @@ class Trace:
         self.friction_coordinates += (-1 - self.dof,) * more
         self.switches = tuple(called(function, names, self.parameters) for function in functions)
 
-    def let_slide(self, sizes: set[Expr]) -> None:
+    def let_slide(self, kept: set[Expr]) -> None:
         """Let the equations hold along functions too, with 0 for a side: there the accelerations
         are the mean of both sides by which the function stays at 0 (Filippov),
 
             h'(s) = (p + m s) / 2,    s = -p / m,
 
         with the sum p and the difference m of its rates on the sides +1 and -1. That s stands in
-        the place of the second margin. The absolute values `sizes` stay as they are, as they are 0
-        with their functions.
+        the place of the second margin. What is 0 with a function, such as absolute values, is `kept` as it
+        is.
         """
         found = dict[Expr, Any]()
         declared = len(self.friction_coordinates) - len(self.switches)
@@ -297,7 +297,7 @@ class Trace:
             place = len(self.signs) + 2 * k
             if (k >= declared and k not in self.jumping) or k in (*self.relays, *self.resetting):
                 continue
-            own = {size: size for size in sizes if side in ordered([size.args[0]])}
+            own = {part: part for part in kept if side in ordered([part.args[0]])}
             means = [_mean_of_sides(a, side, own) for a in self.acceleration]
             mean = [each for each in means if each is not None]
             if len(mean) < len(means):
@@ -498,7 +498,7 @@ def trace(
         first = len(result.friction_coordinates)
         result.jumping = frozenset(first + place for place in switches.jumping)
         result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
-        result.let_slide(switches.sizes)
+        result.let_slide(switches.kept)
     if energy:
         result.margins["kinetic_energy"] = combine(
             "add", ask_user(model, "kinetic_energy", t, q, v, side, load), 0.0
@@ -510,13 +510,13 @@ def trace(
     return result
 
 
-def _mean_of_sides(root: Expr, side: Expr, sizes: Iterable[Expr]) -> Expr | None:
+def _mean_of_sides(root: Expr, side: Expr, kept: Iterable[Expr]) -> Expr | None:
     """An expression of a side that is linear in it, and has the given values on both sides; None
     where its formula of one side may be no number on the other one.
 
-    The absolute values `sizes` do not count, which are 0 where the side changes.
+    What is 0 where the side changes, such as its absolute values, is `kept` and does not count.
     """
-    plain = substitute(root, {size: Expr("slide", (), -1 - i) for i, size in enumerate(sizes)})
+    plain = substitute(root, {part: Expr("slide", (), -1 - i) for i, part in enumerate(kept)})
     if side not in ordered([differentiate(plain, side)]):
         return root
     for node in ordered([plain]):
@@ -524,8 +524,8 @@ def _mean_of_sides(root: Expr, side: Expr, sizes: Iterable[Expr]) -> Expr | None
             return None
         if node.op in ("sqrt", "log", "pow") and side in ordered([node.args[0]]):
             return None
-    kept: dict[Expr, Any] = {size: size for size in sizes}
-    above, below = (substitute(root, kept | {side: s}) for s in (1.0, -1.0))
+    same: dict[Expr, Any] = {part: part for part in kept}
+    above, below = (substitute(root, same | {side: s}) for s in (1.0, -1.0))
     return 0.5 * (above + below) + 0.5 * side * (above - below)
 
 
@@ -558,8 +558,8 @@ def _check_powers(accelerations: list[Expr], edges: dict[str, Any]) -> None:
                 shown = "u**0.5" if node.op == "sqrt" else "u**p, such as u**1.5,"
                 raise TraceError(
                     f"a power {shown} has no Taylor series where u is 0, and here u is 0 at {what}:"
-                    " write (u**2 + d**2)**(p/2) with a small length d, such as (u**2 +"
-                    " 1e-12)**0.75 for Hertz's law of a sphere"
+                    " write np.maximum(u, 0)**p, whose switch is followed without a surface, such as"
+                    " np.maximum(u, 0)**1.5 for Hertz's law of a sphere"
                 )
 
 

@@ -784,7 +784,8 @@ def one_pass(motion, target, t_end):
         note_jumps(motion)
     if motion.mode == Mode.CONTACT:
         return decide_contacts(motion)
-    return contact_arc(motion, target)
+    # a motion that has left a singular start may be beyond it by rounding
+    return contact_arc(motion, max(target, motion.time))
 
 
 @jit

@@ -744,7 +744,7 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
             f"the motion leaves the range of numbers {at}; its velocity was last {velocity}; a"
             " number of the system may be too large, or a power or root of the model may have no"
             " Taylor series there, such as abs(x)**1.5 at x = 0; a Hertz contact is written as"
-            " (x**2 + 1e-12)**0.75 behind a Surface"
+            " np.maximum(x, 0)**1.5 in the force of a ContactModel"
         )
     if status == Status.PASSED:
         return (
