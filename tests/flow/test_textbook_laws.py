@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from saltus import Friction
+from saltus.errors import TraceError
 from saltus.flow import sensitivities, simulate
 from saltus.systems import ContactModel, Harmonic, Load, System
 
@@ -272,3 +273,50 @@ def test_a_mass_of_two_that_sticks_under_a_falling_friction():
     assert {"stick", "slip"} <= {str(event.kind) for event in one.events}
     assert np.allclose(one.position, two.position, rtol=0.0, atol=1e-11)
     assert np.allclose(one.velocity, two.velocity, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("law", "same"),
+    [
+        (lambda x, v: np.copysign(0.4, v), lambda x, v: 0.4 * np.sign(v)),
+        (lambda x, v: np.fabs(v) * v, lambda x, v: np.abs(v) * v),
+        (lambda x, v: np.clip(x, None, 0.3), lambda x, v: np.minimum(x, 0.3)),
+        (lambda x, v: np.clip(x, a_min=0.1, a_max=None), lambda x, v: np.maximum(x, 0.1)),
+        (lambda x, v: np.heaviside(x, 0.5) * v, lambda x, v: np.where(x > 0.0, v, 0.0)),
+        (lambda x, v: np.heaviside(x, 1.0) * v, lambda x, v: np.where(x > 0.0, v, 0.0)),
+        (
+            lambda x, v: np.where((x > 0.0) & (v > 0.0), v, 0.0),
+            lambda x, v: np.where(x > 0.0, np.maximum(v, 0.0), 0.0),
+        ),
+        (
+            lambda x, v: np.where(np.logical_or(x <= 0.0, np.logical_not(v > 0.0)), 0.0, v),
+            lambda x, v: np.where(x > 0.0, np.maximum(v, 0.0), 0.0),
+        ),
+    ],
+)
+def test_forms_of_numpy_are_those_they_stand_for(law, same):
+    motions = [
+        simulate(
+            with_force(lambda t, x, v, f, m, law=law: f - 0.2 * x - law(x, v)),
+            **START,
+            duration=15.0,
+        )
+        for law in (law, same)
+    ]
+    assert len(motions[0].events) == len(motions[1].events) > 0
+    assert math.isclose(motions[0].position, motions[1].position, abs_tol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda x, v: max(x, 0.0), r"np\.maximum\(x, 0\.0\)"),
+        (lambda x, v: v if v > 0.0 else 0.0, r"write np\.where\(x > 0\.0, a, b\)"),
+        (lambda x, v: np.where(x > 0.0 and v > 0.0, v, 0.0), r"\(x > 0\.0\) & \(v < 0\.0\)"),
+        (lambda x, v: math.copysign(1.0, v), "use NumPy's functions, not math's"),
+    ],
+)
+def test_forms_of_python_are_refused_with_the_form_to_write(law, words):
+    with pytest.raises(TraceError, match=words) as refusal:
+        simulate(with_force(lambda t, x, v, f, m: f - law(x, v)), **START, duration=1.0)
+    assert len(str(refusal.value)) < 450

@@ -49,7 +49,7 @@ ALLOWED = (
     "+ - * /, powers, NumPy's"
     f" {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the"
     " coordinate (the sign of the coordinate is `side`); in the force of a ContactModel also abs,"
-    " sign, maximum, minimum, where and clip of any value"
+    " sign, maximum, minimum, where, clip, heaviside and copysign of any value"
 )
 BRANCH = (
     "only an impact law may compare: where the equations change at a contact, the model is a"
@@ -60,16 +60,26 @@ FRICTION = (
     " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and the force"
     " of a ContactModel may have abs, sign, maximum, minimum and where, as in -v * abs(v)"
 )
+BOTH_BRANCHES = (
+    "write np.where(x > 0.0, a, b), np.maximum(x, 0.0), np.minimum, np.sign or abs, as in"
+    " -v * abs(v), and join conditions as in (x > 0.0) & (v < 0.0)"
+)
+OF_ONE_CONTACT = "at the contact of another model use `side`"
+# the names of the bounds of `np.clip`
+BOUNDS = {"a_min": "low", "min": "low", "a_max": "high", "max": "high"}
 COMPARISON = (
     "a traced model may not compare its state or numbers, or look them up (==, !=, in, a dict, a"
     " set): they are symbols; what chooses between equations is a ClassVar, or two classes of model"
 )
 # NumPy's names, and ours
 ARITHMETIC = {"add": "add", "subtract": "sub", "multiply": "mul", "divide": "div", "power": "pow"}
+# those of switches, which only the force of a ContactModel may have
+SWITCHES = ("sign", "heaviside", "copysign", "logical_and", "logical_or", "logical_not")
 _AS_THEY_ARE = ("tan", "square", "negative", "positive", *POINTWISE)
 UFUNCS = (
     ARITHMETIC
-    | {name: name for name in _AS_THEY_ARE}
+    | {name: name for name in (*_AS_THEY_ARE, *SWITCHES)}
+    | {"fabs": "absolute"}
     | {f.numpy.__name__: name for name, f in FUNCTIONS.items()}
 )
 
@@ -210,11 +220,27 @@ class Expr:
             raise TraceError(COMPARISON)
         return id(self) >> 4
 
+    def __and__(self, other: Any) -> Expr:
+        return _joined("&", self, other)
+
+    def __rand__(self, other: Any) -> Expr:
+        return _joined("&", other, self)
+
+    def __or__(self, other: Any) -> Expr:
+        return _joined("|", self, other)
+
+    def __ror__(self, other: Any) -> Expr:
+        return _joined("|", other, self)
+
+    def __invert__(self) -> Expr:
+        # of the bool that a comparison of floats gives, ~ makes a whole number
+        raise TraceError("~ of a comparison is no condition: write np.logical_not, or the opposite")
+
     def __bool__(self) -> bool:
-        hint = FRICTION if uses_velocity(self) else "use `side`"
+        other = "dry friction may be a Friction" if uses_velocity(self) else OF_ONE_CONTACT
         raise TraceError(
-            "a traced model may not branch on its state or parameters (if, and, or, min, max);"
-            f" {hint}"
+            "a traced model may not branch on its state or parameters (if, and, or, min, max); in the"
+            f" force of a ContactModel {BOTH_BRANCHES}; {other}"
         )
 
     def __float__(self) -> float:
@@ -239,7 +265,7 @@ class Expr:
         if _holds_expressions(inputs):
             return NotImplemented  # type: ignore[no-any-return]
         name = UFUNCS.get(ufunc.__name__)
-        if name == "sign" and not _USERS_CODE.switches:
+        if name in SWITCHES and not _USERS_CODE.switches:
             name = None
         if method != "__call__" or kwargs or name is None:
             raise TraceError(f"np.{ufunc.__name__} cannot be traced; {_what_is_allowed(*inputs)}")
@@ -248,8 +274,8 @@ class Expr:
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Expr:
         if func is np.where and len(args) == 3:
             return combine("where", *args)
-        if func is np.clip and len(args) == 3 and not kwargs and _USERS_CODE.switches:
-            return combine("minimum", combine("maximum", *args[:2]), args[2])
+        if func is np.clip and _USERS_CODE.switches and set(kwargs) <= set(BOUNDS):
+            return _clipped(*args, **{BOUNDS[name]: value for name, value in kwargs.items()})
         raise TraceError(f"np.{func.__name__} cannot be traced; allowed are {ALLOWED}")
 
     def __getattr__(self, name: str) -> Any:
@@ -387,7 +413,46 @@ def _whole_power(base: Expr, exponent: int) -> Expr:
     return result
 
 
+def _is_condition(value: Any) -> bool:
+    """Whether a value is a comparison, or several that are joined."""
+    if not isinstance(value, Expr):
+        return isinstance(value, (bool, np.bool_))
+    if value.op == "where":
+        return all(_is_condition(x) or x is number(0.0) or x is number(1.0) for x in value.args)
+    return value.op.startswith(("greater", "less"))
+
+
+def _joined(sign: str, one: Any, other: Any) -> Expr:
+    """Conditions that hold together, or one of which holds, or that do not hold."""
+    if not (_is_condition(one) and _is_condition(other)):
+        raise TraceError(
+            f"{sign} joins comparisons, each in brackets, as in (x > 0.0) & (v < 0.0), and was given"
+            f" {one!r} and {other!r}"
+        )
+    if sign == "~":
+        return combine("where", one, 0.0, 1.0)
+    return combine("where", one, other, 0.0) if sign == "&" else combine("where", one, 1.0, other)
+
+
+def _clipped(value: Any, low: Any = None, high: Any = None) -> Expr:
+    """A value between bounds, of which one may be None."""
+    above = value if low is None else combine("maximum", value, low)
+    return as_expr(above if high is None else combine("minimum", above, high))
+
+
 def _apply(name: str, inputs: tuple[Any, ...]) -> Expr:
+    if name.startswith("logical"):
+        return _joined(
+            {"logical_and": "&", "logical_or": "|"}.get(name, "~"), inputs[0], inputs[-1]
+        )
+    if name == "heaviside":
+        at_zero = as_expr(inputs[1])
+        if at_zero is number(0.0) or at_zero is number(1.0):
+            comparison = "greater" if at_zero is number(0.0) else "greater_equal"
+            return combine("where", combine(comparison, inputs[0], 0.0), 1.0, 0.0)
+        return 0.5 * (1.0 + combine("sign", inputs[0]))
+    if name == "copysign":
+        return abs(as_expr(inputs[0])) * combine("sign", inputs[1])
     if name == "absolute":
         return abs(as_expr(inputs[0]))
     if name == "negative":
