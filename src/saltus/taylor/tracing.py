@@ -479,7 +479,12 @@ def trace(
         )
     one_by_one = accelerations if several or dof > 1 else (accelerations,)
     result.acceleration = [combine("add", a, 0.0) for a in one_by_one]
-    declared = {k: result.reactions[len(result.signs) + 2 * k] for k in result.functions}
+    # the side of one that remembers, or resets the state, is not the sign of its function
+    declared = {
+        k: result.reactions[len(result.signs) + 2 * k]
+        for k in result.functions
+        if k not in (*result.relays, *result.resetting)
+    }
     switches = Switches(len(result.friction_coordinates), declared)
     if several:
         result.acceleration = switches.written(result.acceleration)
