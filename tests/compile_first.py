@@ -5,9 +5,9 @@ compile it for themselves.
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-from saltus.flow.kernel.compiled import load_contacts_kernel, load_kernel
-from saltus.flow.kernel.orbit_segments import load_contact_segments, load_segments
-from saltus.flow.lanes.compiled_lanes import load_driver, load_helpers
+from saltus.flow.programs.compiled import load_contacts_kernel, load_kernel
+from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
+from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
 from saltus.web.objects import kernel_code
 
 # The kernels that all models share, here and on pages, those that take longest first.

@@ -62,6 +62,29 @@ MAY_IMPORT = {
         "config",
     },
 }
+# The folders of a room from below: each uses those before it, and those of one floor not each other.
+# A file of the room itself has no floor.
+FLOORS = {
+    "systems": ({"files"}, {"loads"}, {"contracts"}, {"structures"}, {"catalogue"}),
+    "flow": (
+        {"kernel"},
+        {"lane_steps"},
+        {"one_contact", "contacts"},
+        {"programs"},
+        {"motion", "cuda"},
+        {"lanes"},
+        {"long_time"},
+    ),
+    "orbits": (
+        {"segments"},
+        {"contract"},
+        {"beyond"},
+        {"equations"},
+        {"finding"},
+        {"branches"},
+        {"proofs"},
+    ),
+}
 # of the lanes, and for other processors
 TEXTS = {
     f"saltus.taylor.{name}"
@@ -167,6 +190,34 @@ def test_imports_run_one_way(room: str) -> None:
             - {room, ""}
         )
         assert not foreign, f"{path.relative_to(SOURCE)} imports {foreign}"
+
+
+def floor_of(room: str, module: str) -> int | None:
+    """The floor of a module's folder in its room, from below; none for a file of the room."""
+    folder = [*module.split("."), "", ""][2]
+    return next((level for level, names in enumerate(FLOORS[room]) if folder in names), None)
+
+
+@pytest.mark.parametrize("room", FLOORS)
+def test_the_folders_of_a_room_are_floors(room: str) -> None:
+    past = []
+    for path in (SOURCE / room).rglob("*.py"):
+        module = module_of(path)
+        own = floor_of(room, module)
+        for line, _, reached in imported(path):
+            if room_of(reached) != room or own is None:
+                continue
+            level = floor_of(room, reached)
+            same_folder = reached.split(".")[:3] == module.split(".")[:3]
+            if level is not None and level >= own and not same_folder:
+                past.append(f"{path.relative_to(SOURCE)}:{line} {reached}")
+    assert not past
+
+
+@pytest.mark.parametrize("room", FLOORS)
+def test_every_folder_of_a_room_has_its_floor(room: str) -> None:
+    folders = {path.parent.name for path in (SOURCE / room).glob("*/__init__.py")}
+    assert folders == set().union(*FLOORS[room])
 
 
 def test_rooms_import_each_other_through_their_front_doors() -> None:

@@ -125,7 +125,7 @@ def test_other_parameters_make_it_again(tmp_path, registry):
         ("saltus.theory.quasi_static", True),
         ("saltus.theory.loaded_equilibria", True),
         ("saltus.flow.kernel.roots", True),
-        ("saltus.systems.metainterface", True),
+        ("saltus.systems.catalogue.metainterface", True),
         ("saltus.plots.plane", True),
         ("saltus_paper.figures.fig09", False),
         ("saltus.plots.basins", False),  # other inner files of a room that it uses

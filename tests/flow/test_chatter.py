@@ -16,11 +16,11 @@ from scipy.integrate import quad
 from shared_systems import BETA80, forced
 
 from saltus.flow import EventKind, simulate
-from saltus.flow.kernel.compiled import program
 from saltus.flow.kernel.layout import CHATTER_SPEED, Mode, Status
 from saltus.flow.kernel.memory import EventBuffers, StepBuffers
 from saltus.flow.motion.kernel_state import KernelState
 from saltus.flow.motion.simulate import MotionRequest
+from saltus.flow.programs.compiled import program
 from saltus.systems import EnergyRestitution, Harmonic, Load, System, WallOscillator
 
 

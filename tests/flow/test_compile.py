@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from saltus.flow.kernel import compiled as compilation
-from saltus.flow.kernel.compiled import load_kernel, load_structure
+from saltus.flow.programs import compiled as compilation
+from saltus.flow.programs.compiled import load_kernel, load_structure
 from saltus.systems import Harmonic, Load, System, WallOscillator
 from saltus.taylor.cache import cache_directory
 from saltus.taylor.generated import functions_text

@@ -16,7 +16,7 @@ from saltus.checks import LIMITS
 from saltus.errors import ParameterError
 from saltus.flow import EventKind
 from saltus.flow.contacts.complementarity import acting, by_exchange
-from saltus.flow.kernel import compiled
+from saltus.flow.programs import compiled
 from saltus.systems import Harmonic, Load, System, VelocityReduction, energy_gain
 from saltus.taylor.generated import llvm_text, object_code
 from saltus.taylor.graph import is_long

@@ -26,10 +26,10 @@ from saltus.flow.cuda import devices
 from saltus.flow.cuda.launch import LaunchSettings, example_of, run_on
 from saltus.flow.cuda.targets import Card, Host
 from saltus.flow.cuda.thread_code import BLOCK, BLOCKS, OLDEST, thread_code
-from saltus.flow.kernel.compiled import limits_of, program
 from saltus.flow.lanes import ensemble
 from saltus.flow.lanes.inputs import read_inputs
 from saltus.flow.lanes.options import EnsembleOptions
+from saltus.flow.programs.compiled import limits_of, program
 
 TOL = 1e-12
 ALL = {"sample": ("state", "extrema", "speed", "impact_count"), "last": "all"}

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import saltus
 from saltus import Contact, ContactModel, Friction, Load, NewtonImpact, Surface, System
 from saltus.flow import sensitivities, simulate, simulate_many
-from saltus.systems.model import SLOPES, Jet
+from saltus.systems.contracts.model import SLOPES, Jet
 from saltus.taylor.rules import FUNCTIONS
 
 

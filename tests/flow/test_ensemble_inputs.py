@@ -496,7 +496,7 @@ def test_a_record_and_a_model_without_contact_take_columns_too():
 
 def test_processes_that_compute_at_the_same_time_share_the_cores(monkeypatch):
     monkeypatch.setattr("os.sched_getaffinity", lambda process: set(range(8)), raising=False)
-    monkeypatch.setattr("saltus.flow.lanes.threads._sharing", [lambda: 1])
+    monkeypatch.setattr("saltus.flow.programs.lane_threads._sharing", [lambda: 1])
     assert read_threads(None) == 8
     for processes, threads in ((2, 4), (3, 2), (8, 1), (20, 1), (0, 8)):
         share_cores(lambda count=processes: count)

@@ -732,7 +732,7 @@ def test_derivatives_through_accumulations_are_those_of_differences(system, star
 
 def test_rows_are_the_derivatives_of_gaps_and_speeds():
     """Entries of the trace beside complex steps of the model's own methods."""
-    from saltus.flow.kernel.compiled import contact_rows_at, program
+    from saltus.flow.programs.compiled import contact_rows_at, program
 
     system = rotor()
     model = system.model

@@ -9,7 +9,7 @@ import pytest
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.flow.motion import differentiable
+from saltus.flow.lanes import differentiable
 
 SYSTEM = saltus.System(
     model=saltus.Metainterface(beta0=np.deg2rad(80), damping=0.1),

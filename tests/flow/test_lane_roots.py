@@ -11,8 +11,9 @@ from numba import from_dtype, njit, types
 
 from saltus.flow.kernel import layout as kernel_layout
 from saltus.flow.kernel.layout import HIGHEST_ORDER, LOWEST_ORDER, SERIES_LENGTH
-from saltus.flow.lanes import lane_steps, memory
-from saltus.flow.lanes.memory import FLAGS, ROW, SERIES, Gap
+from saltus.flow.lane_steps import memory
+from saltus.flow.lane_steps import steps as lane_steps
+from saltus.flow.lane_steps.memory import FLAGS, ROW, SERIES, Gap
 from saltus.taylor import compiled_part, lane_memory, lane_vectors, private_numba
 from saltus.taylor.lane_memory import LanesType, named_tuple, shared_as
 from saltus.taylor.lane_vectors import (

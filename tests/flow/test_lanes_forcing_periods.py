@@ -12,7 +12,7 @@ from test_ensemble_samples import KINDS, extrema
 
 import saltus
 from saltus.flow import stop_names
-from saltus.flow.lanes.handoff import turning_range
+from saltus.flow.programs.lane_handoff import turning_range
 from saltus.systems import Harmonic, Load, Record
 
 SHORT = {"load.frequency": 40.0, "load.horizontal.amplitude": 0.3}  # periods shorter than a step

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from lane_cases import FAMILIES, end_state
 
-import saltus.flow.lanes.threads as lanes_run
+import saltus.flow.programs.lane_threads as lanes_run
 from saltus.taylor.lane_vectors import WIDTH
 
 OPTIONS = {"sample": ("state", "extrema", "impact_count", "speed"), "last": 3, "tol": 1e-12}

@@ -10,8 +10,8 @@ from shared_systems import BETA80, forced
 import saltus
 from saltus.flow import stop_names
 from saltus.flow.kernel.layout import CHATTER_SPEED, SLOW, Status
-from saltus.flow.lanes import threads
-from saltus.flow.lanes.function_types import SCALAR_MOTION
+from saltus.flow.lane_steps.function_types import SCALAR_MOTION
+from saltus.flow.programs import lane_threads as threads
 from saltus.systems import EnergyRestitution, Load, System, VelocityReduction, WallOscillator
 from saltus.taylor import pointer
 from saltus.taylor.private_numba import OPTIONS

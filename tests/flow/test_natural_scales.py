@@ -13,8 +13,8 @@ import pytest
 import saltus
 from saltus import Contact, Friction, NewtonImpact, Surface
 from saltus.errors import MotionError
-from saltus.flow.kernel.compiled import program
 from saltus.flow.motion.kernel_state import SLOW_LOAD, natural_time, natural_times
+from saltus.flow.programs.compiled import program
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from test_contact_models import chain
 from test_contacts import layers
 
 from saltus import TwoStops
-from saltus.flow.kernel.compiled import one_free
+from saltus.flow.programs.compiled import one_free
 from saltus.systems import Load, System, reactions, solved_motion
 from saltus.taylor import Expr, differentiate, substitute, trace
 

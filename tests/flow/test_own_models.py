@@ -12,7 +12,7 @@ import pytest
 from saltus import OneContactModel
 from saltus.errors import ParameterError, SaltusError
 from saltus.flow import simulate
-from saltus.flow.kernel.compiled import _structures
+from saltus.flow.programs.compiled import _structures
 from saltus.systems import Harmonic, Load, Model, System, VelocityReduction, WallOscillator
 from saltus.systems.serial import MODELS, register
 from saltus.taylor.cache import cache_directory

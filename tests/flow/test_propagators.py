@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.flow.kernel.compiled import program
-from saltus.systems import eigenmodes
+from saltus.flow.programs.compiled import program
+from saltus.systems.structures import eigenmodes
 
 LOAD = saltus.Load(frequency=1.1, drive=[saltus.Harmonic(amplitude=0.6, phase=0.4), 0.1])
 NUMBERS = ["load.frequency", "load.drive.0.amplitude", "load.drive.0.phase", "load.drive.1"]

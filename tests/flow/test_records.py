@@ -269,7 +269,7 @@ def test_oscillator_at_rest_on_its_wall_is_released_within_a_record():
 
 
 def test_samples_change_without_compiling():
-    from saltus.flow.kernel.compiled import _structures
+    from saltus.flow.programs.compiled import _structures
 
     simulate(oscillator(Record(TIMES, FORCES)), x=0.0, duration=1.0)
     known = set(_structures)

@@ -24,7 +24,7 @@ AMPLITUDE = "load.horizontal.amplitude"
 
 
 def test_the_numbers_are_those_of_the_compiled_lanes():
-    from saltus.flow.lanes.sampling import LONGEST_RECURRENCE
+    from saltus.flow.lane_steps.sampling import LONGEST_RECURRENCE
 
     assert RECURRENCE.compiled_max_period == LONGEST_RECURRENCE
 

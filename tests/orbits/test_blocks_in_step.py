@@ -13,8 +13,8 @@ import pytest
 from scipy.linalg import expm
 
 import saltus
-from saltus.orbits.branches.symmetry import full_period
-from saltus.systems.load import reversed_load
+from saltus.orbits.beyond.symmetry import full_period
+from saltus.systems.loads.load import reversed_load
 
 DAMPING, COUPLING, FRICTION, FREQUENCY = 0.1, 0.5, 0.2, 0.7
 

@@ -10,7 +10,7 @@ from soft_stops import soft_stop, variational_map
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.orbits.branches.special_point import SpecialKind
+from saltus.orbits.beyond.special_point import SpecialKind
 
 FREQUENCY = "load.frequency"
 CASES = {

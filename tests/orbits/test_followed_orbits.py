@@ -13,7 +13,7 @@ import pytest
 
 import saltus
 from saltus.orbits import solved_near
-from saltus.orbits.branches.symmetry import nearest
+from saltus.orbits.beyond.symmetry import nearest
 from saltus.orbits.equations.whole_motion import WholeMotionEquations
 
 

@@ -12,7 +12,7 @@ import pytest
 import saltus
 from saltus.continuation import CurveEnd
 from saltus.orbits.branches.retrace import comes_along_itself
-from saltus.systems.load import reversed_load
+from saltus.systems.loads.load import reversed_load
 
 FREQUENCY = "load.frequency"
 AMPLITUDE = "load.force.amplitude"

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus
-from saltus.orbits.equations.sampled_motion import excursions
+from saltus.orbits.contract.sampled_motion import excursions
 
 DAMPING, FORCE, RATE = 0.1, 0.8, 0.3
 

@@ -14,9 +14,9 @@ from shared_systems import walled
 import saltus
 from saltus import SpecialCurve
 from saltus.orbits import SpecialPoint
-from saltus.orbits.branches import conditions
-from saltus.orbits.branches.conditions import normal_form
-from saltus.orbits.branches.orbit_curve import OrbitCurve
+from saltus.orbits.beyond import conditions
+from saltus.orbits.beyond.conditions import normal_form
+from saltus.orbits.beyond.orbit_curve import OrbitCurve
 from saltus.orbits.branches.special_curve import SpecialCurvePoint
 from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.theory.impact_oscillator import wall_orbits

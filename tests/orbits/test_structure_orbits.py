@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve, minimize_scalar
 
 import saltus
-from saltus.orbits.equations.sampled_motion import SampledMotion
+from saltus.orbits.contract.sampled_motion import SampledMotion
 from saltus.orbits.equations.whole_motion import WholeMotionEquations
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])

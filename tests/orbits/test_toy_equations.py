@@ -20,7 +20,7 @@ from saltus.continuation import CurveEnd, Cut, End
 from saltus.continuation import TestFunction as Function
 from saltus.flow import SegmentColumn
 from saltus.orbits import PeriodicOrbit, Signature, orbits_of
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.contract.equations import MotionToRead, OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.equations.kinds import KINDS
 
 FREQUENCY, STEP = "load.frequency", 1e-6

@@ -75,7 +75,7 @@ def test_a_rest_that_is_too_short_is_not_proved() -> None:
     assert proof.zero is not None
     from dataclasses import replace
 
-    from saltus.orbits.proofs.resting_segments import rest_by
+    from saltus.orbits.segments.resting_segments import rest_by
 
     rest = proof.made.rests[0]
     assert rest_by(proof.shooting, proof.zero.box, rest) is not None

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import saltus
-from saltus.systems import eigenmodes
+from saltus.systems.structures import eigenmodes
 
 # in parts of the stiffness: the fastest of six modes dies out 2000 times as fast as the first one
 # turns

@@ -18,7 +18,7 @@ import scipy.sparse
 
 import saltus
 from saltus.errors import ParameterError
-from saltus.systems.matrix_files import matrices_in
+from saltus.systems.files.matrix_files import matrices_in
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
 import bad_inputs

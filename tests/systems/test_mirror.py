@@ -12,7 +12,7 @@ import saltus
 import saltus.systems.mirror as mirror_module
 from saltus.orbits import is_symmetric
 from saltus.systems import image_of, mirror_of
-from saltus.systems.load import reversed_load
+from saltus.systems.loads.load import reversed_load
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
 

@@ -132,8 +132,8 @@ def test_a_structure_with_other_numbers_is_not_traced_anew() -> None:
 
 @pytest.mark.parametrize("coupled", [False, True])
 def test_a_structure_of_another_size_has_the_same_code(coupled: bool) -> None:
-    from saltus.flow.kernel.compiled import structure_functions
-    from saltus.flow.lanes.compiled_lanes import lane_functions
+    from saltus.flow.programs.compiled import structure_functions
+    from saltus.flow.programs.compiled_lanes import lane_functions
     from saltus.taylor.generated import functions_text
     from saltus.taylor.tracing import trace
 
@@ -200,7 +200,7 @@ def test_an_ensemble_has_the_derivatives_of_its_motions(coupled: bool) -> None:
 
 
 def test_the_series_of_derivatives_are_as_long_for_any_size() -> None:
-    from saltus.flow.kernel.compiled import structure_functions
+    from saltus.flow.programs.compiled import structure_functions
     from saltus.taylor.generated import llvm_text
     from saltus.taylor.tracing import trace
 

@@ -27,7 +27,7 @@ from saltus.systems import (
     distinct_rows,
     register,
 )
-from saltus.systems.signals import scaled
+from saltus.systems.loads.signals import scaled
 
 finite = st.floats(-1e6, 1e6)
 positive = st.floats(1e-6, 1e6)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from saltus.flow.kernel import memory
-from saltus.flow.kernel.compiled import load_structure
+from saltus.flow.programs.compiled import load_structure
 from saltus.systems.serial import numbers
 from saltus.taylor import record_table, trace, written_type
 

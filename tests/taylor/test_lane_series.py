@@ -12,13 +12,13 @@ from numba import njit, types
 from power_series import solution
 from test_series import OPERATIONS, agrees, force
 
-from saltus.flow.kernel.compiled import program
 from saltus.flow.kernel.layout import HIGHEST_ORDER, LOWEST_ORDER
 from saltus.flow.kernel.layout import SERIES_LENGTH as STRIDE
-from saltus.flow.lanes.compiled_lanes import load_lane_functions
-from saltus.flow.lanes.function_types import LANE_SERIES
-from saltus.flow.lanes.memory import SLOTS
-from saltus.flow.lanes.threads import lane_order
+from saltus.flow.lane_steps.function_types import LANE_SERIES
+from saltus.flow.lane_steps.memory import SLOTS
+from saltus.flow.programs.compiled import program
+from saltus.flow.programs.compiled_lanes import load_lane_functions
+from saltus.flow.programs.lane_threads import lane_order
 from saltus.systems import Harmonic, Load, Model, Record, System, WallOscillator
 from saltus.taylor import written_type
 from saltus.taylor.graph import RECORD_WIDTH

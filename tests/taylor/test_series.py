@@ -15,7 +15,7 @@ from generated_functions import Generated
 from power_series import solution
 
 from saltus import InelasticImpact, OneContactModel, TwoLayer
-from saltus.flow.kernel.compiled import structure_functions
+from saltus.flow.programs.compiled import structure_functions
 from saltus.systems import (
     EnergyRestitution,
     Harmonic,

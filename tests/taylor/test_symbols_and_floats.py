@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import saltus
-from saltus.systems.model import Jet
+from saltus.systems.contracts.model import Jet
 
 HARMONIC = saltus.Load(frequency=1.0, force=saltus.Harmonic(0.5))
 

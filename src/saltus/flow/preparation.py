@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 
 from saltus.errors import SaltusError
-from saltus.flow.kernel.compiled import load_contacts_kernel, load_fillers, load_kernel
-from saltus.flow.kernel.orbit_segments import load_contact_segments, load_segments
-from saltus.flow.lanes.compiled_lanes import load_driver, load_helpers
+from saltus.flow.programs.compiled import load_contacts_kernel, load_fillers, load_kernel
+from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
+from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
 
 # All kernels but that of proofs; what takes longest comes first.
 KERNELS: dict[str, Callable[[], object]] = {

@@ -1,3 +1,8 @@
+from .beyond.special_point import OrbitEnd as OrbitEnd
+from .beyond.special_point import SpecialKind as SpecialKind
+from .beyond.special_point import SpecialPoint as SpecialPoint
+from .beyond.symmetry import is_symmetric as is_symmetric
+from .beyond.symmetry import keeps_symmetry as keeps_symmetry
 from .branches.branch import Branch as Branch
 from .branches.branch import orbits_of as orbits_of
 from .branches.branch_continuation import STEP as STEP
@@ -6,11 +11,6 @@ from .branches.branch_continuation import continue_orbit as continue_orbit
 from .branches.branch_continuation import follow_stable as follow_stable
 from .branches.branch_continuation import switch_branch as switch_branch
 from .branches.special_curve_continuation import continue_special as continue_special
-from .branches.special_point import OrbitEnd as OrbitEnd
-from .branches.special_point import SpecialKind as SpecialKind
-from .branches.special_point import SpecialPoint as SpecialPoint
-from .branches.symmetry import is_symmetric as is_symmetric
-from .branches.symmetry import keeps_symmetry as keeps_symmetry
 from .equations.kinds import equations_of as equations_of
 from .finding.from_motion import find_orbit as find_orbit
 from .finding.from_motion import orbit_from as orbit_from

@@ -24,7 +24,7 @@ from saltus.flow import (
     quantity_of,
     simulate,
 )
-from saltus.orbits.equations.contract import OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.contract.equations import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result, function_for

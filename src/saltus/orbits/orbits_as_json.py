@@ -17,10 +17,10 @@ import numpy as np
 
 from saltus.continuation import CurveEnd, CurveMissed, End, Evidence, Missed
 from saltus.errors import ParameterError
+from saltus.orbits.beyond.orbit_curve import OrbitCurve, OrbitPoint
+from saltus.orbits.beyond.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint
 from saltus.orbits.branches.branch import Branch
-from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, OrbitMissed, SpecialKind, SpecialPoint
-from saltus.orbits.equations.contract import OrbitEquations, Solution
+from saltus.orbits.contract.equations import OrbitEquations, Solution
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature

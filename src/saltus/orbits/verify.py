@@ -8,7 +8,7 @@ import numpy as np
 
 from saltus.checks import answered, check_count
 from saltus.flow import simulate_many
-from saltus.orbits.equations.sampled_motion import DYING
+from saltus.orbits.contract.sampled_motion import DYING
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
 from saltus.systems import System, natural_units

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.systems.contact_model import mass_and_force
-from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import first_of_largest
+from saltus.systems.contracts.contact_model import mass_and_force
+from saltus.systems.contracts.model import first_of_largest
+from saltus.systems.loads.load import DeclaredLoad, Load
 from saltus.systems.system import System
 from saltus.systems.system_units import instants_of, natural_units
 

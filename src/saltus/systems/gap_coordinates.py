@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import (
+from saltus.systems.contracts.contact_model import (
     Contact,
     ContactModel,
     Friction,
@@ -31,6 +31,7 @@ from saltus.systems.contact_model import (
     called_part,
     solved_motion,
 )
+from saltus.systems.contracts.model import Jet, as_given, derivatives_along, each_of, less, weighted
 from saltus.systems.gap_places import (
     CLOSED_BELOW,
     INVERSE,
@@ -43,8 +44,7 @@ from saltus.systems.gap_places import (
     places_of,
     terms_of,
 )
-from saltus.systems.load import Load
-from saltus.systems.model import Jet, as_given, derivatives_along, each_of, less, weighted
+from saltus.systems.loads.load import Load
 
 
 class InGapCoordinates(ContactModel):

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.systems.contact_model import Contact, Friction, Surface
-from saltus.systems.model import is_function, is_zero, reads_of
+from saltus.systems.contracts.contact_model import Contact, Friction, Surface
+from saltus.systems.contracts.model import is_function, is_zero, reads_of
 from saltus.systems.system_units import units_of_gaps
 
 Part = Contact | Surface | Friction

@@ -15,7 +15,7 @@ import numpy as np
 from saltus.checks import answered
 from saltus.errors import ParameterError
 from saltus.number_ranges import NumberRange, number_range, settle_numbers
-from saltus.systems.contact_model import (
+from saltus.systems.contracts.contact_model import (
     Contact,
     ContactModel,
     Friction,
@@ -25,9 +25,9 @@ from saltus.systems.contact_model import (
     normal_forces,
     single_mass,
 )
+from saltus.systems.contracts.model import Model, OneContactModel, is_zero
 from saltus.systems.gap_coordinates import in_gap_coordinates
-from saltus.systems.load import Load
-from saltus.systems.model import Model, OneContactModel, is_zero
+from saltus.systems.loads.load import Load
 
 
 class ImpactLaw:

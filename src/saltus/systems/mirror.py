@@ -13,11 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError
-from saltus.systems.contact_model import ContactModel, mass_and_force, mass_rows, normal_forces
-from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import IMAGE_ROUNDING, Model
-from saltus.systems.repeating import Repeating
-from saltus.systems.signals import Constant, Harmonic, Signal, Sum, scaled
+from saltus.systems.contracts.contact_model import (
+    ContactModel,
+    mass_and_force,
+    mass_rows,
+    normal_forces,
+)
+from saltus.systems.contracts.model import IMAGE_ROUNDING, Model
+from saltus.systems.loads.load import DeclaredLoad, Load
+from saltus.systems.loads.repeating import Repeating
+from saltus.systems.loads.signals import Constant, Harmonic, Signal, Sum, scaled
 from saltus.systems.system_units import natural_units
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, shown
-from saltus.systems.contact_model import (
+from saltus.systems.contracts.contact_model import (
     MOST_CONTACTS,
     MOST_FRICTIONS,
     MOST_MULTIPLIERS,
@@ -26,11 +26,7 @@ from saltus.systems.contact_model import (
     Surface,
     sides_for,
 )
-from saltus.systems.gap_coordinates import InGapCoordinates
-from saltus.systems.gap_places import INVERSE, Part
-from saltus.systems.impact_laws import ImpactLaw, check_paradox
-from saltus.systems.load import DeclaredLoad, Load
-from saltus.systems.model import (
+from saltus.systems.contracts.model import (
     SCALES,
     Jet,
     Model,
@@ -39,6 +35,10 @@ from saltus.systems.model import (
     check_one_contact,
     is_function,
 )
+from saltus.systems.gap_coordinates import InGapCoordinates
+from saltus.systems.gap_places import INVERSE, Part
+from saltus.systems.impact_laws import ImpactLaw, check_paradox
+from saltus.systems.loads.load import DeclaredLoad, Load
 
 # The parts of the contracts of the two siblings: a class that defines one of them and is of neither
 # has the wrong base.

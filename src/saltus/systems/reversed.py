@@ -20,11 +20,11 @@ from typing import Any
 
 from saltus.errors import ParameterError
 from saltus.number_ranges import number_range, settle_numbers
+from saltus.systems.contracts.model import Model
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
-from saltus.systems.load import Load
-from saltus.systems.model import Model
-from saltus.systems.repeating import Repeating
-from saltus.systems.signals import Constant, Harmonic, Record, Signal, Sum
+from saltus.systems.loads.load import Load
+from saltus.systems.loads.repeating import Repeating
+from saltus.systems.loads.signals import Constant, Harmonic, Record, Signal, Sum
 from saltus.systems.system import System, check_system
 
 RESET_SPEEDS = (0.3, 2.0)  # speeds at which a reset is compared with its inverse

@@ -16,11 +16,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from saltus.errors import ParameterError, SaltusError, near, shown
+from saltus.systems.contracts.model import Count, Model, OneContactModel, check_one_contact
 from saltus.systems.gap_coordinates import IN_GAPS, fields_of, in_gap_coordinates
 from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw, NamedParts
-from saltus.systems.load import Load
-from saltus.systems.model import Count, Model, OneContactModel, check_one_contact
-from saltus.systems.signals import Constant, Harmonic, Record, Setting, Signal, Sum, as_signal
+from saltus.systems.loads.load import Load
+from saltus.systems.loads.signals import Constant, Harmonic, Record, Setting, Signal, Sum, as_signal
 
 
 def children(node: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.checks import LIMITS, as_numbers, check_number
 from saltus.errors import ParameterError, near, shown
+from saltus.systems.contracts.model import Model, ask
 from saltus.systems.gap_coordinates import InGapCoordinates
 from saltus.systems.gap_places import (
     CLOSED_BELOW,
@@ -24,7 +25,6 @@ from saltus.systems.gap_places import (
     reflected,
     terms_of,
 )
-from saltus.systems.model import Model, ask
 from saltus.systems.system import System
 from saltus.systems.system_units import ANGLES, natural_units, time_without_period
 

@@ -16,12 +16,12 @@ from saltus.errors import ParameterError, near, shown
 from saltus.files import parsed_json
 from saltus.number_ranges import settle_numbers
 from saltus.progress import html_table
-from saltus.systems.contact_model import ContactModel
+from saltus.systems.contracts.contact_model import ContactModel
+from saltus.systems.contracts.model import Model, OneContactModel
 from saltus.systems.gap_coordinates import in_gap_coordinates
 from saltus.systems.impact_laws import ImpactLaw, VelocityReduction
-from saltus.systems.load import DeclaredLoad, Load
+from saltus.systems.loads.load import DeclaredLoad, Load
 from saltus.systems.mirror import mirror_of
-from saltus.systems.model import Model, OneContactModel
 from saltus.systems.model_checks import check_contact, check_traces, check_works
 from saltus.systems.serial import (
     children,

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from saltus.systems.contact_model import Surface, mass_rows, normal_forces, sides_for
-from saltus.systems.load import DeclaredLoad, Load, LoadOnSides
-from saltus.systems.model import Jet, each_of
+from saltus.systems.contracts.contact_model import Surface, mass_rows, normal_forces, sides_for
+from saltus.systems.contracts.model import Jet, each_of
+from saltus.systems.loads.load import DeclaredLoad, Load, LoadOnSides
 
 if TYPE_CHECKING:
     from saltus.systems.system import System

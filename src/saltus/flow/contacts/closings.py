@@ -69,7 +69,20 @@ from saltus.flow.contacts.impacts import (
     settle_contact,
     undecide,
 )
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import gives, pull_of
+from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
+from saltus.flow.contacts.tangent import (
+    closing_columns,
+    fill_slopes,
+    gap_derivative,
+    hold_columns,
+    impulse_columns,
+    jump_columns,
+    note_shifts,
+    note_velocities,
+    slope,
+)
+from saltus.flow.kernel.contact_layout import (
     APART,
     EQUAL_PUSH,
     LETS_GO,
@@ -83,19 +96,6 @@ from saltus.flow.contacts.layout import (
     contact_position,
     copy_all,
     restitution,
-)
-from saltus.flow.contacts.rows import gives, pull_of
-from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
-from saltus.flow.contacts.tangent import (
-    closing_columns,
-    fill_slopes,
-    gap_derivative,
-    hold_columns,
-    impulse_columns,
-    jump_columns,
-    note_shifts,
-    note_velocities,
-    slope,
 )
 from saltus.flow.kernel.layout import ZERO, EventCode, Status
 from saltus.flow.kernel.roots import growth_of, leading

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import gives, independence, rate_at
+from saltus.flow.kernel.contact_layout import (
     MOST_TRIED,
     SPANNED,
     VIOLATED,
@@ -25,7 +26,6 @@ from saltus.flow.contacts.layout import (
     restitution,
     rub_coefficient,
 )
-from saltus.flow.contacts.rows import gives, independence, rate_at
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.flow.contacts.impacts import gap_series
-from saltus.flow.contacts.layout import (
+from saltus.flow.kernel.contact_layout import (
     ContactColumn,
     SegmentEnd,
     SegmentExtremes,

@@ -19,7 +19,9 @@ import numpy as np
 from saltus.flow.contacts.complementarity import eliminate, friction_rate
 from saltus.flow.contacts.held_rows import all_rows_stand, guard_step, onto, some_idle, stop_row
 from saltus.flow.contacts.impacts import friction_mobility, record_contact_event
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import row_series
+from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
+from saltus.flow.kernel.contact_layout import (
     TOGETHER,
     ContactColumn,
     FrictionColumn,
@@ -32,8 +34,6 @@ from saltus.flow.contacts.layout import (
     is_sum,
     is_surface,
 )
-from saltus.flow.contacts.rows import row_series
-from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, leading, nudged_share
 from saltus.flow.kernel.steps import (

@@ -8,16 +8,6 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 from __future__ import annotations
 
 from saltus.flow.contacts.complementarity import invert, tell_instant
-from saltus.flow.contacts.layout import (
-    PULLED,
-    SPANNED,
-    ContactColumn,
-    FrictionColumn,
-    FrictionImpact,
-    first_flag,
-    first_row,
-    is_surface,
-)
 from saltus.flow.contacts.rows import (
     gives,
     has_speed,
@@ -29,6 +19,16 @@ from saltus.flow.contacts.rows import (
     row_series,
     size_of_terms,
     told_rate,
+)
+from saltus.flow.kernel.contact_layout import (
+    PULLED,
+    SPANNED,
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    first_flag,
+    first_row,
+    is_surface,
 )
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.kernel.steps import state_size, step_size, time_scale

@@ -12,7 +12,8 @@ import numpy as np
 
 from saltus.flow.contacts.complementarity import acting, complementary, invert, push, tell_instant
 from saltus.flow.contacts.held_rows import fill_rows, hold_rows, row_step
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import pull_of, row_series, told_rate
+from saltus.flow.kernel.contact_layout import (
     EXCESS,
     FINISHED,
     MOST_EXCESS,
@@ -29,7 +30,6 @@ from saltus.flow.contacts.layout import (
     jumping,
     restitution,
 )
-from saltus.flow.contacts.rows import pull_of, row_series, told_rate
 from saltus.flow.kernel.layout import EXACT, LEAST_LOSS, Mode
 from saltus.flow.kernel.steps import column_step, leaps, slow_share, step_size
 from saltus.taylor import lean_jit

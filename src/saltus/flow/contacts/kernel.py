@@ -1,8 +1,8 @@
 """The flow of a motion with several contacts: smooth steps, impacts, releases, accumulations of
 impacts, rest.
 
-The compiled parts of the files that `kernel/compiled.py` names, of this file and of
-`kernel/loop.py`, which calls it, are compiled as one module, once for every model. All of a
+The compiled parts of the files that `programs/compiled.py` names, of this file and of
+`programs/loop.py`, which calls it, are compiled as one module, once for every model. All of a
 motion's memory is in `motion` (see `kernel/memory.py`): `motion.contacts` has a row for each
 contact, in the columns of `ContactColumn`, and the last of `motion.parameters` say for each
 coordinate whether it is free (1) or held (0).
@@ -74,24 +74,6 @@ from saltus.flow.contacts.impacts import (
     slow_impacts,
     smaller_set,
 )
-from saltus.flow.contacts.layout import (
-    EXCESS,
-    GAP_ROUNDING,
-    MOST_TRIED,
-    NEAR,
-    TIED,
-    TRIED_AGAIN,
-    ContactColumn,
-    FrictionColumn,
-    FrictionImpact,
-    NoMargin,
-    NoPress,
-    contact_position,
-    first_flag,
-    ground_speed,
-    is_function,
-    solver_arrays,
-)
 from saltus.flow.contacts.propagators import (
     carries_columns,
     carry_columns,
@@ -115,6 +97,24 @@ from saltus.flow.contacts.tangent import (
     note_shifts,
     release_columns,
     start_columns,
+)
+from saltus.flow.kernel.contact_layout import (
+    EXCESS,
+    GAP_ROUNDING,
+    MOST_TRIED,
+    NEAR,
+    TIED,
+    TRIED_AGAIN,
+    ContactColumn,
+    FrictionColumn,
+    FrictionImpact,
+    NoMargin,
+    NoPress,
+    contact_position,
+    first_flag,
+    ground_speed,
+    is_function,
+    solver_arrays,
 )
 from saltus.flow.kernel.layout import PENETRATED, ZERO, EventCode, Mode, Status
 from saltus.flow.kernel.memory import ContactsParts

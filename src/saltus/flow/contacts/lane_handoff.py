@@ -1,7 +1,7 @@
-"""What `lanes/handoff.py` needs of a model with several contacts, to let the scalar kernel move a
+"""What `programs/lane_handoff.py` needs of a model with several contacts, to let the scalar kernel move a
 lane.
 
-Its compiled part goes into one module with that of `lanes/handoff.py`, in the place of
+Its compiled part goes into one module with that of `programs/lane_handoff.py`, in the place of
 `one_contact/lane_handoff.py`.
 """
 

@@ -12,9 +12,9 @@ closed contacts. Lanes in which neither is a solution are solved one at a time (
 
 from __future__ import annotations
 
-from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.kernel.contact_layout import ContactColumn
 from saltus.flow.kernel.layout import LEAST_LOSS
-from saltus.flow.lanes.memory import Closing
+from saltus.flow.lane_steps.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_vectors import absolute, bits, fma, mask, maximum, select, splat
 

@@ -1,7 +1,7 @@
 """A step of all lanes of a model with several contacts: the smooth motion up to the first closing
 of a gap, and impacts.
 
-Its compiled part goes into one module with that of `lanes/driver.py`, in the place of
+Its compiled part goes into one module with that of `programs/lane_driver.py`, in the place of
 `one_contact/lane_step.py`, and with that of `lane_impacts.py`. Lanes move together as long as all
 closed contacts certainly push and at most one gap closes. Releases, contacts that close together,
 slow impacts and rest are left to the scalar kernel, and so are all events of motions with a
@@ -14,7 +14,7 @@ even if it is not the same one in all lanes (`one_free.py`).
 from __future__ import annotations
 
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
-from saltus.flow.contacts.layout import (
+from saltus.flow.kernel.contact_layout import (
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
@@ -22,7 +22,9 @@ from saltus.flow.contacts.layout import (
     NoPress,
 )
 from saltus.flow.kernel.layout import Mode
-from saltus.flow.lanes.lane_steps import (
+from saltus.flow.lane_steps.memory import FAST, Gap, Step, Stretch
+from saltus.flow.lane_steps.sampling import keep_ended, pass_ends, record_others, record_range
+from saltus.flow.lane_steps.steps import (
     both_at,
     commit,
     find_contact,
@@ -34,8 +36,6 @@ from saltus.flow.lanes.lane_steps import (
     state_size,
     sweep,
 )
-from saltus.flow.lanes.memory import FAST, Gap, Step, Stretch
-from saltus.flow.lanes.sampling import keep_ended, pass_ends, record_others, record_range
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_memory import one
 from saltus.taylor.lane_vectors import (

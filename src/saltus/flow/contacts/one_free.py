@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
-from saltus.flow.contacts.layout import MOST_TRIED
+from saltus.flow.kernel.contact_layout import MOST_TRIED
 from saltus.taylor import Expr, Trace, combine, differentiate, number, ordered, substitute
 
 Factors = tuple[Expr, ...]

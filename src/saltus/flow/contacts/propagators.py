@@ -5,7 +5,7 @@ While its contacts do not change, a structure obeys x' = A x + B u, and its colu
     z' = A z + B u_c,
 
 where u_c are the derivatives of the inputs u to the column's parameter; for the columns of the
-state at the start they are 0. In the eigenvectors of A (`systems/eigenmodes.py`) the columns of the
+state at the start they are 0. In the eigenvectors of A (`systems/structures/eigenmodes.py`) the columns of the
 state are exact after any time T, exp(lambda T) y. Those of parameters are taken from step to step
 of the motion: a polynomial p of the degree of the inputs' series solves p' = lambda p + f exactly,
 so that
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from saltus.flow.contacts.layout import ContactColumn
+from saltus.flow.kernel.contact_layout import ContactColumn
 from saltus.flow.kernel.layout import ROUGHER
 from saltus.flow.kernel.steps import drive_mode, inputs_of_modes, places_of_modes
 from saltus.taylor import lean_jit

@@ -20,7 +20,8 @@ from saltus.flow.contacts.impacts import (
     measure_gap,
     record_contact_event,
 )
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
+from saltus.flow.kernel.contact_layout import (
     ContactColumn,
     FrictionColumn,
     contact_position,
@@ -30,7 +31,6 @@ from saltus.flow.contacts.layout import (
     is_surface,
     jumping,
 )
-from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
 from saltus.flow.kernel.layout import EventCode, Status
 from saltus.flow.kernel.steps import clear_shifts, expand, move_columns
 from saltus.taylor import lean_jit

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 
-from saltus.flow.contacts.layout import (
+from saltus.flow.kernel.contact_layout import (
     ROW_ROUNDING,
     SPANNED,
     ContactColumn,

@@ -30,7 +30,16 @@ from saltus.flow.contacts.complementarity import (
 from saltus.flow.contacts.frictions import rubs_along
 from saltus.flow.contacts.held_rows import fill_pushes, row_lift
 from saltus.flow.contacts.impacts import hold_coordinates, time_to_close
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import gives, independence, row_entry, row_series, told_rate
+from saltus.flow.contacts.tangent import (
+    fill_slopes,
+    hold_columns,
+    impulse_columns,
+    lift_rate,
+    note_velocities,
+    slope,
+)
+from saltus.flow.kernel.contact_layout import (
     SAME_IMPACT,
     SPANNED,
     VIOLATED,
@@ -44,15 +53,6 @@ from saltus.flow.contacts.layout import (
     restitution,
     rub_coefficient,
     zeros,
-)
-from saltus.flow.contacts.rows import gives, independence, row_entry, row_series, told_rate
-from saltus.flow.contacts.tangent import (
-    fill_slopes,
-    hold_columns,
-    impulse_columns,
-    lift_rate,
-    note_velocities,
-    slope,
 )
 from saltus.flow.kernel.steps import change_rate, expand, piece_end
 from saltus.taylor import jit, lean_jit

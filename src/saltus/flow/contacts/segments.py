@@ -32,14 +32,6 @@ from saltus.flow.contacts.impacts import (
     jump_first_order,
     note_press,
 )
-from saltus.flow.contacts.layout import (
-    ContactColumn,
-    SegmentEnd,
-    SegmentPlan,
-    contact_position,
-    restitution,
-    solver_arrays,
-)
 from saltus.flow.contacts.propagators import (
     begin_remainders,
     carry_columns,
@@ -57,6 +49,14 @@ from saltus.flow.contacts.tangent import (
     impulse_columns,
     jump_columns,
     note_velocities,
+)
+from saltus.flow.kernel.contact_layout import (
+    ContactColumn,
+    SegmentEnd,
+    SegmentPlan,
+    contact_position,
+    restitution,
+    solver_arrays,
 )
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.memory import CONTACT_SEGMENTS, ContactsSegmentParts, MotionMemory

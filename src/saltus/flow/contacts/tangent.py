@@ -28,7 +28,8 @@ from saltus.flow.contacts.complementarity import (
 )
 from saltus.flow.contacts.held_rows import fill_pushes, left_of, onto, row_lift
 from saltus.flow.contacts.impacts import frozen_accumulation, jump_place, press_of
-from saltus.flow.contacts.layout import (
+from saltus.flow.contacts.rows import gives, row_series
+from saltus.flow.kernel.contact_layout import (
     APART,
     RELATIVE_STEP,
     TIED,
@@ -37,7 +38,6 @@ from saltus.flow.contacts.layout import (
     copy_all,
     restitution,
 )
-from saltus.flow.contacts.rows import gives, row_series
 from saltus.flow.kernel.layout import EventCode
 from saltus.flow.kernel.steps import columns_at_event, expand, move_columns
 from saltus.taylor import jit, lean_jit

@@ -15,7 +15,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from saltus.errors import ParameterError, SaltusError, shown
 from saltus.flow.cuda.targets import Card, Target
-from saltus.flow.kernel.compiled import Program
+from saltus.flow.programs.compiled import Program
 from saltus.progress import say
 from saltus.systems import System
 from saltus.taylor import trace

@@ -10,10 +10,10 @@ from llvmlite import binding
 
 from saltus.flow.cuda import thread
 from saltus.flow.cuda.thread_memory import NONE, ONE_CONTACT, SEVERAL
-from saltus.flow.kernel.compiled import contacts_text, one_contact_text
 from saltus.flow.kernel.memory import ContactsFunctions, OneContactFunctions
-from saltus.flow.lanes.compiled_lanes import driver_text, helpers_text
-from saltus.flow.lanes.memory import Code, Helpers
+from saltus.flow.lane_steps.memory import Code, Helpers
+from saltus.flow.programs.compiled import contacts_text, one_contact_text
+from saltus.flow.programs.compiled_lanes import driver_text, helpers_text
 from saltus.taylor import (
     compiled_part,
     digest,

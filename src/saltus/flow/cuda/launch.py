@@ -18,8 +18,8 @@ import numpy as np
 from saltus.flow.cuda.targets import Target
 from saltus.flow.cuda.thread_code import ThreadCode, thread_code
 from saltus.flow.cuda.thread_memory import FLAG_WORDS, WORD, Request
-from saltus.flow.lanes.memory import UNBOUNDED, LaneGroup, Work
-from saltus.flow.lanes.threads import WHAT, Ends, Jobs, Lanes
+from saltus.flow.lane_steps.memory import UNBOUNDED, LaneGroup, Work
+from saltus.flow.programs.lane_threads import WHAT, Ends, Jobs, Lanes
 from saltus.progress import Progress, silent
 
 

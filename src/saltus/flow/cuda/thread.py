@@ -4,8 +4,8 @@ from one launch to the next.
 
 from __future__ import annotations
 
-from saltus.flow.lanes.driver import run_all
-from saltus.flow.lanes.function_types import RUN_LANES, shared
+from saltus.flow.lane_steps.function_types import RUN_LANES, shared
+from saltus.flow.programs.lane_driver import run_all
 from saltus.taylor import cached_jit
 
 # --- compiled from here on ---------------------------------------------------

@@ -12,10 +12,10 @@ from llvmlite import binding
 
 from saltus.flow.cuda.kernel_text import kernel_texts
 from saltus.flow.cuda.thread_memory import ThreadText
-from saltus.flow.kernel.compiled import structure_functions
-from saltus.flow.lanes.compiled_lanes import lane_functions
-from saltus.flow.lanes.memory import LaneGroup
-from saltus.flow.lanes.threads import Lanes
+from saltus.flow.lane_steps.memory import LaneGroup
+from saltus.flow.programs.compiled import structure_functions
+from saltus.flow.programs.compiled_lanes import lane_functions
+from saltus.flow.programs.lane_threads import Lanes
 from saltus.taylor import (
     SeriesOf,
     Trace,

@@ -1,6 +1,6 @@
 """The memory of a thread, and LLVM's text of the function that gives it to the lanes' driver.
 
-The driver takes a `LaneGroup` (`lanes/memory.py`). What a structure and a call fix in it (sizes,
+The driver takes a `LaneGroup` (`lane_steps/memory.py`). What a structure and a call fix in it (sizes,
 the functions, the places of the parts) are constants of the text. So LLVM removes what a structure
 does not have, and calls through addresses become code. What moves is in the thread's own memory;
 what a motion keeps from one launch to the next is a row of `kept`, and everything else is an array
@@ -17,7 +17,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from saltus.flow.lanes.memory import END, FLAGS, JOB, ROW, Code, Control, Helpers, LaneGroup
+from saltus.flow.lane_steps.memory import END, FLAGS, JOB, ROW, Code, Control, Helpers, LaneGroup
 from saltus.taylor.lane_memory import LanesType
 from saltus.taylor.private_numba import value_type
 from saltus.taylor.vectors import DOUBLE, INDEX, LONG

@@ -1,3 +1,1 @@
-"""What the kernels of all models share: roots, steps, the layout of their memory, and how they are
-compiled.
-"""
+"""What the kernels of all models share: roots, steps and the layout of their memory."""

@@ -60,7 +60,7 @@ MOTION = np.dtype(
             "horizon",
             _REAL,
         ),  # for the scalar steps of a lane, which end with its forcing period: the local time at its motion's end
-        # whether to return as soon as the motion is smooth again (see `lanes/driver.py`)
+        # whether to return as soon as the motion is smooth again (see `programs/lane_driver.py`)
         ("until_smooth", _WHOLE),
         # for tests: 1 plus the row of a contact or friction whose events are moved, and by how
         # many units in the last place of the time; 0 moves none
@@ -213,7 +213,7 @@ class ContactsFunctions(NamedTuple):
     tangent: Any
     load_series: Any  # of the load's channels, for eigenmodes
     signs: Any
-    # the table of `systems/eigenmodes.py`; empty for motions that are not followed in them
+    # the table of `systems/structures/eigenmodes.py`; empty for motions that are not followed in them
     eigenmodes: Any
 
 

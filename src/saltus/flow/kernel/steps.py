@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn
+from saltus.flow.kernel.contact_layout import ContactColumn, FrictionColumn
 from saltus.flow.kernel.layout import (
     CANCELLED,
     DEFECT,
@@ -495,7 +495,7 @@ def motion_end(motion):
     return (motion.last_period - motion.period) * motion.period_length + motion.end
 
 
-# Structures in eigenmodes (`systems/eigenmodes.py`).
+# Structures in eigenmodes (`systems/structures/eigenmodes.py`).
 
 # The share of the tolerance up to which a mode is taken as dead where derivatives are asked for.
 DEAD = 1e-4
@@ -576,7 +576,7 @@ def measured_from_rest(motion, values, j, width, one, two):
 @lean_jit
 def one_mode(motion, place, j, order, allowed):
     """The series of a real eigenmode from its value, which begins it: the polynomial of
-    `systems/eigenmodes.py` if it is on that to within what is allowed. Its eigenvalue is at a place
+    `systems/structures/eigenmodes.py` if it is on that to within what is allowed. Its eigenvalue is at a place
     of the table."""
     y = motion.mode_series[j]
     f = motion.mode_series[2 * motion.own]

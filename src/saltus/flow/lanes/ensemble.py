@@ -15,19 +15,12 @@ from saltus.checks import Numbers, check_memory, check_number, check_work
 from saltus.errors import ParameterError
 from saltus.flow.cuda.devices import read_device, target_of
 from saltus.flow.cuda.launch import run_on
-from saltus.flow.kernel.compiled import Program, limits_of, program
 from saltus.flow.kernel.layout import SHORTEST, Mode, Status
+from saltus.flow.lane_steps.memory import JOB
 from saltus.flow.lanes.capture_speeds import capture_speeds
-from saltus.flow.lanes.compiled_lanes import (
-    compile_beside,
-    compile_driver_aside,
-    compile_everything,
-    load_lane_functions,
-)
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import Inputs, read_inputs
-from saltus.flow.lanes.memory import JOB
 from saltus.flow.lanes.one_by_one import followed_one_by_one
 from saltus.flow.lanes.options import (
     EnsembleOptions,
@@ -38,9 +31,16 @@ from saltus.flow.lanes.options import (
     read_side,
     read_threads,
 )
-from saltus.flow.lanes.threads import Jobs, Lanes
 from saltus.flow.motion.kernel_state import longest_time
 from saltus.flow.motion.simulate import Clock, clock
+from saltus.flow.programs.compiled import Program, limits_of, program
+from saltus.flow.programs.compiled_lanes import (
+    compile_beside,
+    compile_driver_aside,
+    compile_everything,
+    load_lane_functions,
+)
+from saltus.flow.programs.lane_threads import Jobs, Lanes
 from saltus.progress import Progress, silent
 from saltus.systems import (
     System,

@@ -12,10 +12,10 @@ import numpy as np
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.lanes.inputs import Inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample
-from saltus.flow.lanes.threads import Ends, Jobs
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.sensitivities import state_slopes
 from saltus.flow.motion.simulate import simulate
+from saltus.flow.programs.lane_threads import Ends, Jobs
 from saltus.systems import System, arguments_of
 from saltus.taylor import FREQUENCY
 

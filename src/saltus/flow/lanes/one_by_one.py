@@ -12,15 +12,15 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.layout import Mode, Status
+from saltus.flow.lane_steps.memory import END, LONGEST_RECURRENCE
+from saltus.flow.lane_steps.sampling import recurrence_period
 from saltus.flow.lanes.inputs import Inputs
-from saltus.flow.lanes.memory import END, LONGEST_RECURRENCE
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until
-from saltus.flow.lanes.sampling import recurrence_period
-from saltus.flow.lanes.threads import Ends, Jobs
 from saltus.flow.motion.events import EventKind, Stop, modes_of
 from saltus.flow.motion.motion import Motion
 from saltus.flow.motion.row_values import closing_rates
 from saltus.flow.motion.simulate import simulate
+from saltus.flow.programs.lane_threads import Ends, Jobs
 from saltus.progress import Progress
 from saltus.systems import System, arguments_of, natural_units
 

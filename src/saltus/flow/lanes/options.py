@@ -120,7 +120,7 @@ def read_threads(threads: Any) -> int:
         `threads` is no whole number from 1 on.
     """
     # here, as reading a dataset needs no compiled code
-    from saltus.flow.lanes.threads import available_cores
+    from saltus.flow.programs.lane_threads import available_cores
 
     threads = available_cores() if threads is None else threads
     check_count("threads", threads, 1)

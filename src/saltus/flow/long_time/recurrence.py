@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.enumerations import NumberedSentence
-from saltus.flow.kernel.compiled import limits_of
 from saltus.flow.lanes.ensemble import run_ensemble, simulate_many
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import read_inputs
@@ -23,6 +22,7 @@ from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_threa
 from saltus.flow.long_time.load_release import load_releases
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import state_names
+from saltus.flow.programs.compiled import limits_of
 from saltus.progress import Progress, silent
 from saltus.systems import System, natural_units
 
@@ -151,7 +151,7 @@ class RecurrenceSettings:
     """When a motion counts as periodic, in orbits, attractors, charts and diagrams."""
 
     # The compiled lanes look for periods up to this one (`LONGEST_RECURRENCE` in
-    # flow/lanes/memory.py). A motion has settled with the period q if 2 q + 2 successive states
+    # flow/lane_steps/memory.py). A motion has settled with the period q if 2 q + 2 successive states
     # agree with those q forcing periods before to within `RECURRENT` (same file): 1e-10 of their
     # size, or of natural units where they are smaller.
     compiled_max_period: int = 16

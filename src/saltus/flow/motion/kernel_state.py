@@ -16,20 +16,12 @@ import numpy as np
 
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
-from saltus.flow.contacts.layout import (
+from saltus.flow.kernel.contact_layout import (
     ContactColumn,
     FrictionColumn,
     FrictionImpact,
     NoMargin,
     NoPress,
-)
-from saltus.flow.kernel.compiled import (
-    Program,
-    contact_rows_at,
-    load_contacts_kernel,
-    load_kernel,
-    piece_at,
-    taylor_order,
 )
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
 from saltus.flow.kernel.memory import (
@@ -44,6 +36,14 @@ from saltus.flow.kernel.memory import (
 from saltus.flow.motion.events import ContactEvents, MotionEvents, Stop
 from saltus.flow.motion.motion import Motion, Samples, motion_of
 from saltus.flow.motion.validity import DenseOutput, Validity, ValidityCheck
+from saltus.flow.programs.compiled import (
+    Program,
+    contact_rows_at,
+    load_contacts_kernel,
+    load_kernel,
+    piece_at,
+    taylor_order,
+)
 from saltus.systems import (
     CLOSED_BELOW,
     OWN_TIME,

@@ -17,9 +17,14 @@ import numpy as np
 
 from saltus.checks import LIMITS
 from saltus.errors import SaltusError
-from saltus.flow.contacts.layout import ContactColumn, FrictionColumn, NoPress
 from saltus.flow.kernel import memory
-from saltus.flow.kernel.compiled import (
+from saltus.flow.kernel.contact_layout import ContactColumn, FrictionColumn, NoPress
+from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
+from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, behind_parameters
+from saltus.flow.motion.events import EventKind, Stop
+from saltus.flow.motion.kernel_state import natural_times
+from saltus.flow.motion.simulate import refusal
+from saltus.flow.programs.compiled import (
     HERE,
     LEAVES,
     MOST_COEFFICIENTS,
@@ -28,11 +33,6 @@ from saltus.flow.kernel.compiled import (
     program,
     structure_functions,
 )
-from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
-from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, behind_parameters
-from saltus.flow.motion.events import EventKind, Stop
-from saltus.flow.motion.kernel_state import natural_times
-from saltus.flow.motion.simulate import refusal
 from saltus.systems import System, Transient, children, substitute, where_inert
 from saltus.taylor import (
     RECORD_WIDTH,

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.kernel.compiled import ContactRows, contact_rows_at, program
 from saltus.flow.motion.events import modes_of
 from saltus.flow.motion.motion import Motion
+from saltus.flow.programs.compiled import ContactRows, contact_rows_at, program
 from saltus.systems import (
     System,
     inert_frictions,

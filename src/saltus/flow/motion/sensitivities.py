@@ -13,13 +13,13 @@ import numpy as np
 
 from saltus.checks import Numbers, Speeds, check_names, instants
 from saltus.errors import MotionError
-from saltus.flow.contacts.layout import ImpactDetail
-from saltus.flow.kernel.compiled import Program
+from saltus.flow.kernel.contact_layout import ImpactDetail
 from saltus.flow.kernel.layout import EventCode, GrazingDetail, RestDetail
 from saltus.flow.motion.events import EventKind, Stop
 from saltus.flow.motion.motion import Motion, in_own_coordinates, state_names
 from saltus.flow.motion.simulate import MotionRequest, follow
 from saltus.flow.motion.validity import DenseOutput
+from saltus.flow.programs.compiled import Program
 from saltus.progress import Progress, silent
 from saltus.result import Result, result_dataset
 from saltus.systems import System, check_system, natural_units, solved_motion, substitute

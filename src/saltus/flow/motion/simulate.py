@@ -23,7 +23,6 @@ from saltus.checks import (
     real_array,
 )
 from saltus.errors import MotionError, ParameterError, shown
-from saltus.flow.kernel.compiled import Program, known_program, limits_of, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.kernel_state import (
@@ -37,6 +36,7 @@ from saltus.flow.motion.kernel_state import (
 )
 from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
+from saltus.flow.programs.compiled import Program, known_program, limits_of, taylor_order
 from saltus.progress import Progress, shown_if_long, silent
 from saltus.systems import (
     DeclaredLoad,

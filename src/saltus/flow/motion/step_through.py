@@ -13,12 +13,12 @@ import numpy as np
 
 from saltus.checks import Speeds
 from saltus.errors import ParameterError, near
-from saltus.flow.kernel.compiled import known_program, taylor_order
 from saltus.flow.kernel.layout import Mode, Status
-from saltus.flow.kernel.plain import PlainKernel, Words
 from saltus.flow.motion.kernel_state import ContactState, KernelState, Recorder
 from saltus.flow.motion.motion import Motion, in_own_coordinates
 from saltus.flow.motion.simulate import GOES_ON, MotionRequest, collected, refuse
+from saltus.flow.programs.compiled import known_program, taylor_order
+from saltus.flow.programs.plain import PlainKernel, Words
 from saltus.systems import System
 
 # The numbers of a motion that are printed at a pause, in this order.

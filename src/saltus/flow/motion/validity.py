@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.kernel.compiled import contact_rows_at, program
 from saltus.flow.kernel.layout import LOSSLESS
+from saltus.flow.programs.compiled import contact_rows_at, program
 from saltus.progress import html_table, rows_table
 from saltus.systems import System, energy_gain, friction_margins
 

@@ -2,8 +2,8 @@
 chatter.
 
 The compiled parts of `kernel/layout.py`, `kernel/roots.py`, `kernel/steps.py`, `impacts.py`, this
-file and `kernel/loop.py`, which calls it, are compiled as one module, once for all models with at
-most one contact: the functions that are generated for a structure (see `kernel/compiled.py`) are in
+file and `programs/loop.py`, which calls it, are compiled as one module, once for all models with at
+most one contact: the functions that are generated for a structure (see `programs/compiled.py`) are in
 its memory. These files therefore consist of plain loops under the decorators of `saltus.taylor`,
 and share one namespace. All of a motion's memory is in `motion` (see `kernel/memory.py`).
 

@@ -1,6 +1,6 @@
-"""What `lanes/handoff.py` needs of a model with one contact, to let the scalar kernel move a lane.
+"""What `programs/lane_handoff.py` needs of a model with one contact, to let the scalar kernel move a lane.
 
-Its compiled part goes into one module with that of `lanes/handoff.py`; `contacts/lane_handoff.py`
+Its compiled part goes into one module with that of `programs/lane_handoff.py`; `contacts/lane_handoff.py`
 takes its place for models with several contacts.
 """
 

@@ -1,14 +1,16 @@
 """A step of all lanes of a model with one contact or none: the smooth motion up to the contact, and
 impacts.
 
-Its compiled part goes into one module with that of `lanes/driver.py`; `contacts/lane_step.py` takes
+Its compiled part goes into one module with that of `programs/lane_driver.py`; `contacts/lane_step.py` takes
 its place for other models.
 """
 
 from __future__ import annotations
 
 from saltus.flow.kernel.layout import CHATTER_SPEED, LOSSLESS, side_of_state
-from saltus.flow.lanes.lane_steps import (
+from saltus.flow.lane_steps.memory import FAST, SMALLEST_SHARE, Gap, Step, Stretch
+from saltus.flow.lane_steps.sampling import pass_ends, record_others, record_range
+from saltus.flow.lane_steps.steps import (
     both_at,
     commit,
     find_contact,
@@ -21,8 +23,6 @@ from saltus.flow.lanes.lane_steps import (
     state_size,
     sweep,
 )
-from saltus.flow.lanes.memory import FAST, SMALLEST_SHARE, Gap, Step, Stretch
-from saltus.flow.lanes.sampling import pass_ends, record_others, record_range
 from saltus.taylor import inline_jit, lean_jit
 from saltus.taylor.lane_vectors import absolute, bits, fma, mask, minimum, select, splat
 

@@ -1,3 +1,1 @@
-"""Branches of orbits along one parameter, curves of special points along two, their special points,
-changes and ends.
-"""
+"""Branches of orbits along one parameter, and curves of special points along two."""

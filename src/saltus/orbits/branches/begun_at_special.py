@@ -5,9 +5,9 @@ branch is followed to both sides.
 from __future__ import annotations
 
 from saltus.continuation import Course, Cut, Evidence, Zero, located
+from saltus.orbits.beyond.orbit_curve import OrbitPoint
+from saltus.orbits.beyond.special_point import SpecialPoint
 from saltus.orbits.branches.branch_events import BranchEvents
-from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import SpecialPoint
 from saltus.orbits.signature import TOLERANCES
 
 # Distances along the branch at which the sides of a change at its first point are told apart.

@@ -24,9 +24,9 @@ from saltus.flow import (
     own_quantities,
     unit_of,
 )
-from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialPoint, SpecialPoints
-from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.beyond.orbit_curve import OrbitPoint
+from saltus.orbits.beyond.special_point import OrbitEnd, SpecialPoint, SpecialPoints
+from saltus.orbits.contract.equations import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import ModeChange, Signature
@@ -37,7 +37,7 @@ from saltus.systems import System, driven_displacements
 if TYPE_CHECKING:
     import xarray
 
-    from saltus.orbits.branches.special_point import SpecialPoint
+    from saltus.orbits.beyond.special_point import SpecialPoint
 
 START = End(OrbitEnd.START)
 OF_CYCLES = ("rounds", "through")  # names of a table of cycles alone

@@ -15,18 +15,18 @@ from saltus.checks import check_bounds, check_step
 from saltus.continuation import STEPS, Continuation, End, Watch, both_ways
 from saltus.errors import ParameterError, shown
 from saltus.flow import unit_of
+from saltus.orbits.beyond.orbit_curve import OrbitPoint, start
+from saltus.orbits.beyond.rest import as_the_motion_goes_on
+from saltus.orbits.beyond.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
+from saltus.orbits.beyond.symmetry import divide, full_period, half, keeps_symmetry
 from saltus.orbits.branches.begun_at_special import from_a_change, with_special_start
-from saltus.orbits.branches.beyond_rest import as_the_motion_goes_on
 from saltus.orbits.branches.branch import START, Branch
 from saltus.orbits.branches.branch_events import (
     BranchEvents,
     ended_where_grazings_accumulate,
     restarted,
 )
-from saltus.orbits.branches.orbit_curve import OrbitPoint, start
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint, UserFunction
-from saltus.orbits.branches.symmetry import divide, full_period, half, keeps_symmetry
-from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.contract.equations import OrbitEquations
 from saltus.orbits.equations.cycles import PERIOD
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_near

@@ -23,7 +23,7 @@ from saltus.continuation import (
 )
 from saltus.errors import SaltusError
 from saltus.flow import simulate
-from saltus.orbits.branches.orbit_curve import (
+from saltus.orbits.beyond.orbit_curve import (
     FLIP,
     STEEPEST,
     OrbitPoint,
@@ -33,15 +33,14 @@ from saltus.orbits.branches.orbit_curve import (
     grazing,
     never_torus,
 )
-from saltus.orbits.branches.retrace import comes_along_itself
-from saltus.orbits.branches.special_point import (
+from saltus.orbits.beyond.special_point import (
     OrbitEnd,
     OrbitMissed,
     SpecialKind,
     SpecialPoint,
     UserFunction,
 )
-from saltus.orbits.branches.symmetry import (
+from saltus.orbits.beyond.symmetry import (
     beside_image,
     falls_onto_image,
     is_image,
@@ -50,7 +49,8 @@ from saltus.orbits.branches.symmetry import (
     passes_image,
     repetition,
 )
-from saltus.orbits.equations.contract import Restart
+from saltus.orbits.branches.retrace import comes_along_itself
+from saltus.orbits.contract.equations import Restart
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
 from saltus.orbits.signature import TOLERANCES, Signature

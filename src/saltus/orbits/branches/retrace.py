@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from saltus.orbits.branches.orbit_curve import OrbitPoint
-from saltus.orbits.branches.symmetry import nearest
+from saltus.orbits.beyond.orbit_curve import OrbitPoint
+from saltus.orbits.beyond.symmetry import nearest
 from saltus.orbits.signature import TOLERANCES
 
 FEWEST_POINTS = 6  # a branch of fewer cannot have turned round

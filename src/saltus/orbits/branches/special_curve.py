@@ -13,12 +13,12 @@ from saltus.checks import with_answers
 from saltus.continuation import Corrected, Course, Units
 from saltus.errors import ParameterError
 from saltus.flow import unit_of
+from saltus.orbits.beyond.conditions import Condition, ConditionValue, Slow
+from saltus.orbits.beyond.orbit_curve import OrbitCurve, OrbitPoint
+from saltus.orbits.beyond.special_point import SpecialPoint
+from saltus.orbits.beyond.vanishing import Vanishing
 from saltus.orbits.branches.branch import multiplier_columns, solution_columns
-from saltus.orbits.branches.conditions import Condition, ConditionValue, Slow
-from saltus.orbits.branches.orbit_curve import OrbitCurve, OrbitPoint
-from saltus.orbits.branches.special_point import SpecialPoint
-from saltus.orbits.branches.vanishing import Vanishing
-from saltus.orbits.equations.contract import OrbitEvaluation, Solution
+from saltus.orbits.contract.equations import OrbitEvaluation, Solution
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import Result, provenance
 from saltus.systems import driven_displacement

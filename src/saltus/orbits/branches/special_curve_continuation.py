@@ -13,25 +13,25 @@ import numpy as np
 from saltus.checks import check_bounds, check_count, check_step
 from saltus.continuation import STEPS, Continuation, Cut, End, TestFunction, both_ways
 from saltus.errors import ParameterError
+from saltus.orbits.beyond.conditions import Condition, Singular, Slow, curve_tests
+from saltus.orbits.beyond.orbit_curve import OrbitPoint
+from saltus.orbits.beyond.special_point import OrbitEnd, SpecialKind, SpecialPoint
+from saltus.orbits.beyond.symmetry import divide, half, keeps_symmetry
+from saltus.orbits.beyond.vanishing import (
+    Vanishing,
+    other_witnesses,
+    pair_on_circle,
+    witness_vanishes,
+)
 from saltus.orbits.branches.branch_continuation import STEP
 from saltus.orbits.branches.branch_events import OrbitEvents
-from saltus.orbits.branches.conditions import Condition, Singular, Slow, curve_tests
-from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.branches.special_curve import (
     ConditionedCurve,
     SpecialCurve,
     SpecialCurvePoint,
     without_condition,
 )
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind, SpecialPoint
-from saltus.orbits.branches.symmetry import divide, half, keeps_symmetry
-from saltus.orbits.branches.vanishing import (
-    Vanishing,
-    other_witnesses,
-    pair_on_circle,
-    witness_vanishes,
-)
-from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.contract.equations import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES

@@ -1,3 +1,3 @@
 """The equations of a periodic orbit F(unknowns, parameters) = 0, in one file for each kind of
-equations.
+equations; `kinds.py` lists them.
 """

@@ -29,34 +29,34 @@ from saltus.flow import (
     SegmentExtremes,
     SegmentPlan,
 )
-from saltus.orbits.branches.beyond_switching import (
-    AFTER_RELEASE,
-    bounces,
-    contact_change,
-    families_beside,
-    other_events_side,
-)
-from saltus.orbits.branches.orbit_curve import (
+from saltus.orbits.beyond.orbit_curve import (
     GRAZING,
     OrbitPoint,
     curve_test,
     grazing,
     with_witness,
 )
-from saltus.orbits.branches.special_point import OrbitEnd, SpecialKind
-from saltus.orbits.branches.symmetry import full_point
-from saltus.orbits.branches.vanishing import other_room
-from saltus.orbits.equations.contract import (
+from saltus.orbits.beyond.special_point import OrbitEnd, SpecialKind
+from saltus.orbits.beyond.switching import (
+    AFTER_RELEASE,
+    bounces,
+    contact_change,
+    families_beside,
+    other_events_side,
+)
+from saltus.orbits.beyond.symmetry import full_point
+from saltus.orbits.beyond.vanishing import other_room
+from saltus.orbits.contract.equations import (
     MotionToRead,
     OrbitEquations,
     OrbitEvaluation,
     Solution,
     Witness,
 )
-from saltus.orbits.equations.event_sequence import STAYS, contact_blocks, read_signature
-from saltus.orbits.equations.sampled_motion import ONE_INSTANT, excursions
-from saltus.orbits.proofs.contact_segments import contact_segments
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.contract.event_sequence import STAYS, contact_blocks, read_signature
+from saltus.orbits.contract.sampled_motion import ONE_INSTANT, excursions
+from saltus.orbits.segments.contact_segments import contact_segments
+from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System, arguments_of, held_values, mass_rows
 from saltus.taylor import FREQUENCY

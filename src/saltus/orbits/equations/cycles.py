@@ -20,16 +20,16 @@ import numpy as np
 from saltus.continuation import Units, Zero
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import Motion, MotionRequest, state_rates
-from saltus.orbits.equations.contract import (
+from saltus.orbits.contract.equations import (
     ORBIT_TOLERANCE,
     MotionToRead,
     OrbitEquations,
     Solution,
 )
-from saltus.orbits.equations.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.equations.event_sequence import EventSequence, held_at, section_time
+from saltus.orbits.contract.event_sequence import SETTINGS as EVENTS
+from saltus.orbits.contract.event_sequence import EventSequence, held_at, section_time
 from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.systems import System
 from saltus.taylor import ordered

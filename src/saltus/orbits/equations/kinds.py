@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from saltus.orbits.contract.equations import ORBIT_TOLERANCE, OrbitEquations
 from saltus.orbits.equations.contacts import ContactsEquations
-from saltus.orbits.equations.contract import ORBIT_TOLERANCE, OrbitEquations
 from saltus.orbits.equations.cycles import PERIOD, CycleEquations, FamilyEquations
 from saltus.orbits.equations.one_contact import OneContactEquations
 from saltus.orbits.equations.whole_motion import WholeMotionEquations

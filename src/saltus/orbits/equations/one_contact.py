@@ -33,19 +33,19 @@ from saltus.flow import (
     contact_regularity,
     load_segments,
 )
-from saltus.orbits.branches.beyond_grazing import inserted, other_side, removed
-from saltus.orbits.branches.conditions import room
-from saltus.orbits.branches.orbit_curve import GRAZING, OrbitPoint, curve_test, with_witness
-from saltus.orbits.branches.special_point import SpecialKind
-from saltus.orbits.equations.contract import (
+from saltus.orbits.beyond.conditions import room
+from saltus.orbits.beyond.grazing import inserted, other_side, removed
+from saltus.orbits.beyond.orbit_curve import GRAZING, OrbitPoint, curve_test, with_witness
+from saltus.orbits.beyond.special_point import SpecialKind
+from saltus.orbits.contract.equations import (
     MotionToRead,
     OrbitEquations,
     OrbitEvaluation,
     Solution,
     Witness,
 )
-from saltus.orbits.proofs.one_contact_segments import one_contact_segments
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.segments.one_contact_segments import one_contact_segments
+from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.systems import System, arguments_of, state_of
 from saltus.taylor import FREQUENCY

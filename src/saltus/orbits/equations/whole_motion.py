@@ -32,7 +32,7 @@ from saltus.flow import (
     program,
     state_rates,
 )
-from saltus.orbits.branches.beyond_events import (
+from saltus.orbits.beyond.events import (
     beyond,
     change_at,
     events_of,
@@ -44,17 +44,17 @@ from saltus.orbits.branches.beyond_events import (
     same_events,
     stalled_at,
 )
-from saltus.orbits.branches.beyond_rest import last_release
-from saltus.orbits.branches.orbit_curve import STEEPEST, OrbitPoint
-from saltus.orbits.branches.special_point import OrbitEnd
-from saltus.orbits.branches.symmetry import nearest
-from saltus.orbits.equations.contract import (
+from saltus.orbits.beyond.orbit_curve import STEEPEST, OrbitPoint
+from saltus.orbits.beyond.rest import last_release
+from saltus.orbits.beyond.special_point import OrbitEnd
+from saltus.orbits.beyond.symmetry import nearest
+from saltus.orbits.contract.equations import (
     MotionToRead,
     OrbitEquations,
     OrbitEvaluation,
     Solution,
 )
-from saltus.orbits.equations.event_sequence import (
+from saltus.orbits.contract.event_sequence import (
     STAYS,
     EventSequence,
     held_at,
@@ -62,10 +62,10 @@ from saltus.orbits.equations.event_sequence import (
     section_time,
     sequence_of,
 )
-from saltus.orbits.equations.sampled_motion import SampledMotion, modes_in
+from saltus.orbits.contract.sampled_motion import SampledMotion, modes_in
 from saltus.orbits.orbit import PeriodicOrbit
-from saltus.orbits.proofs.resting_segments import resting_segments
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments
+from saltus.orbits.segments.resting_segments import resting_segments
+from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
 from saltus.progress import silent
 from saltus.systems import System, arguments_of, held_values, substitute

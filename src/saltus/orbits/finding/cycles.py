@@ -12,9 +12,9 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import Motion, Stop, simulate
-from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.contract.equations import OrbitEquations
+from saltus.orbits.contract.event_sequence import section_time
 from saltus.orbits.equations.cycles import direction_at, passages, states_of
-from saltus.orbits.equations.event_sequence import section_time
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
 from saltus.progress import Progress

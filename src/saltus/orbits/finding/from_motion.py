@@ -25,9 +25,9 @@ from saltus.flow import (
     sensitivities,
     simulate,
 )
-from saltus.orbits.branches.symmetry import divide, half, has_symmetry, keeps_symmetry
-from saltus.orbits.equations.contract import MotionToRead, OrbitEquations
-from saltus.orbits.equations.event_sequence import STAYS
+from saltus.orbits.beyond.symmetry import divide, half, has_symmetry, keeps_symmetry
+from saltus.orbits.contract.equations import MotionToRead, OrbitEquations
+from saltus.orbits.contract.event_sequence import STAYS
 from saltus.orbits.equations.kinds import equations_of, kinds_of
 from saltus.orbits.finding.cycles import (
     Return,

@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import MotionError
 from saltus.flow import Motion, Stop, sensitivities, simulate
-from saltus.orbits.equations.contract import OrbitEquations
+from saltus.orbits.contract.equations import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.cycles import (
     SETTINGS,

@@ -27,11 +27,11 @@ from saltus.bounds import (
     verified_arc,
     verified_zero,
 )
+from saltus.orbits.beyond.orbit_curve import OrbitPoint
 from saltus.orbits.branches.branch import Branch
-from saltus.orbits.branches.orbit_curve import OrbitPoint
 from saltus.orbits.proofs.orbit_proof import assumptions_of, of_radii, shooting_of, with_proof
-from saltus.orbits.proofs.segments import CannotProve, OrbitSegments, least_speed
 from saltus.orbits.proofs.special_proof import MEANINGS, prove_special
+from saltus.orbits.segments.segments import CannotProve, OrbitSegments, least_speed
 from saltus.progress import Progress, silent
 from saltus.result import Result
 

@@ -26,8 +26,8 @@ from saltus.bounds import (
 )
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.certificate import ROOM, certificate_of, differences
-from saltus.orbits.proofs.resting_segments import rest_by
-from saltus.orbits.proofs.segments import (
+from saltus.orbits.segments.resting_segments import rest_by
+from saltus.orbits.segments.segments import (
     CannotProve,
     OrbitSegments,
     Rest,

@@ -9,9 +9,9 @@ from typing import overload
 from saltus.bounds import ShootingSettings, rounded_up
 from saltus.checks import check_count, check_number
 from saltus.errors import ParameterError, SaltusError, near, shown
+from saltus.orbits.beyond.special_point import SpecialPoint
+from saltus.orbits.beyond.symmetry import is_symmetric
 from saltus.orbits.branches.branch import Branch
-from saltus.orbits.branches.special_point import SpecialPoint
-from saltus.orbits.branches.symmetry import is_symmetric
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.branch_proof import BranchProof, prove_branch
 from saltus.orbits.proofs.orbit_proof import OrbitProof, prove_orbit

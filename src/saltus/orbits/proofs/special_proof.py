@@ -23,7 +23,7 @@ from saltus.bounds import (
     verified_zero,
 )
 from saltus.bounds import only_one as only_one_of
-from saltus.orbits.branches.special_point import SpecialKind, SpecialPoint
+from saltus.orbits.beyond.special_point import SpecialKind, SpecialPoint
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.proofs.certificate import differences, special_certificate_of
 from saltus.orbits.proofs.orbit_proof import (
@@ -36,7 +36,7 @@ from saltus.orbits.proofs.orbit_proof import (
     with_proof,
     within,
 )
-from saltus.orbits.proofs.segments import CannotProve
+from saltus.orbits.segments.segments import CannotProve
 from saltus.result import Result
 
 if TYPE_CHECKING:

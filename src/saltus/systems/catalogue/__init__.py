@@ -1,0 +1,1 @@
+"""The models that saltus has, their SI data and their drawings."""

@@ -1,0 +1,1 @@
+"""Files of matrices and of records, read into numbers."""

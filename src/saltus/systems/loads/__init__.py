@@ -1,0 +1,1 @@
+"""Loads: channels, signals, pulses, and what repeats."""

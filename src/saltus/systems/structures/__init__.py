@@ -1,0 +1,1 @@
+"""Structures from their matrices, in eigenmodes; models from expressions."""
