@@ -33,4 +33,5 @@ assert orbit.stable
 loop = orbit.motion().to_xarray()
 assert float(abs(loop.z).max()) < 1.0  # its strength
 plt.plot(loop.x, loop.z)
+plt.gca().set(xlabel="displacement $x$", ylabel="restoring force $z$")
 plt.show()

@@ -36,5 +36,5 @@ def speed_missing(beat, e=0.8, push=0.05):
 clock = saltus.System(model=Clock(), impact=saltus.NewtonImpact(0.8))
 cycle = saltus.find_orbit(clock, x=0.0, velocity=1.5)
 assert abs(cycle.period - 2.0 * brentq(speed_missing, 1.0, 2.0, xtol=1e-15)) < 1e-12
-saltus.plot(cycle)
+saltus.plot(cycle, figure=plt.figure(layout="constrained"))
 plt.show()

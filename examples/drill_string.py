@@ -36,5 +36,5 @@ cycle = saltus.find_orbit(string, pipe=-0.3, bit=-0.5, velocity=(-0.9, -1.1))
 branch = saltus.continue_orbit(cycle, "model.speed", (0.1, 2.0))
 critical = branch.special[-1]
 assert (str(critical.kind), round(critical.parameter, 8)) == ("GS", 1.18499080), branch
-saltus.plot(branch)
+saltus.plot(branch, ax=plt.gca())
 plt.show()

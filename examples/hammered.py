@@ -7,6 +7,7 @@ On its branch an impact comes to the jump of the load, where the map over a peri
 derivatives (SW), and the branch goes on.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -20,7 +21,7 @@ system = saltus.System(
 orbit = saltus.find_orbit(system, x=0.0)
 branch = saltus.continue_orbit(orbit, "load.frequency", (1.2, 1.67))
 print(branch)
-saltus.plot(branch)
+saltus.plot(branch, ax=plt.gca())
 
 (jump,) = [point for point in branch.special if point.kind == "SW"]
 (impact,) = jump.orbit.motion().events

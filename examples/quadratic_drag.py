@@ -31,5 +31,5 @@ motion = saltus.simulate(ball, y=0.0, velocity=25.0, duration=12.0)
 height = np.log1p(0.02 * 25.0**2 / 9.81) / (2 * 0.02)
 speed = np.sqrt(-9.81 / 0.02 * np.expm1(-2 * 0.02 * height))
 assert abs(motion.impacts.velocity_before[0, 0] + speed) < 1e-12
-saltus.plot(motion)
+saltus.plot(motion, figure=plt.figure(layout="constrained"))
 plt.show()

@@ -36,5 +36,5 @@ assert orbit.stable
 assert [str(event.kind) for event in motion.events] == ["crossing"] * 2
 heights = motion.to_xarray().y
 assert float(heights.max() + heights.min()) < 0.0
-saltus.plot(motion)
+saltus.plot(motion, figure=plt.figure(layout="constrained"))
 plt.show()

@@ -10,6 +10,7 @@ symmetry breaks twice.
 from dataclasses import dataclass
 from typing import ClassVar
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import saltus
@@ -30,7 +31,7 @@ system = saltus.System(
 orbit = saltus.find_orbit(system, x=0.0)
 branch = saltus.continue_orbit(orbit, "load.frequency", (0.8, 1.5))
 print(branch)
-saltus.plot(branch)
+saltus.plot(branch, ax=plt.gca())
 
 published = {"BPC": [0.85439927, 1.07596791], "LP": [0.81948777, 1.11097075]}
 for kind, values in published.items():

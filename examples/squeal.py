@@ -36,5 +36,5 @@ cycle = saltus.find_orbit(saltus.System(model=Brake()), x=1.0)
 branch = saltus.continue_orbit(cycle, "model.speed", (0.05, 2.0))
 hopf = 0.5 * math.log(0.3 / (0.5 * 0.1))  # where the damping equals the fall of the friction
 assert abs(branch.ends[1].parameter - hopf) < 1e-8, branch.ends
-saltus.plot(branch)
+saltus.plot(branch, ax=plt.gca())
 plt.show()

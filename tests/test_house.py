@@ -432,6 +432,14 @@ def test_examples_are_short(script: Path) -> None:
     assert "assert " in text
 
 
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.name)
+def test_pictures_of_examples_are_shown(script: Path) -> None:
+    """`plt.show` and the gallery know figures of pyplot alone."""
+    for node in ast.walk(ast.parse(script.read_text())):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "saltus.plot":
+            assert {keyword.arg for keyword in node.keywords} & {"ax", "figure"}, node.lineno
+
+
 @pytest.mark.parametrize(
     "script",
     [

@@ -317,7 +317,8 @@ def plot(
     **options: Any,
 ) -> Any:
     """Draw any result; returns the axes, or an array of them for several panels. In a notebook the
-    picture is below the cell.
+    picture is below the cell, and `saltus.save` writes it to a file. `plt.show()` shows what was
+    drawn into figures of pyplot: `ax=plt.gca()`, or `figure=plt.figure()` for several panels.
 
     Parameters
     ----------
