@@ -132,8 +132,8 @@ def with_two(mass, force=lambda self, t, q, velocity, load: (-q[0], -q[1])):
 
 
 @dataclass(frozen=True, kw_only=True)
-class NamedGap(ContactModel):
-    gap: float = 0.1
+class NamedForce(ContactModel):
+    mass_matrix: float = 0.1
     coordinates = ("x",)
     force = pulled
 
@@ -151,10 +151,10 @@ UNIT = [[1.0, 0.0], [0.0, 1.0]]
     ("model", "sentence"),
     [
         (
-            NamedGap(),
+            NamedForce(),
             (
-                "NamedGap has a number named gap, which is the name of a method of "
-                "saltus.OneContactModel: rename it"
+                "NamedForce has a number named mass_matrix, which is the name of a method of "
+                "saltus.ContactModel: rename it"
             ),
         ),
         (

@@ -129,11 +129,13 @@ def _check_class(kind: type[Model]) -> None:
     models has.
     """
     _check_fields(kind)
+    numbers = getattr(kind, "__dataclass_fields__", {})  # `gap` may be a clearance
     for base, parts in OWN_PARTS.items():
         given = [
             name
             for name in parts
-            if getattr(kind, name, ()) not in ((), getattr(Model, name, None))
+            if name not in numbers
+            and getattr(kind, name, ()) not in ((), getattr(Model, name, None))
         ]
         if given and not issubclass(kind, base):
             raise ParameterError(
@@ -157,8 +159,8 @@ def _check_class(kind: type[Model]) -> None:
 
 
 def _check_fields(kind: type[Model]) -> None:
-    """Refuse numbers of a class that is no dataclass, and those whose names are those of a
-    contract's methods.
+    """Refuse numbers of a class that is no dataclass, and those whose names are those of methods
+    of its own contract.
     """
     fields: dict[str, Any] = getattr(kind, "__dataclass_fields__", {})
     given = {
@@ -173,7 +175,8 @@ def _check_fields(kind: type[Model]) -> None:
             f" @dataclass(frozen=True, kw_only=True) above class {kind.__name__}",
             "model",
         )
-    for base in (Model, OneContactModel, ContactModel):
+    contracts = (base for base in (Model, OneContactModel, ContactModel) if issubclass(kind, base))
+    for base in contracts:
         for name in fields:
             if isinstance(vars(base).get(name), FunctionType):
                 raise ParameterError(
