@@ -600,16 +600,8 @@ def test_a_mass_matrix_has_no_switches():
         System(model=Heavy())
 
 
-@pytest.mark.parametrize(
-    "force",
-    [
-        lambda x, v: -x - 0.2 * v * np.where(np.sign(v) * x > 0.0, 1.0, 0.0),
-        lambda x, v: -x - 0.2 * np.sign(x - 0.1 * np.sign(v)),
-        lambda x, v: -x - 0.2 * np.sign(np.sign(v)),
-    ],
-)
-def test_a_switch_of_a_value_that_jumps_is_refused(force):
-    """It passes 0 without a root, where the inner sign changes."""
+def swinging(force):
+    """A motion of x'' = force(x, x') from x = 1."""
 
     @dataclass(frozen=True, kw_only=True)
     class Nested(saltus.ContactModel):
@@ -619,8 +611,72 @@ def test_a_switch_of_a_value_that_jumps_is_refused(force):
         def force(self, t, x, velocity, load):
             return force(x, velocity)
 
+    return saltus.simulate(saltus.System(model=Nested()), x=1.0, velocity=-0.1, duration=9.0)
+
+
+def test_a_switch_of_a_value_that_jumps_is_refused():
+    """It passes 0 without a root, where the inner sign changes."""
     with pytest.raises(TraceError, match="depends on a value that jumps"):
-        saltus.simulate(saltus.System(model=Nested()), x=1.0, duration=6.0)
+        swinging(lambda x, v: -x - 0.2 * np.sign(x - 0.1 * np.sign(v)))
+
+
+@pytest.mark.parametrize(
+    ("nested", "plain"),
+    [
+        (
+            lambda x, v: -x - 0.2 * v * np.where(np.sign(v) * x > 0.0, 1.0, 0.0),
+            lambda x, v: -x - 0.2 * v * np.where(v * x > 0.0, 1.0, 0.0),
+        ),
+        (lambda x, v: -x - 0.3 * np.sign(np.sign(v)), lambda x, v: -x - 0.3 * np.sign(v)),
+        (lambda x, v: -x - 0.3 * np.sign(v * abs(v)), lambda x, v: -x - 0.3 * np.sign(v)),
+        (lambda x, v: -x - 0.3 * np.sign(abs(v) * v), lambda x, v: -x - 0.3 * np.sign(v)),
+        (
+            lambda x, v: -x - 0.3 * np.where(v * abs(v) > 0.0, 1.0, -1.0),
+            lambda x, v: -x - 0.3 * np.sign(v),
+        ),
+        (lambda x, v: -x - 0.3 * np.sign(x * abs(x)), lambda x, v: -x - 0.3 * np.sign(x)),
+        (lambda x, v: -x + 0.3 * np.sign(0.0 - 3.0 * v), lambda x, v: -x - 0.3 * np.sign(v)),
+    ],
+)
+def test_signs_within_signs_have_the_switches_of_the_plain_form(nested, plain):
+    one = swinging(nested)
+    other = swinging(plain)
+    kinds = [str(event.kind) for event in one.events]
+    assert kinds == [str(event.kind) for event in other.events]
+    assert len(kinds) > 1
+    instants = [event.time for event in one.events]
+    np.testing.assert_allclose(instants, [event.time for event in other.events], rtol=1e-12)
+    assert one.x == pytest.approx(other.x, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "function"),
+    [
+        (lambda x, v: -0.3 * np.sign(v), lambda x, v: v),
+        (lambda x, v: -0.3 * v * abs(v), lambda x, v: v),
+        (lambda x, v: -3.0 * np.maximum(x - 0.2, 0.0), lambda x, v: x - 0.2),
+        (lambda x, v: -0.3 * np.sign(x), lambda x, v: 3.0 * x),
+    ],
+)
+def test_a_formula_may_have_the_switch_of_a_declared_surface(law, function):
+    """It moves as without the surface, whose side is not read."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Both(saltus.ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+        channels: ClassVar[tuple[str, ...]] = ()
+        surfaces: ClassVar[tuple] = (saltus.Surface(name="own", function="value"),)
+
+        def value(self, t, x, velocity, load):
+            return function(x, velocity)
+
+        def force(self, t, x, velocity, load, sides):
+            return -x + law(x, velocity)
+
+    motion = saltus.simulate(saltus.System(model=Both()), x=1.0, velocity=-0.1, duration=9.0)
+    alone = swinging(lambda x, v: -x + law(x, v))
+    assert motion.x == pytest.approx(alone.x, abs=1e-12)
+    assert len(motion.events) == len(alone.events) > 1
 
 
 def test_a_surface_whose_function_is_no_number_is_refused():

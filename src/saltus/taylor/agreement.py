@@ -77,7 +77,10 @@ def _compare(
     leaves |= {Expr("free", (), i): 1.0 for i in range(traced.flags)}
     leaves |= {Expr("slide", (), k): direction for k, direction in enumerate(directions)}
     first = len(traced.friction_coordinates) - len(traced.switches)
-    for k in range(first, len(directions)):  # those of the force are where the state is
+    # Sides of functions are those of the state, as a formula may have the same switch.
+    remembered = {*traced.relays, *traced.resetting}
+    functions = [k for k in traced.functions if k < first and k not in remembered]
+    for k in (*functions, *range(first, len(directions))):
         value = substitute(traced.reactions[len(traced.signs) + 2 * k], leaves)
         if value.op != "number":
             return  # a record or a pulse is read from a table

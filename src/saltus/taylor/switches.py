@@ -157,14 +157,21 @@ def _difference(function: Expr) -> tuple[Expr, Expr]:
 
 
 def _sign_and_core(value: Expr, sizes: set[Expr]) -> tuple[Expr, Expr | None]:
-    """A constant sign and a function, whose product has the sign of a value wherever that is not 0;
-    without a function the sign is constant.
+    """A sign, of constants and sides, and a function, whose product has the sign of a value
+    wherever that is not 0; without a function the value has the sign alone.
     """
     sign = number(1.0)
     powers: dict[Expr, int] = {}
+    sides: dict[Expr, int] = {}
     waiting = [value]
     while waiting:
         node = waiting.pop()
+        if node in sizes:
+            continue
+        if node.op == "sub" and node.args[0] is number(0.0):
+            sign = -sign
+            waiting.append(node.args[1])
+            continue
         if node.op in ("mul", "div"):
             divided = node.op == "div" and not (
                 _is_constant(node.args[1]) or _is_positive(node.args[1], sizes)
@@ -174,6 +181,8 @@ def _sign_and_core(value: Expr, sizes: set[Expr]) -> tuple[Expr, Expr | None]:
                 continue
         if node.op in ODD:
             waiting.append(node.args[0])
+        elif node.op == "slide":  # a side is its own sign
+            sides[node] = sides.get(node, 0) + 1
         elif node.op == "number":
             sign = sign * float(np.sign(node.value) or 1.0)
         elif _is_constant(node):
@@ -181,6 +190,9 @@ def _sign_and_core(value: Expr, sizes: set[Expr]) -> tuple[Expr, Expr | None]:
             sign = sign * (node / np.sqrt(node * node + TINY))
         elif not _is_positive(node, sizes):
             powers[node] = powers.get(node, 0) + 1
+    for side, power in sides.items():
+        if power % 2 == 1:
+            sign = sign * side
     core: Expr | None = None
     for node, power in powers.items():
         if power % 2 == 1:
