@@ -653,6 +653,7 @@ def test_signs_within_signs_have_the_switches_of_the_plain_form(nested, plain):
     ("law", "function"),
     [
         (lambda x, v: -0.3 * np.sign(v), lambda x, v: v),
+        (lambda x, v: -0.3 * np.sign(v), lambda x, v: -v),
         (lambda x, v: -0.3 * v * abs(v), lambda x, v: v),
         (lambda x, v: -3.0 * np.maximum(x - 0.2, 0.0), lambda x, v: x - 0.2),
         (lambda x, v: -0.3 * np.sign(x), lambda x, v: 3.0 * x),

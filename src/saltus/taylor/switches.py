@@ -48,6 +48,7 @@ class Switches:
     def __init__(self, first: int, known: Mapping[int, Expr]) -> None:
         self._first = first
         self._numbers: dict[tuple[Expr, ...], int] = {}
+        self._turned: dict[int, Expr] = {}  # -1 for surfaces of the opposite sign
         self._made: dict[int, Expr] = {}
         self.functions: list[Expr] = []
         self.jumping: set[int] = set()  # those at which values may jump
@@ -56,8 +57,9 @@ class Switches:
         self.kept: set[Expr] = set()
         for place, function in known.items():
             sign, core = _sign_and_core(function, self.sizes)
-            if core is not None and sign is number(1.0):
+            if core is not None and sign.op == "number":
                 self._numbers[_difference(core)] = place - first
+                self._turned[place - first] = sign
 
     def written(self, roots: Iterable[Expr]) -> list[Expr]:
         """The expressions on the sides of their switches."""
@@ -133,7 +135,9 @@ class Switches:
             self._check_continuous(new)
             self._numbers[a, b] = len(self.functions)
             self.functions.append(new)
-        return sign * Expr("slide", (), self._first + self._numbers[a, b])
+        place = self._numbers[a, b]
+        turned = self._turned.get(place, number(1.0))
+        return sign * turned * Expr("slide", (), self._first + place)
 
     def _check_continuous(self, function: Expr) -> None:
         """Refuse a function whose own sides may make it jump through 0, which is no root of it."""
