@@ -630,7 +630,7 @@ def test_other_questions_refuse_relays_and_resets_by_name():
     with pytest.raises(ParameterError, match="has 'threshold'; simulate, sensitivities"):
         saltus.simulate_many(system, u=[0.0, 0.1], duration=1.0)
     room = System(model=Thermostat())
-    with pytest.raises(ParameterError, match="find_orbit does not follow relays so far"):
-        saltus.find_orbit(room, T=18.0)
+    with pytest.raises(ParameterError, match="search_orbits does not follow relays so far"):
+        saltus.search_orbits(room, "model.power", [2.0, 3.0])
     with pytest.raises(ParameterError, match="simulate_many does not follow relays so far"):
         saltus.simulate_many(room, T=[18.0, 19.0], duration=1.0)

@@ -25,6 +25,7 @@ from saltus.flow import (
     simulate,
 )
 from saltus.orbits.contract.equations import OrbitEquations, OrbitEvaluation, Solution
+from saltus.orbits.contract.event_sequence import remembered_at
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result, function_for
@@ -537,7 +538,7 @@ class PeriodicOrbit(Result):
         inner = state_of(self.system.in_gap_coordinates, start)
         own = np.concatenate(self.system.from_gaps(start.get("time", 0.0), *np.split(inner, 2)))
         return arguments_of(self.system, own) | {
-            name: value for name, value in start.items() if name == "time"
+            name: value for name, value in start.items() if name in ("time", "relays")
         }
 
     @property
@@ -630,6 +631,25 @@ class PeriodicOrbit(Result):
         ahead = max(1, math.ceil(start["time"] / period)) * period - start["time"]
         motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
         return motion.position, motion.velocity
+
+    @property
+    def remembered(self) -> dict[str, Any]:
+        """The argument `relays` of `simulate` at phase 0, where `state` is; nothing for a model
+        without relays."""
+        if not self.signature.relays:
+            return {}
+        start = self.start()
+        period = 2.0 * math.pi / self.frequency
+        time = start.get("time", 0.0)
+        ahead = (math.ceil(time / period) * period - time) if time else 0.0
+        motion = simulate(self.system, **start, duration=ahead, tol=1e-13, dense=False)
+        return remembered_at(motion)
+
+    @property
+    def largest_multiplier(self) -> float:
+        """The modulus of its largest multiplier; 0 of the cycle of a single coordinate of first
+        order, which has none."""
+        return float(np.abs(self.multipliers[:1]).max(initial=0.0))
 
     @property
     def section_state(self) -> np.ndarray:

@@ -59,6 +59,8 @@ class Signature:
         For a cycle of a system on which nothing acts that varies with time: the state through which
         its section passes, and the direction of its flow there, to which the section is orthogonal
         in natural units. Empty for all others.
+    relays
+        Of a model with relays: the side of each at the section, +1 or -1. Empty for all others.
 
     Examples
     --------
@@ -74,6 +76,7 @@ class Signature:
     closed: int = 0
     section: float | None = None
     through: tuple[float, ...] = ()
+    relays: tuple[int, ...] = ()
 
     def _repr_html_(self) -> str:
         events = self.sides or " ".join(map(str, self.events)) or "none"

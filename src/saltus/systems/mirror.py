@@ -458,7 +458,7 @@ def _images_of_parts(
     if not (model.contacts or model.frictions or model.surfaces):
         return ()
     if any(surface.function is not None for surface in model.surfaces):
-        return None  # images of functions are not looked for
+        return None  # images of functions are not looked for, nor those of relays
     if model.resets:
         return None  # nor those of resets
     lengths = natural_units(system).lengths

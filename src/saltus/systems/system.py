@@ -518,8 +518,8 @@ def _check_modes(system: System, asking: str, resets: bool) -> None:
     kind = type(system.model).__name__
     if known:
         raise ParameterError(
-            f"{asking} does not follow relays so far, and {kind} has {known[0]!r}; simulate and"
-            " sensitivities do",
+            f"{asking} does not follow relays so far, and {kind} has {known[0]!r}; simulate,"
+            " sensitivities and find_orbit do",
             "system",
         )
     if resetting and not resets:

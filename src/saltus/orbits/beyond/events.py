@@ -403,7 +403,7 @@ def located_beyond(cut: Cut, following: OrbitPoint) -> SpecialPoint | None:
     """
     special = cut.special
     assert special is not None
-    own, other = (abs(p.orbit.multipliers[0]) for p in (cut.point, following))
+    own, other = (p.orbit.largest_multiplier for p in (cut.point, following))
     if not own > SETTINGS.fall * max(1.0, float(other)):
         return None
     sequence = events_at(following).sequence
@@ -514,7 +514,7 @@ def _is_discontinuous(point: OrbitPoint, place: np.ndarray, evaluation: Any) -> 
         return False
     way = place - point.place
     size = units.unknowns * np.ones(len(evaluation.residual))
-    largest = max(1.0, float(abs(point.orbit.multipliers[0])))
+    largest = max(1.0, point.orbit.largest_multiplier)
     monodromy = evaluation.monodromy() / np.outer(size, 1.0 / size)
     if np.isfinite(monodromy).all():  # a motion that passes a grazing has no derivatives
         largest = max(largest, float(np.linalg.norm(monodromy, 2)))

@@ -243,9 +243,8 @@ def torus(point: OrbitPoint) -> float:
         if half is not None:
             product = (half**2 if point.orbit.symmetric else half) - 1.0
         else:
-            values = np.where(
-                np.abs(values) > MULTIPLIER_ROUNDING * np.abs(values).max(), values, 0.0
-            )
+            largest = np.abs(values).max(initial=0.0)  # some cycles have none
+            values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * largest, values, 0.0)
             first, second = _pairs(len(values))
             product = float(np.prod(values[first] * values[second] - 1.0).real)
     return (

@@ -44,7 +44,7 @@ def as_the_motion_goes_on(point: OrbitPoint) -> Restart:
     way = point.tangent[-len(point.parameters) :]
     sizes = np.abs(point.parameters)
     way = way / np.linalg.norm(way / np.where(sizes > 0.0, sizes, point.curve.scales))
-    state = arguments_of(point.orbit.system, point.orbit.section_state)
+    state = arguments_of(point.orbit.system, point.orbit.section_state) | point.orbit.remembered
     values = [point.parameters + distance * way for distance in SETTINGS.after_rest]
     return Restart(state, values)
 

@@ -133,6 +133,14 @@ class OrbitEnd(EndReason):
     UNSTABLE = "is no longer stable"
     SHRINKS = "shrinks to rest"
     EQUILIBRIUM = "shrinks to an equilibrium at {parameter:.9g}, of which it is born"
+    RELAY_CHATTERS = (
+        "at {parameter:.9g} the two functions of a relay meet, so that it goes on and off without"
+        " end: the cycle shrinks to nothing"
+    )
+    RELAY_TURNS = (
+        "at {parameter:.10g} the motion just reaches a function of a relay: beyond, the relay has"
+        " its other side at the end of the round, and these orbits are none"
+    )
     GROWS = (
         "at {parameter:.10g} its amplitude has grown to {detail}, as without end at a resonance"
         " without damping"

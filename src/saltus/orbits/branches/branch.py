@@ -349,6 +349,9 @@ def solution_columns(orbits: list[PeriodicOrbit]) -> dict[str, Any]:
         rounds, plane = OF_CYCLES
         data[rounds] = ("point", np.array([orbit.signature.period for orbit in orbits]))
         data[plane] = (("point", "section_number"), np.array(through))
+    relays = [orbit.signature.relays for orbit in orbits]
+    if any(relays):
+        data["relays"] = (("point", "relay"), np.array(relays, dtype=np.int8))
     return data | {
         "section": ("point", sections),
         "events": (("point", "event_mark"), events.reshape(len(orbits), -1)),
@@ -470,6 +473,7 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
         dataset["closed_contacts"].values,
         dataset["section"].values,
         dataset["through"].values if "through" in dataset else [()] * len(signatures),
+        dataset["relays"].values if "relays" in dataset else [()] * len(signatures),
         strict=True,
     )
     return [
@@ -479,8 +483,9 @@ def _signatures(dataset: xarray.Dataset) -> list[Signature]:
             closed=int(closed),
             section=None if np.isnan(section) else float(section),
             through=tuple(map(float, through)),
+            relays=tuple(map(int, relays)),
         )
-        for signature, events, closed, section, through in more
+        for signature, events, closed, section, through, relays in more
     ]
 
 

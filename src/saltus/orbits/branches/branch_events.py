@@ -51,6 +51,7 @@ from saltus.orbits.beyond.symmetry import (
 )
 from saltus.orbits.branches.retrace import comes_along_itself
 from saltus.orbits.contract.equations import Restart
+from saltus.orbits.contract.event_sequence import remembered_at
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.from_motion import orbit_from
 from saltus.orbits.signature import TOLERANCES, Signature
@@ -113,6 +114,9 @@ class OrbitEvents(Events):
             return End(OrbitEnd.CONNECTION, connected)
         if not _has_shrunk(ahead):
             return None
+        meet = equations.relays_meet([*run.points, ahead])
+        if meet is not None:
+            return End(OrbitEnd.RELAY_CHATTERS, meet)
         born = equations.birth(run.points)
         if born is not None:  # a branch turns back there, which is no fold
             _forget_where_it_turns(run, born)
@@ -337,7 +341,7 @@ class BranchEvents(OrbitEvents):
         found = point.orbit.equations.stalled(point, step, run.points, run.bounds)
         if found is not None:
             return found
-        largest = abs(point.orbit.multipliers[0])
+        largest = point.orbit.largest_multiplier
         if largest > STEEPEST and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
         return super().stalled(run, point, step)
@@ -355,7 +359,7 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
             motion = simulate(
                 system, **restart.state, periods=SETTINGS.settling * period, dense=False
             )
-            state = arguments_of(system, motion.final_state)
+            state = arguments_of(system, motion.final_state) | remembered_at(motion)
             base = equations_of(system, Signature((), 1), equations.paths, equations.tol)
             orbit = orbit_from(base, state, period)
             # once more from its own motion, which may have other events than one that has not
@@ -364,7 +368,9 @@ def restarted(restart: Restart, point: OrbitPoint) -> OrbitPoint | None:
                 None
                 if orbit is None
                 else orbit_from(
-                    base, arguments_of(system, orbit.section_state), orbit.signature.period
+                    base,
+                    arguments_of(system, orbit.section_state) | orbit.remembered,
+                    orbit.signature.period,
                 )
             )
         except SaltusError:

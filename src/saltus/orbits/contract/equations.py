@@ -492,6 +492,11 @@ class OrbitEquations(ABC):
     # an orbit of a smaller size, in natural units, has shrunk to rest
     least_size: float = 1e-7
 
+    def relays_meet(self, points: list[Any]) -> float | None:
+        """The parameter at which the two functions of a relay meet that keeps a cycle alive, which
+        has nearly shrunk to nothing; None of other orbits."""
+        return None
+
     def birth(self, points: list[Any]) -> float | None:
         """The parameter at which the orbits of a branch, which has shrunk, are born of an
         equilibrium; None if they are not.

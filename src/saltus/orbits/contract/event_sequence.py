@@ -390,6 +390,52 @@ def held_at(motion: Motion, time: float) -> int:
     return int(bits[0]) | sticks << len(model.contacts)
 
 
+def relays_at(motion: Motion, times: np.ndarray) -> np.ndarray:
+    """The side of each relay of a motion's model, +1 or -1, at times (n,) between its events,
+    (n, relays)."""
+    model: Any = motion.system.model
+    if not model.relays:
+        return np.zeros((len(times), 0), dtype=int)
+    assert motion.dense is not None
+    sides = modes_of(model, motion.dense.states(times)[2])[2]
+    known = zip(model.surfaces, sides, strict=True)
+    return np.stack([side for part, side in known if part in model.relays], axis=1).astype(int)
+
+
+def remembered_at(motion: Motion, time: float | None = None) -> dict[str, Any]:
+    """The argument `relays` of `simulate` at a time of a motion, by default at its end; nothing for
+    a model without relays."""
+    relays = motion.system.model.relays
+    if not relays:
+        return {}
+    if time is None:
+        ends = motion.sides
+        sides = [ends[relay.name] for relay in relays]
+    else:
+        sides = relays_at(motion, np.array([time]))[0].tolist()
+    return {"relays": {relay.name: side > 0 for relay, side in zip(relays, sides, strict=True)}}
+
+
+def relays_over_round(motion: Motion, time: float, duration: float) -> tuple[int, ...]:
+    """The side of each relay at a time of a motion, which a round later has the same ones.
+
+    Raises
+    ------
+    MotionError
+        It has others.
+    """
+    begin, end = relays_at(motion, np.array([time, min(time + duration, motion.time)])).tolist()
+    for relay, before, after in zip(motion.system.model.relays, begin, end, strict=True):
+        if before != after:
+            states = ("off", "on") if after > 0 else ("on", "off")
+            raise MotionError(
+                f"the relay {relay.name!r} is {states[0]} at the start of a round of"
+                f" {duration:.9g}, at time {time:.9g}, and {states[1]} at its end: that is no"
+                " orbit; try another period=..., or let the motion settle first (settle=...)"
+            )
+    return tuple(begin)
+
+
 def _moves(system: System, side: np.ndarray) -> np.ndarray:
     """Whether a motion with these numbers `side` is not held altogether, (n,)."""
     modes = modes_in(system)

@@ -22,7 +22,7 @@ from saltus.flow import (
     contact_pull,
     modes_of,
 )
-from saltus.systems import NaturalUnits, System, natural_units, reactions, stick_margins
+from saltus.systems import NaturalUnits, Relay, System, natural_units, reactions, stick_margins
 
 # in each step; minima of parabolas through them have errors of the fourth power of their distance
 SAMPLES = 33
@@ -336,7 +336,8 @@ class ContactModes(SideModes):
         surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
         for number, (surface, beside) in enumerate(surfaces):
             if surface.function is not None and number not in smooth:
-                found.append(([beside > 0, beside < 0], partial(_of_function, surface)))
+                values = _of_relay if isinstance(surface, Relay) else _of_function
+                found.append(([beside > 0, beside < 0], partial(values, surface)))
         return found
 
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
@@ -361,6 +362,18 @@ def _of_function(
     """The value of a surface's function along a motion, and minus it."""
     value = np.asarray(model.value_of_function(surface, t, q, v, load), dtype=float)
     return [value, -value]
+
+
+def _of_relay(
+    relay: Relay, model: Any, t: Any, q: Any, v: Any, a: Any, load: Any, *_: Any
+) -> list[Any]:
+    """What is positive while a relay is on, and what is while it is off: minus the function that
+    ends its side."""
+    off, on = (
+        np.asarray(model.value_of_function(relay, t, q, v, load, name), dtype=float)
+        for name in (relay.off, relay.on)
+    )
+    return [-off, -on]
 
 
 def excursions(

@@ -27,7 +27,13 @@ from saltus.orbits.contract.equations import (
     Solution,
 )
 from saltus.orbits.contract.event_sequence import SETTINGS as EVENTS
-from saltus.orbits.contract.event_sequence import EventSequence, held_at, section_time
+from saltus.orbits.contract.event_sequence import (
+    EventSequence,
+    held_at,
+    relays_at,
+    relays_over_round,
+    section_time,
+)
 from saltus.orbits.equations.whole_motion import WholeMotionEquations, WholeMotionEvaluation
 from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
@@ -233,6 +239,15 @@ class CycleEquations(WholeMotionEquations):
         ways = np.ptp(orbit.followed.extrema, axis=1)
         return float((ways / self.natural.lengths).max() * self.natural.length)
 
+    def relays_meet(self, points: list[Any]) -> float | None:
+        if not self.signature.relays:
+            return None
+        known = {p.parameter: gap for p in points[-8:] if (gap := hysteresis_of(p.orbit.followed))}
+        if len(known) < 2:
+            return None
+        (before, wide), (last, narrow) = list(known.items())[-2:]
+        return float(last - narrow * (last - before) / (narrow - wide)) if narrow < wide else None
+
     def birth(self, points: list[Any]) -> float | None:
         """A parabola in a power of the size, through three orbits: smaller ones have an error of
         rounding by their size. The power is 2, or that which tells a fourth orbit much better.
@@ -303,6 +318,10 @@ class CycleEquations(WholeMotionEquations):
         states = states_of(motion, crossings)
         states[:, self.following] = 0.0
         apart = np.abs((states - near[:-1]) / self.natural.state).max(axis=1)
+        if target.relays:
+            apart[(relays_at(motion, crossings) != target.relays).any(axis=1)] = math.inf
+        if not np.isfinite(apart).any():
+            return None
         return np.append(states[apart.argmin()], unknowns[-1])
 
 
@@ -457,7 +476,10 @@ def _section_along(
     state[equations.following] = 0.0
     through = (*state.tolist(), *normal.tolist())
     held = held_at(motion, time)
-    return Signature((), rounds, closed=held, section=0.0, through=through), state
+    relays: tuple[int, ...] = tuple(relays_at(motion, np.array([time]))[0].tolist())
+    if duration is not None:  # the motion is no cycle yet
+        relays = relays_over_round(motion, time, duration)
+    return Signature((), rounds, closed=held, section=0.0, through=through, relays=relays), state
 
 
 def direction_at(motion: Motion, time: float, equations: OrbitEquations) -> np.ndarray:
@@ -493,6 +515,27 @@ def slowest(motion: Motion, equations: OrbitEquations) -> float:
     rates[equations.following] = 0.0
     natural = equations.natural
     return float(np.linalg.norm(rates.T / natural.state, axis=1).min() * natural.time)
+
+
+def hysteresis_of(motion: Motion) -> float | None:
+    """How far, where a relay is set by one of its functions, the other one is below 0: the mean over
+    its events, of the relay with the least; None without such events."""
+    system = motion.system
+    model: Any = system.contact_model
+    found = []
+    events: Any = motion.events
+    for number, relay in enumerate(model.relays):
+        times = np.array([event.time for event in events if event.contact == relay.name])
+        if not times.size:
+            continue
+        sides = relays_at(motion, times)[:, number]
+        values = [
+            float(model.value_of_function(relay, time, *motion.at(time), system.load, other))
+            for time, side in zip(times.tolist(), sides, strict=True)
+            for other in [relay.off if side > 0 else relay.on]
+        ]
+        found.append(-float(np.mean(values)))
+    return min(found, default=None)
 
 
 def states_of(motion: Motion, times: np.ndarray) -> np.ndarray:

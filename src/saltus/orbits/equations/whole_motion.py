@@ -58,6 +58,8 @@ from saltus.orbits.contract.event_sequence import (
     STAYS,
     EventSequence,
     held_at,
+    relays_at,
+    relays_over_round,
     section_of,
     section_time,
     sequence_of,
@@ -74,6 +76,9 @@ from saltus.taylor import FREQUENCY, record_table
 # A contact is closed at the section if its gap and the gap's rate are smaller than this there, in
 # natural units.
 CLOSED = 1e-9
+# How near a branch comes to where a relay turns before its steps shrink, and how far ahead it is
+# looked for, in natural units.
+NEAR_RELAY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,8 @@ class WholeMotionEvaluation(OrbitEvaluation):
     """The equations at one point, with the events along the motion."""
 
     events: EventSequence | None  # None if extremes were not asked for
-    # the state after half of the time; None if extremes were not asked for
+    # the state after half of the time; None if extremes were not asked for, or relays have other
+    # sides there
     middle: np.ndarray | None
 
 
@@ -134,8 +140,10 @@ class WholeMotionEquations(OrbitEquations):
         ):
             raise MotionError(STAYS)
         phase, state = section_of(twice, base.frequency(base.values), duration=motion.duration)
-        held = held_at(twice, section_time(twice, motion.duration))
-        signature = Signature((), periods, closed=held, section=phase)
+        time = section_time(twice, motion.duration)
+        held = held_at(twice, time)
+        relays = relays_over_round(twice, time, motion.duration)
+        signature = Signature((), periods, closed=held, section=phase, relays=relays)
         return cls(base.given, signature, base.paths, base.tol), state
 
     def section_along(self, motion: Motion, solution: Solution) -> tuple[Signature, np.ndarray]:
@@ -143,8 +151,10 @@ class WholeMotionEquations(OrbitEquations):
         there.
         """
         phase, state = section_of(motion, self.frequency(solution.values))
-        held = held_at(motion, section_time(motion))
-        return replace(self.signature, closed=held, section=phase), state
+        time = section_time(motion)
+        held = held_at(motion, time)
+        relays = tuple(relays_at(motion, np.array([time]))[0].tolist())
+        return replace(self.signature, closed=held, section=phase, relays=relays), state
 
     @property
     def size(self) -> int:
@@ -203,7 +213,25 @@ class WholeMotionEquations(OrbitEquations):
         """At the section."""
         system = self.system_at(solution.values)
         state = self.start_state(solution.unknowns, system)
-        return {**arguments_of(system, state), "time": self.section_time(solution.values)}
+        start = {**arguments_of(system, state), "time": self.section_time(solution.values)}
+        if self.signature.relays:
+            start["relays"] = {name: side > 0 for name, side in self._relays.items()}
+        return start
+
+    @cached_property
+    def _relays(self) -> dict[str, int]:
+        """The side of each relay at the section."""
+        names = [relay.name for relay in self.system.model.relays]
+        return dict(zip(names, self.signature.relays, strict=True))
+
+    def _keeps_relays(self, request: MotionRequest, motion: Motion) -> bool:
+        """Whether the relays of a motion have the sides of the section at its start and at its
+        end."""
+        relays = self._relays
+        if not relays:
+            return True
+        ends = motion.sides
+        return request.relays == relays and all(ends[name] == relays[name] for name in relays)
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         times = solution.evaluation.ends[:, 0]
@@ -277,7 +305,7 @@ class WholeMotionEquations(OrbitEquations):
         """Not where multipliers grow without bound, as they do towards some changes of events:
         further steps would be rounding. Nor if no change of events leads to the orbits ahead, which
         then belong to another branch."""
-        return abs(ahead.orbit.multipliers[0]) <= STEEPEST and not isinstance(cut(), End)
+        return ahead.orbit.largest_multiplier <= STEEPEST and not isinstance(cut(), End)
 
     def change(self, zero: Zero, point: OrbitPoint) -> Cut | End:
         return change_at(zero, point)
@@ -305,8 +333,22 @@ class WholeMotionEquations(OrbitEquations):
     ) -> Cut | End | None:
         """Events may change there, so that the branch turns round; or the system ends."""
         found = refused_beyond(point, step, bounds) or stalled_at(point, step, points)
+        if found is None and self._relay_turns(point):
+            return End(OrbitEnd.RELAY_TURNS, point.parameter)
         limit = None if found is not None else point.orbit.motion().limit
         return found if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
+
+    def _relay_turns(self, point: OrbitPoint) -> bool:
+        """Whether a relay that only just keeps its side at an orbit ends a round on the other side
+        a little farther ahead."""
+        if not self.signature.relays or events_of(point.evaluation).distance > NEAR_RELAY:
+            return False
+        unknowns, values = np.split(point.place + NEAR_RELAY * point.tangent, [self.size])
+        try:
+            request, run = self._request(self.system_at(values), unknowns, values, None)
+            return not self._keeps_relays(request, follow(request, silent, run).motion)
+        except SaltusError:
+            return False
 
     def curve_barrier(self, kind: str, point: Any) -> TestFunction:
         return same_events(point)
@@ -392,7 +434,8 @@ class WholeMotionEquations(OrbitEquations):
         motion, evaluation = found
         if evaluation.events is None:
             sampled = SampledMotion.of(motion)
-            half = motion.at(0.5 * (motion.start + motion.time))
+            time = 0.5 * (motion.start + motion.time)
+            half = motion.at(time)
             images = self.images if self.signature.symmetric else None
             events = sequence_of(motion, sampled, self.natural, images, self.smooth_surfaces)
             events = self._seen_from_section(events, motion)
@@ -400,7 +443,9 @@ class WholeMotionEquations(OrbitEquations):
             extremes = self._extremes(sampled)
             middle[self.following] = 0.0
             middle = self._middle(middle, unknowns)
-            evaluation = replace(evaluation, extremes=extremes, events=events, middle=middle)
+            begin, later = relays_at(motion, np.array([motion.start, time]))
+            turned = None if (begin != later).any() else middle  # other sides are another state
+            evaluation = replace(evaluation, extremes=extremes, events=events, middle=turned)
             self._latest = place, (motion, evaluation)
         return evaluation
 
@@ -413,7 +458,7 @@ class WholeMotionEquations(OrbitEquations):
             motion = follow(request, silent, run).motion
         except SaltusError:
             return None
-        if motion.limit is not None:
+        if motion.limit is not None or not self._keeps_relays(request, motion):
             return None
         after = np.append(np.atleast_1d(motion.position), np.atleast_1d(motion.velocity))
         after = self.image_of(after) if self.signature.symmetric else after
@@ -429,12 +474,15 @@ class WholeMotionEquations(OrbitEquations):
             return None
         try:
             system = self.system_at(values)
-            found = derivatives_of(*self._request(system, unknowns, values, self.model_paths))
+            request, run = self._request(system, unknowns, values, self.model_paths)
+            found = derivatives_of(request, run)
         except SaltusError:  # such parameters or such a state are refused, or the motion is
             return None
         motion = found.motion
         parameters = found.parameters.copy()
         if motion.limit is not None or found.undefined is not None or slides_along(motion):
+            return None
+        if not self._keeps_relays(request, motion):  # its end is no return
             return None
         if FREQUENCY in self.paths:  # the section stays at its phase
             rates = state_rates(motion)
@@ -488,7 +536,9 @@ class WholeMotionEquations(OrbitEquations):
         states[:, self.following] = 0.0
         states = np.where(later[:, None], self.image_of(states) if later.any() else states, states)
         apart = np.abs((states - near) / self.natural.state).max(axis=1)
-        return np.asarray(states[apart.argmin()])
+        if target.relays:
+            apart[(relays_at(motion, times) != target.relays).any(axis=1)] = math.inf
+        return np.asarray(states[apart.argmin()]) if np.isfinite(apart).any() else None
 
     @cached_property
     def smooth_surfaces(self) -> frozenset[int]:
@@ -540,6 +590,7 @@ class WholeMotionEquations(OrbitEquations):
             dense=paths is not None,
             sensitivities=paths,
             dense_tangent=False,
+            relays=self._relays or None,
         )
         run = self._plain_program if paths is None else self._program
         # breakpoints are shares of the forcing period, whatever the numbers are

@@ -13,7 +13,7 @@ import numpy as np
 from saltus.errors import MotionError
 from saltus.flow import Motion, Stop, simulate
 from saltus.orbits.contract.equations import OrbitEquations
-from saltus.orbits.contract.event_sequence import section_time
+from saltus.orbits.contract.event_sequence import relays_at, remembered_at, section_time
 from saltus.orbits.equations.cycles import direction_at, passages, states_of
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.orbits.signature import TOLERANCES
@@ -51,6 +51,7 @@ class FindCycleSettings:
 SETTINGS = FindCycleSettings()
 SHRUNK = 1e-2  # A solution smaller than this share of the motion is none of its cycles.
 SAMPLES = 4001  # of the second half of a small motion
+NO_RETURN = 1e9  # the distance, in natural units, of a state with relays on other sides
 SHORTEST = 1e-6  # of a round, as a share of the time of several rounds
 
 
@@ -61,6 +62,7 @@ class Return(NamedTuple):
     time: float  # how long it is away
     apart: float  # how far it is away then, as a share of the motion's size
     size: float  # the motion's, in natural units
+    remembered: dict[str, Any]  # the argument `relays` of `simulate` there, if it has some
 
 
 def natural_period(system: System) -> float:
@@ -137,12 +139,16 @@ def _returned(base: OrbitEquations, motion: Motion, period: float | None) -> Ret
     apart = np.abs((states_of(motion, times) - there) / units)
     apart[:, base.following] = 0.0
     distance = apart.max(axis=1)
+    sides = relays_at(motion, np.append(times, begin))
+    distance[(sides[:-1] != sides[-1]).any(axis=1)] = NO_RETURN
     if period is not None:
         chosen = int(np.argmin(np.abs(times - begin - period)))
     else:
         near = max(SETTINGS.as_near * float(distance.min()), SETTINGS.returned * size)
         chosen = int(np.argmax(distance <= near))
-    return Return(there, float(times[chosen] - begin), float(distance[chosen]) / size, size)
+    away = float(times[chosen] - begin)
+    share = float(distance[chosen]) / size
+    return Return(there, away, share, size, remembered_at(motion, begin))
 
 
 def swing_of(base: OrbitEquations, motion: Motion) -> float:
@@ -215,7 +221,9 @@ def round_within(orbit: PeriodicOrbit) -> float | None:
         return None
     apart = np.abs((states_of(motion, times) - state) / equations.natural.state)
     apart[:, equations.following] = 0.0
-    near = np.flatnonzero(apart.max(axis=1) < TOLERANCES.halves)
+    back = apart.max(axis=1) < TOLERANCES.halves
+    back &= (relays_at(motion, times) == orbit.signature.relays).all(axis=1)
+    near = np.flatnonzero(back)
     return float(times[near[0]] - motion.start) if near.size else None
 
 
@@ -233,7 +241,7 @@ def after(
         return state
     motion = simulate(system, **state, side=side, duration=duration, dense=False)
     check_moving(motion, state)
-    return arguments_of(system, motion.final_state)
+    return arguments_of(system, motion.final_state) | remembered_at(motion)
 
 
 def check_moving(motion: Motion, state: dict[str, Any]) -> None:

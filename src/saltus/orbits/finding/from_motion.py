@@ -4,7 +4,7 @@ nearly return.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ from saltus.flow import (
 )
 from saltus.orbits.beyond.symmetry import divide, half, has_symmetry, keeps_symmetry
 from saltus.orbits.contract.equations import MotionToRead, OrbitEquations
-from saltus.orbits.contract.event_sequence import STAYS
+from saltus.orbits.contract.event_sequence import STAYS, remembered_at
 from saltus.orbits.equations.kinds import equations_of, kinds_of
 from saltus.orbits.finding.cycles import (
     Return,
@@ -81,6 +81,7 @@ def find_orbit(
     parameters: tuple[str, ...] = (),
     time: float = 0.0,
     side: int | None = None,
+    relays: Mapping[str, bool] | None = None,
     progress: Progress = silent,
     **coordinates: float,
 ) -> PeriodicOrbit:
@@ -114,6 +115,10 @@ def find_orbit(
     time, side
         The time at the start, phase 0 by default, and the side to which the motion goes from a
         contact, as `simulate` takes them: `find_orbit(system, **orbit.start())` begins on an orbit.
+    relays
+        Whether each `Relay` of the model is on at the start, as `simulate` takes it; not needed
+        where its functions say it. An orbit has the sides of its relays at the end of its period as
+        at the start, in `signature.relays`.
     progress
         Called from time to time with the fraction done and what is being done.
 
@@ -133,8 +138,10 @@ def find_orbit(
     given = {"period": period, "max_period": max_period, "settle": settle}
     _check(system, parameters, given)
     check_number("time", time)
-    others = ("parameters", "time", "side", "progress", *given)
+    others = ("parameters", "time", "side", "relays", "progress", *given)
     state = arguments_of(system, read_start(system, velocity, coordinates, others, time))
+    if relays is not None:
+        state["relays"] = relays
     if system.load.frequency is None:
         base = equations_of(system, Signature((), 1), tuple(parameters))
         return _cycle(base, state, side, period, settle, progress)
@@ -169,7 +176,13 @@ def find_orbit(
 def _check(system: System, parameters: Iterable[str], given: dict[str, Any]) -> None:
     """Refuse arguments without meaning."""
     check_system(
-        system, "find_orbit", several_contacts=True, multipliers=True, switches=True, resets=True
+        system,
+        "find_orbit",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        resets=True,
+        relays=True,
     )
     for name, value in given.items():
         if value is None and name != "max_period":
@@ -224,7 +237,7 @@ def cycle_from(base: OrbitEquations, found: Return) -> PeriodicOrbit | None:
     MotionError
         It finds an equilibrium, or a cycle that only touches a contact.
     """
-    start = arguments_of(base.system, on_this_side(base.system, found.state))
+    start = arguments_of(base.system, on_this_side(base.system, found.state)) | found.remembered
     orbit = orbit_from(base, start, 1, found.time)
     shorter = None if orbit is None else round_within(orbit)
     if orbit is not None and shorter is not None:
@@ -245,14 +258,14 @@ def _at_phase_0(
     ahead = period - time % period
     motion = simulate(system, **state, time=time, side=side, duration=ahead, dense=False)
     _refuse_rest(system, motion, state)
-    return arguments_of(system, motion.final_state)
+    return arguments_of(system, motion.final_state) | remembered_at(motion)
 
 
 def _after(system: System, state: dict[str, Any], periods: int) -> dict[str, Any]:
     """The state `periods` forcing periods later."""
     motion = simulate(system, **state, periods=periods, dense=False)
     _refuse_rest(system, motion, state)
-    return arguments_of(system, motion.final_state)
+    return arguments_of(system, motion.final_state) | remembered_at(motion)
 
 
 def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
@@ -291,12 +304,23 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
 
 
 def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> np.ndarray:
-    """The states after 0, 1, ..., count forcing periods."""
-    states = [state_of(system, state)]
+    """The states after 0, 1, ..., count forcing periods, each with the sides of its relays."""
+    states = [_with_sides(system, state)]
     for _ in range(count):
         state = _after(system, state, 1)
-        states.append(state_of(system, state))
+        states.append(_with_sides(system, state))
     return np.array(states)
+
+
+def _with_sides(system: System, state: dict[str, Any]) -> np.ndarray:
+    """A state, and 1 for each relay that is on."""
+    return np.append(state_of(system, state), [*map(float, state.get("relays", {}).values())])
+
+
+def _units_with_sides(system: System) -> np.ndarray:
+    """The natural units of the state; two sides of a relay are one unit apart, far more than what
+    returns."""
+    return np.append(natural_units(system).state, np.ones(len(system.model.relays)))
 
 
 def _returning(
@@ -304,7 +328,7 @@ def _returning(
 ) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
     states = _stroboscopic_states(system, state, period or max_period)[::-1]
-    units = natural_units(system).state
+    units = _units_with_sides(system)
     if period is None:
         return int(return_period(states, max_period, units=units)) or None
     near = return_distances(states, period, units)[-1] < RECURRENCE.near_return
@@ -318,7 +342,7 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     if period is not None:
         return period
     states = _stroboscopic_states(system, state, max_period)[::-1]
-    return nearest_return(states, max_period, natural_units(system).state)
+    return nearest_return(states, max_period, _units_with_sides(system))
 
 
 def _polish(
