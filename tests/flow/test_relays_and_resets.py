@@ -634,3 +634,35 @@ def test_other_questions_refuse_relays_and_resets_by_name():
         saltus.search_orbits(room, "model.power", [2.0, 3.0])
     with pytest.raises(ParameterError, match="simulate_many does not follow relays so far"):
         saltus.simulate_many(room, T=[18.0, 19.0], duration=1.0)
+
+
+@pytest.mark.parametrize("seed", [2, 6, 17, 22])
+def test_orbits_of_random_machines_have_the_multipliers_of_differences(seed):
+    """Two relays, resets, a contact and a coordinate of first order."""
+    model, draw = random_machine(seed)
+    load = Load(frequency=draw(0.6, 2.0), force=Harmonic(1.0))
+    machine = System(model=model, load=load, impact=saltus.NewtonImpact(draw(0.3, 0.9)))
+    begin = {"x": 0.1, "y": 0.0, "w": 0.0, "relays": {"motor": False, "valve": False}}
+    orbit = saltus.find_orbit(machine, **begin, settle=300, max_period=8)
+    assert orbit.defect < 1e-12
+    start = orbit.start()
+    assert dict(zip(start["relays"], orbit.signature.relays, strict=True)) == {
+        name: 1 if side else -1 for name, side in start["relays"].items()
+    }
+
+    def mapped(state):
+        motion = saltus.simulate(
+            machine,
+            **dict(zip("xyw", state[:3].tolist(), strict=True)),
+            velocity=tuple(state[3:].tolist()),
+            time=start["time"],
+            relays=start["relays"],
+            periods=orbit.period,
+        )
+        return np.array([*motion.position, *motion.velocity[:2]])
+
+    h = 1e-6
+    state = np.array([*(start[name] for name in "xyw"), *start["velocity"]])
+    columns = [(mapped(state + step) - mapped(state - step)) / (2.0 * h) for step in h * np.eye(5)]
+    expected = np.poly(np.linalg.eigvals(np.stack(columns, axis=1)))
+    assert np.poly(orbit.multipliers) == pytest.approx(expected, abs=1e-7)
