@@ -3,6 +3,8 @@ to other processes.
 """
 
 import pickle
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -154,3 +156,67 @@ def test_what_an_expression_may_not_have_is_refused():
         ParameterError, match="equations must be a LagrangesMethod or a KanesMethod"
     ):
         saltus.from_sympy(3, parameters={})
+
+
+# --- switches ----------------------------------------------------------------
+
+HELD = sympy.Symbol("k")
+PLACE, SPEED = sympy.symbols("x v")
+
+
+@pytest.mark.parametrize(
+    ("force", "written"),
+    [
+        (HELD * SPEED * sympy.Abs(SPEED), lambda x, v: 0.3 * v * abs(v)),
+        (HELD * sympy.sign(SPEED), lambda x, v: 0.3 * np.sign(v)),
+        (HELD * sympy.Max(PLACE, 0), lambda x, v: 0.3 * np.maximum(x, 0.0)),
+        (
+            HELD * sympy.Max(PLACE, SPEED, 0),
+            lambda x, v: 0.3 * np.maximum(np.maximum(x, v), 0.0),
+        ),
+        (HELD * sympy.Heaviside(PLACE), lambda x, v: np.where(x > 0.0, 0.3, 0.0)),
+        (
+            sympy.Piecewise(
+                (HELD * PLACE, (PLACE > 0.5) & (SPEED > 0)), (PLACE / 2, PLACE < 0), (0, True)
+            ),
+            lambda x, v: np.where((x > 0.5) & (v > 0.0), 0.3 * x, np.where(x < 0.0, 0.5 * x, 0.0)),
+        ),
+    ],
+)
+def test_switches_of_expressions_are_those_of_numpy(force, written):
+    @dataclass(frozen=True, kw_only=True)
+    class Written(saltus.ContactModel):
+        coordinates: ClassVar[tuple[str, ...]] = ("x",)
+
+        def force(self, t, x, velocity, load):
+            return -x - written(x, velocity)
+
+    model = saltus.from_sympy(
+        coordinates=[PLACE], velocities=[SPEED], force=[-PLACE - force], parameters={HELD: 0.3}
+    )
+    start = {"x": 1.0, "velocity": 0.5, "duration": 9.0}
+    one = saltus.simulate(saltus.System(model=model), **start)
+    other = saltus.simulate(saltus.System(model=Written()), **start)
+    assert one.x == pytest.approx(other.x, abs=1e-12)
+    assert one.velocity == pytest.approx(other.velocity, abs=1e-12)
+    assert len(one.events) == len(other.events) > 0
+
+
+@pytest.mark.parametrize(
+    ("force", "sentence"),
+    [
+        (
+            sympy.Piecewise((PLACE, PLACE > 1)),
+            r"force has a Piecewise .* end it with \(value, True\)",
+        ),
+        (
+            sympy.Piecewise((PLACE, sympy.Eq(PLACE, 1)), (0, True)),
+            "which differs at an instant only: use < or >",
+        ),
+    ],
+)
+def test_conditions_that_are_no_force_are_refused(force, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        saltus.from_sympy(
+            coordinates=[PLACE], velocities=[SPEED], force=[force], parameters={HELD: 0.3}
+        )

@@ -6,6 +6,7 @@ The accelerations take numbers, arrays or symbols.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
@@ -687,7 +688,8 @@ def switches_of_force(model: Any) -> frozenset[str]:
     kind = getattr(model, "own_class", type(model))
     if kind not in _switching:
         _switching[kind] = frozenset()  # while it is asked
-        if kind.__module__.partition(".")[0] != "saltus":
+        own_name = vars(sys.modules.get(kind.__module__, object)).get(kind.__name__)
+        if kind.__module__.partition(".")[0] != "saltus" or own_name is not kind:
             _switching[kind] = import_module("saltus.taylor").switches_of_force(model)
     return _switching[kind]
 

@@ -125,10 +125,12 @@ def from_sympy(
                 raise ParameterError(
                     f"{what} has {shown(str(symbol))}, which is none of {known}", what
                 )
-        printer = sympy.printing.numpy.NumPyPrinter(
-            {"fully_qualified_modules": False, "allow_unknown_functions": True}
-        )
-        return str(printer.doprint(given))
+        try:
+            return str(printer.doprint(given))
+        except _NoForce as error:
+            raise ParameterError(f"{what} has {error}", what) from None
+
+    printer = _printer(sympy)
 
     count = len(coordinates)
     try:
@@ -162,6 +164,61 @@ def from_sympy(
         **{_name_of(key): value for key, value in parameters.items()}
     )
     return model
+
+
+class _NoForce(Exception):
+    """What of an expression cannot be a force."""
+
+
+def _printer(sympy: Any) -> Any:
+    """A printer of NumPy's text, whose maxima and conditions take two operands each, as those of a
+    force do.
+    """
+
+    class Printer(sympy.printing.numpy.NumPyPrinter):  # type: ignore[misc]
+        def _nested(self, function: str, given: Sequence[Any]) -> str:
+            *rest, last = map(self._print, given)
+            text = str(last)
+            for one in reversed(rest):
+                text = f"{function}({one}, {text})"
+            return text
+
+        def _joined(self, operator: str, given: Sequence[Any]) -> str:
+            return "(" + f" {operator} ".join(f"({self._print(each)})" for each in given) + ")"
+
+        def _print_Max(self, expression: Any) -> str:
+            return self._nested("maximum", expression.args)
+
+        def _print_Min(self, expression: Any) -> str:
+            return self._nested("minimum", expression.args)
+
+        def _print_And(self, expression: Any) -> str:
+            return self._joined("&", expression.args)
+
+        def _print_Or(self, expression: Any) -> str:
+            return self._joined("|", expression.args)
+
+        def _print_Relational(self, expression: Any) -> str:
+            if expression.rel_op in ("==", "!="):
+                raise _NoForce(f"{expression}, which differs at an instant only: use < or >")
+            left, right = map(self._print, expression.args)
+            return f"(({left}) {expression.rel_op} ({right}))"
+
+        def _print_Heaviside(self, expression: Any) -> str:
+            return f"heaviside({self._print(expression.args[0])}, 0.5)"
+
+        def _print_Piecewise(self, expression: Any) -> str:
+            *cases, (otherwise, condition) = expression.args
+            if condition != sympy.true:
+                raise _NoForce(
+                    "a Piecewise that is nothing outside its conditions: end it with (value, True)"
+                )
+            text = str(self._print(otherwise))
+            for value, condition in reversed(cases):
+                text = f"where({self._print(condition)}, {self._print(value)}, {text})"
+            return text
+
+    return Printer({"fully_qualified_modules": False, "allow_unknown_functions": True})
 
 
 def _sympy() -> Any:
