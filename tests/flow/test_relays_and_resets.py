@@ -666,3 +666,179 @@ def test_orbits_of_random_machines_have_the_multipliers_of_differences(seed):
     columns = [(mapped(state + step) - mapped(state - step)) / (2.0 * h) for step in h * np.eye(5)]
     expected = np.poly(np.linalg.eigvals(np.stack(columns, axis=1)))
     assert np.poly(orbit.multipliers) == pytest.approx(expected, abs=1e-7)
+
+
+def model_of(coordinates, surfaces, force, first_order=(), contacts=(), **methods):
+    """A model of these parts; its methods may be functions of the state alone."""
+    parts = {
+        "coordinates": coordinates,
+        "first_order": first_order,
+        "surfaces": surfaces,
+        "contacts": contacts,
+        "force": lambda self, t, q, v, load, sides: force,
+    }
+    parts |= {
+        name: lambda self, t, q, v, load, method=method: method(q, v)
+        for name, method in methods.items()
+    }
+    return dataclass(frozen=True, kw_only=True)(type("Made", (ContactModel,), parts))()
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_ball_in_a_corner_of_two_resets_is_turned_round_by_both(order):
+    """From 0 with the velocity (1, 1) to the corner at (1, 1) and back: x = y = 2 - t."""
+    walls = (
+        Surface(name="w", coordinate="x", position=1.0, after_event="turn_x"),
+        Surface(name="u", coordinate="y", position=1.0, after_event="turn_y"),
+    )
+    model = model_of(
+        ("x", "y"),
+        walls[::order],
+        (0.0, 0.0),
+        turn_x=lambda q, v: (q, (-v[0], v[1])),
+        turn_y=lambda q, v: (q, (v[0], -v[1])),
+    )
+    motion = simulate(System(model=model), x=0.0, y=0.0, velocity=(1.0, 1.0), duration=3.0)
+    assert {event.contact for event in motion.events} == {"w", "u"}
+    assert np.allclose(times_of(motion), 1.0, rtol=0.0, atol=1e-15)
+    assert np.allclose(motion.position, -1.0, rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("height", [0.5, 0.7, 1.3, 2.9])
+def test_a_reset_at_the_instant_of_an_impact_acts(height):
+    """x = 1 is reached at sqrt(2 y0), when the ball falls onto the floor; behind it x = 2 - w t."""
+    speed = 1.0 / math.sqrt(2.0 * height)
+    model = model_of(
+        ("x", "y"),
+        (Surface(name="w", coordinate="x", position=1.0, after_event="turn"),),
+        (0.0, -1.0),
+        contacts=(Contact(name="floor", coordinate="y"),),
+        turn=lambda q, v: (q, (-v[0], v[1])),
+    )
+    system = System(model=model, impact=NewtonImpact(0.5))
+    motion = simulate(system, x=0.0, y=height, velocity=(speed, 0.0), duration=3.0)
+    assert {event.contact for event in motion.events[:2]} == {"w", "floor"}
+    assert motion.position[0] == pytest.approx(2.0 - 3.0 * speed, abs=1e-12)
+
+
+def twin_resets(parts, order, first, second):
+    return System(
+        model=model_of(
+            ("x", "y"),
+            parts[::order],
+            (0.0, 0.0),
+            on=lambda q, v: q[0] - 1.0,
+            off=lambda q, v: -q[0],
+            first=first,
+            second=second,
+        )
+    )
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_resets_at_one_instant_act_both_or_are_refused(order):
+    """Doubling x' and lifting y by 10 commute; doubling x' and adding 1 to it do not."""
+    relays = (
+        Relay(name="r", on="on", off="off", after_event="first"),
+        Relay(name="s", on="on", off="off", after_event="second"),
+    )
+    surfaces = (
+        Surface(name="r", coordinate="x", position=1.0, after_event="first"),
+        Surface(name="s", function="on", after_event="second"),
+    )
+    for parts, sides in ((relays, {"r": False, "s": False}), (surfaces, None)):
+        lift = lambda q, v: ((q[0], q[1] + 10.0), v)  # noqa: E731
+        twice = lambda q, v: (q, (2.0 * v[0], v[1]))  # noqa: E731
+        more = lambda q, v: (q, (v[0] + 1.0, v[1]))  # noqa: E731
+        start = {"x": 0.0, "y": 0.0, "velocity": (1.0, 0.0), "duration": 3.0, "relays": sides}
+        motion = simulate(twin_resets(parts, order, lift, twice), **start)
+        assert len(motion.events) == 2
+        assert motion.position == pytest.approx((5.0, 10.0), abs=1e-13)
+        with pytest.raises(MotionError, match=r"at one instant at time 1, of '[rs]' and '[rs]'"):
+            simulate(twin_resets(parts, order, more, twice), **start)
+
+
+def test_resets_that_accumulate_at_their_threshold_are_refused():
+    """u' = 1, and u = 1 is reset to 1 - d with a d that is halved each time: up to t = 2."""
+    neuron = model_of(
+        ("u", "d"),
+        (Surface(name="fires", coordinate="u", position=1.0, after_event="fired"),),
+        (1.0, 0.0),
+        first_order=("u", "d"),
+        fired=lambda q, v: ((1.0 - q[1], 0.5 * q[1]), v),
+    )
+    with pytest.raises(MotionError, match="resets of the state accumulate at time 2, at 'fires'"):
+        simulate(System(model=neuron), u=0.0, d=0.5, duration=20.0)
+    # two walls that come nearer with each reset: x goes 1, 1/2, 1, 1/4, ... up to t = 4
+    walls = model_of(
+        ("x", "d"),
+        (
+            Surface(name="up", function="above", after_event="turn"),
+            Surface(name="down", function="below", after_event="turn"),
+        ),
+        (0.0, 0.0),
+        above=lambda q, v: q[0] - q[1],
+        below=lambda q, v: -q[0] - q[1],
+        turn=lambda q, v: ((q[0], 0.5 * q[1]), (-v[0], v[1])),
+    )
+    with pytest.raises(MotionError, match=r"resets of the state accumulate at time (4|3\.99999)"):
+        simulate(System(model=walls), x=0.0, d=1.0, velocity=(1.0, 0.0), duration=20.0)
+
+
+def test_a_reset_that_leaves_its_own_function_lets_the_motion_pass():
+    """x' is doubled at x = 1, once."""
+    model = model_of(
+        ("x",),
+        (Surface(name="w", coordinate="x", position=1.0, after_event="kick"),),
+        0.0,
+        kick=lambda q, v: (q, 2.0 * v),
+    )
+    motion = simulate(System(model=model), x=0.0, velocity=1.0, duration=3.0)
+    assert len(motion.events) == 1
+    assert motion.position == pytest.approx(5.0, abs=1e-13)
+
+
+def test_what_a_reset_returns_is_checked():
+    def one(after):
+        return System(
+            model=model_of(
+                ("x",),
+                (Surface(name="w", coordinate="x", position=1.0, after_event="jump"),),
+                0.0,
+                jump=after,
+            )
+        )
+
+    def go(system):
+        return simulate(system, x=0.0, velocity=1.0, duration=3.0)
+
+    with pytest.raises(ParameterError, match=r"Made\.jump must return the coordinates and the vel"):
+        go(one(lambda q, v: None))
+    for after in (
+        lambda q, v: (q, np.sqrt(q - 2.0)),
+        lambda q, v: (np.log(-q), v),
+        lambda q, v: (1.0 / (q - 1.0), v),
+    ):
+        with pytest.raises(MotionError, match=r"Made\.jump, after_event of 'w', has no value"):
+            go(one(after))
+    both = model_of(
+        ("x", "y"),
+        (Surface(name="w", coordinate="x", position=1.0, after_event="jump"),),
+        (0.0, 0.0),
+        jump=lambda q, v: (0.5 * np.array(q), -np.array(v)),
+    )
+    motion = simulate(System(model=both), x=0.0, y=0.0, velocity=(1.0, 0.5), duration=2.0)
+    assert motion.position == pytest.approx((-0.5, -0.25), abs=1e-13)
+
+
+def test_a_relay_is_given_as_one_value_and_its_thresholds_lie_apart():
+    system = System(model=Thermostat())
+    with pytest.raises(ParameterError, match="must be given as True or False"):
+        simulate(system, T=20.0, duration=1.0, relays={"heater": np.array([True, False])})
+    # the heater goes off at 19 at the latest, and on below 20
+    crossed = System(model=Thermostat(below=20.0, above=19.0))
+    with pytest.raises(MotionError, match="'heater' is set to both sides: too_cold, by which"):
+        simulate(crossed, T=18.0, duration=1.0)
+    near = System(model=Thermostat(below=20.0, above=20.0 + 1e-9))
+    with pytest.raises(MotionError, match="more than 20000 events .* set thresholds further apart"):
+        simulate(near, T=18.0, duration=1.0)

@@ -462,7 +462,7 @@ def _check_reset(model: ContactModel, surface: Any, name: str) -> None:
     if found is None:
         return
     wanted = "a number" if size == 1 else f"{size} numbers"
-    both = isinstance(found, (tuple, list)) and len(found) == 2
+    both = _is_row(found) and len(found) == 2
     if not both or any(_size_of(part) != wanted for part in found):
         raise ParameterError(
             f"{type(model).__name__}.{name} must return the coordinates and the velocities after"

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
@@ -762,11 +764,20 @@ def _after_event(model: Any, name: str, at: tuple[Any, ...]) -> list[Any]:
     """All coordinates and all velocities after an event; 0 for those of coordinates of first order,
     which follow from the state."""
     size = len(model.coordinates)
-    rows = [
-        list(row) if isinstance(row, (tuple, list)) else [row] for row in ask_user(model, name, *at)
-    ]
+    rows = (tuple, list, np.ndarray)
+    found = ask_user(model, name, *at)
+    halves = found if isinstance(found, rows) else ()
+    both = [list(half) if isinstance(half, rows) else [half] for half in halves]
+    if [len(row) for row in both] != [size, size]:
+        kind = getattr(model, "own_class", type(model)).__name__
+        raise ParameterError(
+            f"{kind}.{name} must return the coordinates and the velocities after the event, each"
+            f" {'a number' if size == 1 else f'{size} numbers'}, got"
+            f" {'None' if found is None else 'something else'}",
+            "model",
+        )
     moving = size - len(getattr(model, "own_class", model).first_order)
-    return [*rows[0], *rows[1][:moving], *[0.0] * (size - moving)]
+    return [*both[0], *both[1][:moving], *[0.0] * (size - moving)]
 
 
 def _function_of(model: Any, part: Any, row: int, at: tuple[Any, ...]) -> Any:

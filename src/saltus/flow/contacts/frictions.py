@@ -89,6 +89,8 @@ def is_on_surface(motion, k):
     row = motion.frictions[k]
     if not is_surface(motion, k) or is_function(motion, k) or row[FrictionColumn.REACHED] == 3:
         return False
+    if row[FrictionColumn.KEPT] == 1:
+        return False
     return motion.coordinates[row[FrictionColumn.COORDINATE]] == ground_speed(motion, k)
 
 

@@ -81,7 +81,12 @@ from saltus.flow.contacts.propagators import (
     columns_from_modes,
     input_step,
 )
-from saltus.flow.contacts.resets import reset_state, resets_state
+from saltus.flow.contacts.resets import (
+    keep_reached,
+    lead_to_events,
+    reset_state,
+    resets_state,
+)
 from saltus.flow.contacts.rows import has_speed, largest_pull, limits_begin, row_series
 from saltus.flow.contacts.rubbing import (
     free_pulls,
@@ -345,7 +350,7 @@ def settle(motion):
 def decide_contacts(motion):
     """Decide which contacts are closed and which frictions stick from here on.
 
-    Returns PAUSED to go on, or NOT_UNIQUE.
+    Returns PAUSED to go on, NOT_UNIQUE, or UNRESOLVED where resets accumulate.
     """
     t = motion.time
     count = motion.contacts.shape[0]
@@ -360,8 +365,11 @@ def decide_contacts(motion):
     fill_contact_matrices(motion)
     still = undecided(motion)
     held = sticking(motion, before)
+    kept = keep_reached(motion, t)
     if not choose_all(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
+    if kept and not lead_to_events(motion, t):
+        return Status.UNRESOLVED
     if motion.multipliers > 0 and is_undetermined(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
     hold_coordinates(motion)

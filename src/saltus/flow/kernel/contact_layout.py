@@ -54,6 +54,10 @@ class FrictionColumn(IntEnum):
     # of a surface that resets the state where its side becomes +1, 1 plus the number of its reset;
     # minus that where -1 is the side in SLIDES that the motion comes to; else 0
     RESETS = 8
+    # of a surface that would reset the state where the motion goes on through it, and at which it is
+    # at this instant, apart from rounding: 1; its side stays as it was, so that it has its own event.
+    # 2 behind its own event, if that has not changed its function: its side is read; else 0
+    KEPT = 9
 
 
 class FrictionImpact(IntEnum):

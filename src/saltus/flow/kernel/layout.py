@@ -80,6 +80,8 @@ class Status(IntEnum):
     OUTSIDE = 11
     UNRESOLVED = 12
     PASSED = 13  # a contact or a surface was passed by more than rounding, without an event
+    UNORDERED = 14  # two resets of the state at one instant, whose order makes a difference
+    NO_STATE = 15  # a reset of the state gives no numbers
 
 
 class GrazingDetail(IntEnum):

@@ -254,7 +254,7 @@ def relays_at(
     found = {}
     for relay in model.relays:
         side = asked.get(relay.name)
-        if side is not None and side not in (True, False, -1):
+        if side is not None and not (np.ndim(side) == 0 and side in (True, False, -1)):
             raise ParameterError(
                 f"the relay {relay.name!r} must be given as True or False, got {shown(side)}",
                 "relays",
@@ -609,7 +609,7 @@ def _advance(
             if time < checked_at + _time_scale(system, numbers) * many / MOST.rate:
                 _refuse_crushed(system, now, recorder.last_hit() if system.model.contacts else [])
                 raise MotionError(
-                    f"more than {many} impacts{_at_contacts(system, recorder)} from time"
+                    f"more than {many} {_what_follows(system, recorder)} from time"
                     f" {checked_at:.6g} to {time:.6g}: {_why_so_many(system, recorder)}, or ask for"
                     " a shorter time"
                 )
@@ -645,6 +645,13 @@ def _at_contacts(system: System, recorder: Recorder) -> str:
     )
 
 
+def _what_follows(system: System, recorder: Recorder) -> str:
+    """What follows one another so fast, in words: impacts with their contacts, or other events."""
+    if not system.model.contacts and system.model.surfaces:
+        return "events"
+    return f"impacts{_at_contacts(system, recorder)}"
+
+
 def _why_so_many(system: System, recorder: Recorder) -> str:
     """Why impacts follow one another so fast, and what to change, in words."""
     matrix = system.impact.restitution_matrix(system.model) if system.model.contacts else []
@@ -654,6 +661,11 @@ def _why_so_many(system: System, recorder: Recorder) -> str:
         return (
             "without a loss impacts on a contact that stays pressed never end, and with several"
             " contacts they are not averaged; give them a loss, an e below 1"
+        )
+    if not system.model.contacts and system.model.surfaces:
+        names = " and ".join(repr(surface.name) for surface in system.model.surfaces)
+        return (
+            f"the motion goes to and fro between the sides of {names}; set thresholds further apart"
         )
     return "they accumulate too slowly to be followed; raise the loss at impact"
 
@@ -679,6 +691,14 @@ def refuse(system: System, status: int, now: KernelState) -> None:
     position = now.state[:own]
     velocity = now.state[numbers.dof : numbers.dof + own]
     sentence = refusal(system, status, f"{time:.9g}", f"{velocity[0]:.6g}")
+    for relay in system.model.relays if status == Status.NOT_UNIQUE else ():
+        if relay.name in now.undecided:
+            raise MotionError(
+                f"at time {time:.9g} the relay {relay.name!r} is set to both sides: {relay.on}, by"
+                f" which it goes on, and {relay.off}, by which it goes off, are both positive, or both"
+                " become positive; its thresholds must lie apart, such as on below 19 and off above"
+                " 21"
+            )
     if status == Status.NOT_UNIQUE and now.undecided:
         names = " and ".join(repr(name) for name in now.undecided)
         raise MotionError(
@@ -756,6 +776,24 @@ def refusal(system: System, status: int, time: str, velocity: str) -> str | None
         return (
             f"a reset of the state {at} leaves it beyond a contact, where the model has no states:"
             f" {' or '.join(map(repr, system.model.resets))} may not take it there"
+        )
+    if status == Status.UNORDERED:
+        return (
+            f"two resets of the state are due at one instant {at}, of"
+            f" {' and '.join(map(repr, system.model.resets))}, and the state behind them depends on"
+            " which one acts first; start beside it, or give these surfaces one method that knows of"
+            " both"
+        )
+    if status == Status.NO_STATE:
+        methods = " or ".join(
+            f"{type(system.model).__name__}.{surface.after_event}, after_event of {surface.name!r},"
+            for surface in system.model.surfaces
+            if surface.after_event is not None
+        )
+        return (
+            f"a reset of the state {at} gives no finite numbers: {methods} has no value at the state"
+            " before the event, as a root or a logarithm of a negative number or a division by 0 have"
+            " none"
         )
     if status == Status.UNRESOLVED and system.model.resets:
         return (
