@@ -840,5 +840,7 @@ def test_a_relay_is_given_as_one_value_and_its_thresholds_lie_apart():
     with pytest.raises(MotionError, match="'heater' is set to both sides: too_cold, by which"):
         simulate(crossed, T=18.0, duration=1.0)
     near = System(model=Thermostat(below=20.0, above=20.0 + 1e-9))
-    with pytest.raises(MotionError, match="more than 20000 events .* set thresholds further apart"):
+    with pytest.raises(
+        MotionError, match=r"more than 20000 events .* set thresholds further apart"
+    ):
         simulate(near, T=18.0, duration=1.0)
