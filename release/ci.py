@@ -42,6 +42,8 @@ BROWSER_TESTS = " ".join(
     )
 )
 PYTEST = ".venv/bin/python -m pytest --assert=plain"
+# What has failed, once more and alone: it tells what fails always from what failed once.
+EXPLAINED = ".venv/bin/python -m pytest -n 0 --last-failed --last-failed-no-failures none"
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ def steps(number: int) -> tuple[Step, ...]:
             "processor",
             f"the numerical tests on an emulated processor, in turn; now {processor}",
             f'test "$(uname -m)" = x86_64 || exit {IMPOSSIBLE}\n'
-            f". tests/processors/{processor}.sh\n{PYTEST} {NUMERICAL}",
+            f". tests/processors/{processor}.sh\n{PYTEST} {NUMERICAL} || {{ {EXPLAINED}; exit 1; }}",
             25,
             may_be_cut=True,
         ),
