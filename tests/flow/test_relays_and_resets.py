@@ -628,12 +628,14 @@ def test_parts_that_are_none_are_refused():
 def test_other_questions_refuse_relays_and_resets_by_name():
     system = System(model=Neuron())
     with pytest.raises(ParameterError, match="has 'threshold'; simulate, sensitivities"):
-        saltus.simulate_many(system, u=[0.0, 0.1], duration=1.0)
+        saltus.search_orbits(system, "model.drive", [2.0, 3.0])
     room = System(model=Thermostat())
     with pytest.raises(ParameterError, match="search_orbits does not follow relays so far"):
         saltus.search_orbits(room, "model.power", [2.0, 3.0])
-    with pytest.raises(ParameterError, match="simulate_many does not follow relays so far"):
-        saltus.simulate_many(room, T=[18.0, 19.0], duration=1.0)
+    with pytest.raises(
+        ParameterError, match="ensembles have no derivatives of motions with relays"
+    ):
+        saltus.simulate_many(room, T=[18.0, 18.5], duration=1.0, sensitivities=())
 
 
 @pytest.mark.parametrize("seed", [2, 6, 17, 22])

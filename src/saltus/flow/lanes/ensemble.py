@@ -21,7 +21,7 @@ from saltus.flow.lanes.capture_speeds import capture_speeds
 from saltus.flow.lanes.ensemble_dataset import to_dataset
 from saltus.flow.lanes.ensemble_result import EnsembleResult
 from saltus.flow.lanes.inputs import Inputs, read_inputs
-from saltus.flow.lanes.one_by_one import followed_one_by_one
+from saltus.flow.lanes.one_by_one import followed_one_by_one, goes_alone
 from saltus.flow.lanes.options import (
     EnsembleOptions,
     Sample,
@@ -69,6 +69,7 @@ def simulate_many(
     tol: float = 1e-12,
     time: Numbers = 0.0,
     side: int | None = None,
+    relays: Mapping[str, Any] | None = None,
     stop_at: Iterable[str] = (),
     sample: Iterable[str] = ("state",),
     last: int | str = 1,
@@ -111,6 +112,10 @@ def simulate_many(
     device
         "cuda" follows the motions on a card, of models with at most one contact (`docs/howto/gpu.md`);
         "auto" does so where there is one and it is faster. Within a study "cpu" is the study's own.
+    relays
+        Whether each `Relay` of the model is on at the start, such as {"heater": True}, or an array
+        for each. Motions with relays, with surfaces that reset the state or with contacts of a
+        `distance` are followed one by one.
     velocity, periods, duration, tol, time, side, stop_at, progress, coordinates
         As for `simulate`; velocity a tuple of
         arrays where there are several coordinates.
@@ -120,7 +125,8 @@ def simulate_many(
     xarray.Dataset
         A Dataset over the dimensions of the arguments, with the state at the end, `time`, `side`,
         `stop` (why it ended), `impact_count`, `grazings` and what `sample` asks for. Its `periods`
-        are those done, 2.5 for two and a half; see `ensemble_dataset.py`.
+        are those done, 2.5 for two and a half; see `ensemble_dataset.py`. Of a relay "heater" it has
+        `side_heater`.
 
     Raises
     ------
@@ -134,7 +140,14 @@ def simulate_many(
     (array([39, 39, 39]), -0.23568059529931645)
     """
     check_system(
-        system, "simulate_many", several_contacts=True, multipliers=True, switches=True, jumps=True
+        system,
+        "simulate_many",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        jumps=True,
+        resets=True,
+        relays=True,
     )
     check_number("tol", tol, at_least=1e-15, at_most=1e-6)
     options = EnsembleOptions(
@@ -146,7 +159,7 @@ def simulate_many(
         paths=None if sensitivities is None else read_names("sensitivities", sensitivities),
     )
     side, threads, device = read_side(side), read_threads(threads), read_device(device)
-    inputs = read_inputs(system, velocity, time, parameters, coordinates)
+    inputs = read_inputs(system, velocity, time, parameters, coordinates, relays)
     inner = system.in_gap_coordinates
     if inner is not system and (Sample.EXTREMA in options.sample or options.paths):
         raise ParameterError(
@@ -190,7 +203,8 @@ def run_ensemble(
     given = inputs
     system, inputs = system.in_gap_coordinates, inputs.in_gaps(system)
     driver = None
-    if not system.model.has_multipliers:
+    alone = goes_alone(system.model)
+    if not alone:
         driver = compile_driver_aside(system.model.holds_coordinates)
     run = program(system, options.limits, options.paths)
     if run.structure.several and any(path.startswith("model.") for path in inputs.parameters):
@@ -218,9 +232,9 @@ def run_ensemble(
         16.0 * len(options.sample) * kept * inputs.size,
         f"samples of {kept} periods of {inputs.size} motions",
     )
-    if system.model.has_multipliers:
-        alone = followed_one_by_one(own, given, options, jobs, kept, side, progress)
-        return EnsembleResult(own, given, options, jobs, alone)
+    if alone:
+        ends = followed_one_by_one(system, inputs, options, jobs, kept, side, progress, duration)
+        return EnsembleResult(own, given, options, jobs, ends)
     lanes = compiled_lanes(system, run, options, kept, inputs.parameters)
     if driver is not None:
         compile_beside(driver, system.model.holds_coordinates)

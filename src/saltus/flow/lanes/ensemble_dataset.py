@@ -56,11 +56,16 @@ def extrema_names(names: tuple[str, ...]) -> tuple[str, str]:
     return f"largest_{of}", f"smallest_{of}"
 
 
-def result_names(names: tuple[str, ...]) -> set[str]:
-    """All names of variables and dimensions that a dataset of a model with these coordinates may
-    have.
+def side_name(relay: str) -> str:
+    """The name in a dataset of the side of a relay."""
+    return f"side_{relay}"
+
+
+def result_names(names: tuple[str, ...], relays: tuple[str, ...] = ()) -> set[str]:
+    """All names of variables and dimensions that a dataset of a model with these coordinates and
+    relays may have.
     """
-    states = state_names(names)
+    states = (*state_names(names), *map(side_name, relays))
     extrema = extrema_names(names)
     further = [
         *(f"{kind}_{name}" for kind in ("sampled", "start") for name in states),
@@ -133,6 +138,10 @@ def _add_ends(writer: _Writer, result: EnsembleResult) -> None:
         writer.add(
             "closed_contacts", closed, "1", "contacts that are closed at the end", **masks_of(names)
         )
+    for i, relay in enumerate(result.system.model.relays):
+        name = side_name(relay.name)
+        text = f"side of {relay.name!r} at the end, 1 where it is on"
+        writer.add(name, ends.sides[:, i], "1", text)
     writer.add("side", result.side.astype(np.int8), "1", "side at the end, 0 at rest")
     writer.add("impact_count", ends.rows["impacts"], "1", "impacts")
     writer.add("grazings", ends.rows["grazings"], "1", "touches of the contact without an impact")
@@ -230,6 +239,10 @@ def _add_samples(writer: _Writer, result: EnsembleResult) -> None:
         "state": [
             (f"sampled_{n}", writer.units[n], f"{n} at the end of the forcing period")
             for n in (*writer.names, *writer.rates)
+        ]
+        + [
+            (f"sampled_{side_name(each.name)}", "1", f"side of {each.name!r} at that time")
+            for each in result.system.model.relays
         ],
         "extrema": [
             (name, unit, f"{text} in the forcing period")
@@ -297,8 +310,8 @@ def stop_names(dataset: xarray.Dataset) -> xarray.DataArray:
 
 @answered
 def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any]:
-    """The states (coordinates, then velocities) at the ends of the forcing periods that were kept,
-    in the order of time.
+    """The states (coordinates, then velocities, then the sides of relays) at the ends of the forcing
+    periods that were kept, in the order of time.
 
     The shape is that of the ensemble, then (periods, d); states are nan where a motion had fewer
     periods than were kept.
@@ -316,6 +329,7 @@ def stroboscopic(system: System, dataset: xarray.Dataset) -> np.ndarray[Any, Any
     >>> saltus.flow.stroboscopic(system, ends).shape
     (2, 3, 2)
     """
-    states = state_names(system.model.coordinates)
+    sides = [side_name(relay.name) for relay in system.model.relays]
+    states = [*state_names(system.model.coordinates), *sides]
     check_dataset(dataset, "simulate_many with sample", [f"sampled_{name}" for name in states])
     return np.stack([dataset[f"sampled_{name}"].values for name in states], axis=-1)

@@ -31,6 +31,8 @@ STOPS = {
     Status.OUTSIDE: Stop.OUTSIDE,
     Status.UNRESOLVED: Stop.UNRESOLVED,
     Status.PASSED: Stop.PASSED,
+    Status.UNORDERED: Stop.NOT_UNIQUE,
+    Status.NO_STATE: Stop.NOT_FINITE,
 }  # by the driver's reason; a motion that is DONE at rest ends with Stop.REST
 NUMBERS = {stop: number for number, stop in enumerate(Stop)}  # in a dataset
 
@@ -53,12 +55,17 @@ class EnsembleResult:
 
     @property
     def last(self) -> np.ndarray:
-        """The states at the end, coordinates and then velocities, (n, d)."""
+        """The states at the end, coordinates and then velocities, (n, d); behind them the sides of
+        relays, if the model has some.
+        """
         own = len(self.system.in_gap_coordinates.model.coordinates)
         states = np.concatenate(
             [self.ends.states[:, :own], self.ends.states[:, self.rows : self.rows + own]], axis=1
         )
-        return self._in_own_coordinates(self.time, states)
+        states = self._in_own_coordinates(self.time, states)
+        if not self.system.model.relays:
+            return states
+        return np.concatenate([states, self.ends.sides], axis=1)
 
     def _in_own_coordinates(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         """States (n, d) at times (n,) in the coordinates of `system`, from those of
@@ -163,6 +170,10 @@ class EnsembleResult:
                 for i, t in enumerate([*whole, self.time])
             ]
             found[Sample.STATE] = np.stack(states, axis=1)
+        if Sample.STATE in found and self.system.model.relays:  # their sides are behind all else
+            found[Sample.STATE] = np.concatenate(
+                [found[Sample.STATE], samples[:, :, column:]], axis=2
+            )
         return found
 
     def extrema_later(self, periods: np.ndarray, kept: int) -> np.ndarray:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from saltus.checks import LIMITS, ManyNumbers, check_memory
-from saltus.errors import ParameterError
-from saltus.flow.lanes.ensemble_dataset import result_names
+from saltus.errors import ParameterError, shown
+from saltus.flow.lanes.ensemble_dataset import result_names, side_name
 from saltus.flow.motion.motion import rate_name, state_names
+from saltus.flow.motion.simulate import check_relays
 from saltus.systems import (
     System,
     broadcast_arrays,
@@ -36,6 +37,7 @@ ARGUMENTS = (  # of `simulate_many`: a misspelt one arrives among the coordinate
         "tol",
         "time",
         "side",
+        "relays",
         "stop_at",
         "sample",
         "last",
@@ -58,6 +60,8 @@ class Inputs:
     # coordinates, velocities and the time by their names, parameters by their paths
     values: dict[str, np.ndarray]
     paths: tuple[str, ...]  # those of the parameters
+    # the names of the relays whose sides are given, each among the values by its `side_name`
+    given_relays: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
@@ -68,6 +72,11 @@ class Inputs:
     def parameters(self) -> dict[str, np.ndarray]:
         """The parameters that were given, by path."""
         return {path: self.values[path] for path in self.paths}
+
+    @property
+    def relays(self) -> dict[str, np.ndarray]:
+        """The sides of relays at the start that were given, +1 or -1, by the names of the relays."""
+        return {name: self.values[side_name(name)] for name in self.given_relays}
 
     def with_numbers(self, system: System) -> Any:
         """A copy of a system in which the numbers of the parameters are arrays, for what is no
@@ -98,7 +107,12 @@ class Inputs:
 
 
 def read_inputs(
-    system: System, velocity: Any, time: Any, parameters: Any, coordinates: Mapping[str, Any]
+    system: System,
+    velocity: Any,
+    time: Any,
+    parameters: Any,
+    coordinates: Mapping[str, Any],
+    relays: Mapping[str, Any] | None = None,
 ) -> Inputs:
     """Broadcast and check the arguments of an ensemble.
 
@@ -109,9 +123,12 @@ def read_inputs(
         shapes do not fit together; or a dimension or coordinate has the name of a result.
     """
     given = parameter_table(system, parameters)
+    remembered = _sides(system, relays)
     arrays = {
         name: finite_array(name, value)
-        for name, value in (_starts(system, velocity, time, coordinates) | given).items()
+        for name, value in (
+            _starts(system, velocity, time, coordinates) | remembered | given
+        ).items()
     }
     dims, shape, coords, together = broadcast_arrays(arrays)
     check_parameters(system, broadcast_arrays({path: arrays[path] for path in given})[3])
@@ -120,7 +137,26 @@ def read_inputs(
     check_memory(
         dims[0] if dims else "parameters", float(size) * LIMITS.motion, f"{size} motions at once"
     )
-    return Inputs(dims, shape, coords, together, tuple(given))
+    return Inputs(dims, shape, coords, together, tuple(given), tuple(relays or ()))
+
+
+def _sides(system: System, given: Any) -> dict[str, Any]:
+    """The sides of relays at the start, +1 or -1, by their names in a dataset."""
+    if given is None:
+        return {}
+    check_relays(system, given)
+    found = {}
+    for name, sides in given.items():
+        numbers = np.asarray(sides)
+        if numbers.dtype.kind not in "bif" or not np.isin(numbers, (-1, 0, 1)).all():
+            raise ParameterError(
+                f"the relay {name!r} must be given as True or False, or as an array of these, got"
+                f" {shown(sides)}",
+                "relays",
+            )
+        values = np.where(numbers > 0, 1.0, -1.0)
+        found[side_name(name)] = sides.copy(data=values) if hasattr(sides, "dims") else values
+    return found
 
 
 def _starts(
@@ -144,7 +180,8 @@ def _check_names(
     """Refuse dimensions and coordinates with the name of a result, and coordinates that contradict
     the parameters.
     """
-    results = result_names(system.model.coordinates)
+    relays = tuple(relay.name for relay in system.model.relays)
+    results = result_names(system.model.coordinates, relays)
     for name in (*dims, *coords):
         if name in results:
             what = "dimension" if name in dims else "coordinate"

@@ -1,5 +1,6 @@
-"""The trajectories of an ensemble whose contacts multipliers hold (`flow/contacts/rows.py`): each is
-followed by itself, as lanes have no multipliers. What is kept of each is what lanes keep.
+"""The trajectories of an ensemble whose contacts multipliers hold (`flow/contacts/rows.py`), or whose
+surfaces remember their sides or reset the state: each is followed by itself, as lanes have none of
+these. What is kept of each is what lanes keep, and the sides of its relays.
 """
 
 from __future__ import annotations
@@ -19,15 +20,18 @@ from saltus.flow.lanes.options import EnsembleOptions, Sample, Until
 from saltus.flow.motion.events import EventKind, Stop, modes_of
 from saltus.flow.motion.motion import Motion
 from saltus.flow.motion.row_values import closing_rates
-from saltus.flow.motion.simulate import simulate
+from saltus.flow.motion.simulate import relays_at, simulate
 from saltus.flow.programs.lane_threads import Ends, Jobs
 from saltus.progress import Progress
-from saltus.systems import System, arguments_of, natural_units
+from saltus.systems import Model, System, arguments_of, natural_units
 
 # A motion that may settle is followed over this number of forcing periods, then twice as many, up
-# to the most.
+# to the most. One that may not, with relays or resets, is followed at once if it is no longer than
+# the most.
 FIRST_SPAN = 4
 LONGEST_SPAN = 64
+# A motion that ends nearer than this share of a forcing period to the period's end ends with it.
+SLIVER = 1e-9
 
 
 @dataclass
@@ -40,6 +44,7 @@ class _Record:
     stroboscopic: np.ndarray  # (2 * longest recurrence, d)
     agreements: np.ndarray
     done: int = 0
+    sides: tuple[int, ...] = ()  # of its relays
     status: int = Status.DONE
     detail: int = 0
     mode: int = Mode.CONTACT
@@ -51,6 +56,11 @@ class _Record:
     least_speed: float = math.inf
 
 
+def goes_alone(model: Model) -> bool:
+    """Whether motions of a model are followed one by one."""
+    return model.has_multipliers or bool(model.relays or model.resets)
+
+
 def followed_one_by_one(
     system: System,
     inputs: Inputs,
@@ -59,50 +69,90 @@ def followed_one_by_one(
     kept: int,
     side: int,
     progress: Progress,
+    duration: float | None = None,
 ) -> Ends:
-    """The ends of all trajectories.
+    """The ends of all trajectories, which last `duration` or the periods that are asked for.
 
     Raises
     ------
     ParameterError
-        Derivatives are asked for.
+        Derivatives are asked for, or a start does not say on which side a relay is.
     """
     if options.paths is not None:
+        what = "motions whose contacts are distances"
+        if not system.model.has_multipliers:
+            what = "motions with relays and surfaces that reset the state"
         raise ParameterError(
-            "ensembles have no derivatives of motions whose contacts are distances so far: take"
-            " saltus.sensitivities, one motion at a time",
+            f"ensembles have no derivatives of {what} so far: take saltus.sensitivities, one motion"
+            " at a time",
             "sensitivities",
         )
     own = len(system.model.coordinates)
+    remembered = len(system.model.relays)
     columns = [column for kind in Sample if kind in options.sample for column in kind.columns(own)]
+    if Sample.STATE in options.sample:
+        columns += range(2 * own + 4, 2 * own + 4 + remembered)
     size = len(jobs)
     ends = Ends(
         np.empty((size, 2 * own)),
         np.zeros(size, dtype=END),
         np.zeros((size, own)),
         np.full((size, kept if columns else 1, len(columns)), np.nan),
+        np.zeros((size, remembered), dtype=np.int8),
     )
     times = np.broadcast_to(inputs.values["time"], size)
-    numbers = {path: np.broadcast_to(a, size) for path, a in inputs.parameters.items()}
-    for row in range(size):
+    systems = _systems(system, inputs)
+    begun = _first_sides(systems, inputs, jobs.states, times)
+    for row, one in enumerate(systems):
         progress(row / size, "following motions one by one")
-        one = system
-        if numbers:
-            one = system.with_({path: float(a[row]) for path, a in numbers.items()})
         job = jobs.rows[row]
         record = _Record(
             jobs.states[row].copy(),
             float(times[row]),
-            np.full((ends.samples.shape[1], 2 * own + 4), np.nan),
-            np.zeros((2 * LONGEST_RECURRENCE, 2 * own)),
+            np.full((ends.samples.shape[1], 2 * own + 4 + remembered), np.nan),
+            np.zeros((2 * LONGEST_RECURRENCE, 2 * (own + remembered))),
             np.zeros(LONGEST_RECURRENCE + 1, dtype=np.int64),
+            sides=begun[row],
         )
-        _follow(one, record, job, options, side)
+        _follow(one, record, job, options, side, duration)
         _write(record, job, ends, row, columns)
     return ends
 
 
-def _follow(system: System, record: _Record, job: Any, options: EnsembleOptions, side: int) -> None:
+def _systems(system: System, inputs: Inputs) -> list[System]:
+    """The system of each trajectory."""
+    numbers = {path: np.broadcast_to(a, inputs.size) for path, a in inputs.parameters.items()}
+    if not numbers:
+        return [system] * inputs.size
+    return [
+        system.with_({path: float(a[row]) for path, a in numbers.items()})
+        for row in range(inputs.size)
+    ]
+
+
+def _first_sides(
+    systems: list[System], inputs: Inputs, states: np.ndarray, times: np.ndarray
+) -> list[tuple[int, ...]]:
+    """The side of each relay at the start of each trajectory."""
+    if not systems or not systems[0].model.relays:
+        return [()] * len(systems)
+    given = {name: np.broadcast_to(a, len(systems)) for name, a in inputs.relays.items()}
+    found = []
+    for row, one in enumerate(systems):
+        asked = {name: bool(sides[row] > 0) for name, sides in given.items()}
+        start = states[row, : 2 * len(one.model.coordinates)]
+        found.append(tuple(relays_at(one, asked, float(times[row]), start).values()))
+    return found
+
+
+def _follow(
+    system: System,
+    record: _Record,
+    job: Any,
+    options: EnsembleOptions,
+    side: int,
+    duration: float | None,
+) -> None:
     """Follow one trajectory, chunk after chunk."""
     length = float(job["period_length"])
     total = (job["last_period"] - job["first_period"]) * length
@@ -110,6 +160,10 @@ def _follow(system: System, record: _Record, job: Any, options: EnsembleOptions,
     whole = math.floor(total / length * (1.0 + 1e-12)) if length > 0.0 else 0
     settles = Until.SETTLED in options.until
     span = FIRST_SPAN if settles else LONGEST_SPAN
+    if whole <= LONGEST_SPAN and not settles and not system.model.has_multipliers:
+        # as `simulate` follows it, to the last bit
+        _advance(system, record, options, side, length, options.periods, duration)
+        return
     begin = record.time
     while record.status == Status.DONE and record.done < whole:
         count = min(span, whole - record.done)
@@ -126,12 +180,15 @@ def _advance(
     options: EnsembleOptions,
     side: int,
     length: float,
-    periods: int | None = None,
+    periods: float | None = None,
     duration: float | None = None,
 ) -> None:
     """Follow a trajectory over some forcing periods, or for a time, and keep what is asked for."""
     own_limits = (*system.model.stops, *system.model.friction_limits)
     lasting: Any = {"duration": duration} if periods is None else {"periods": periods}
+    if record.sides:
+        names = [relay.name for relay in system.model.relays]
+        lasting["relays"] = dict(zip(names, record.sides, strict=True))
     try:
         motion = simulate(
             system,
@@ -147,13 +204,9 @@ def _advance(
         if isinstance(error, ParameterError) and not record.done:
             record.status = Status.OUTSIDE  # a start beyond a contact
         if not record.done:
-            _keep(record, np.array([[*record.state, *4 * [math.nan]]]))
+            _keep(record, np.array([[*record.state, *4 * [math.nan], *record.sides]]))
         return
-    begin = record.time
-    times = np.array([begin, motion.time])
-    if periods is not None:
-        times = begin + length * np.arange(periods + 1)
-        times = np.unique(np.minimum(times, motion.time))
+    times = _period_ends(motion, length)
     settled = _keep_periods(system, record, motion, times, Until.SETTLED in options.until)
     until = times[-1] if settled is None else times[settled]
     record.time = float(until)
@@ -178,6 +231,7 @@ def _keep_periods(
     own = len(states) // 2
     states = states.reshape(2 * own, len(times)).T
     states[-1] = motion.final_state
+    sides = _sides_of_relays(motion, times)
     extrema = motion.extrema_between(times)
     impacts = motion.impacts
     speeds = _closing_speeds(motion)
@@ -190,10 +244,12 @@ def _keep_periods(
                 extrema[number - 1, :, 0].min(),
                 speeds[within].min(initial=math.inf),
                 np.count_nonzero(within),
+                *sides[number],
             ]
         )
         _keep(record, row[None])
         record.state = states[number].copy()
+        record.sides = tuple(sides[number].tolist())
         if settles and _recurs(system, record):
             return number
     return None
@@ -204,7 +260,8 @@ def _keep(record: _Record, rows: np.ndarray) -> None:
     for row in rows:
         record.samples[record.done % len(record.samples)] = row
         record.done += 1
-        high, low, speed, count = row[-4:]
+        first = len(record.state)
+        high, low, speed, count = row[first : first + 4]
         record.highest = max(record.highest, high)
         record.lowest = min(record.lowest, low)
         record.least_speed = min(record.least_speed, speed)
@@ -212,13 +269,17 @@ def _keep(record: _Record, rows: np.ndarray) -> None:
 
 
 def _recurs(system: System, record: _Record) -> bool:
-    """Whether a trajectory repeats itself, as lanes tell it."""
+    """Whether a trajectory repeats itself, as lanes tell it, with its relays on the same sides."""
     own = len(record.state) // 2
-    record.stroboscopic[record.done % (2 * LONGEST_RECURRENCE)] = record.state
     length = natural_units(system).length
     speed = length * float(system.load.frequency or 1.0)
+    # each relay is a coordinate of the size of the others, which stands
+    sides = length * np.array(record.sides)
+    record.stroboscopic[record.done % (2 * LONGEST_RECURRENCE)] = np.concatenate(
+        [record.state[:own], sides, record.state[own:], 0.0 * sides]
+    )
     period, _ = recurrence_period(
-        record.stroboscopic, record.agreements, record.done, own, length, speed
+        record.stroboscopic, record.agreements, record.done, own + len(sides), length, speed
     )
     if period:
         record.status = Status.SETTLED
@@ -229,15 +290,47 @@ def _recurs(system: System, record: _Record) -> bool:
 def _closing_speeds(motion: Motion) -> np.ndarray:
     """The least speed at which each impact closes one of its contacts, (n,)."""
     impacts = motion.impacts
-    rates = np.abs(closing_rates(motion))
+    model = motion.system.model
+    if model.has_multipliers:
+        rates = np.abs(closing_rates(motion))
+    else:
+        before = np.reshape(impacts.velocity_before, (len(impacts), len(model.coordinates))).T
+        places = [model.coordinates.index(str(each.coordinate)) for each in model.contacts]
+        rates = np.abs(before[places])
     for i in range(len(rates)):
         rates[i] = np.where(impacts.side >> i & 1 == 1, rates[i], math.inf)
     return np.asarray(rates.min(axis=0, initial=math.inf))
 
 
+def _period_ends(motion: Motion, length: float) -> np.ndarray:
+    """The start of a motion, the ends of its forcing periods, counted from there, and its end."""
+    whole = 0
+    if length > 0.0:
+        whole = math.floor((motion.time - motion.start) / length + SLIVER)
+    times = np.minimum(motion.start + length * np.arange(whole + 1), motion.time)
+    if whole == 0 or motion.time - times[-1] > SLIVER * length:  # apart from rounding
+        times = np.append(times, motion.time)
+    return np.asarray(times)
+
+
+def _sides_of_relays(motion: Motion, times: np.ndarray) -> np.ndarray:
+    """The sides of a motion's relays at times, of which the last one is its end, (n, relays)."""
+    model = motion.system.model
+    names = [relay.name for relay in model.relays]
+    if not names:
+        return np.zeros((len(times), 0), dtype=int)
+    assert motion.dense is not None
+    sides = modes_of(model, motion.dense.states(times)[2])[2]
+    of_surfaces = dict(zip([part.name for part in model.surfaces], sides, strict=True))
+    found = np.stack([of_surfaces[name] for name in names], axis=1).astype(int)
+    found[-1] = [motion.sides[name] for name in names]
+    return np.asarray(found)
+
+
 def _write(record: _Record, job: Any, ends: Ends, row: int, columns: list[int]) -> None:
     """Write the end of a trajectory into the results."""
     ends.states[row] = record.state
+    ends.sides[row] = record.sides
     ends.samples[row] = record.samples[:, columns]
     end = ends.rows[row]
     length = float(job["period_length"])

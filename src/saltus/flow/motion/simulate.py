@@ -238,16 +238,9 @@ def relays_at(
         positive.
     """
     model: Any = system.model
-    asked = dict(given) if isinstance(given, Mapping) else {} if given is None else None
-    known = [relay.name for relay in model.relays]
-    if asked is None or not known or not set(asked) <= set(known):
-        has = ", ".join(known) or "no relays"
-        raise ParameterError(
-            f"relays must be a dictionary from relays to whether they are on, such as"
-            f" {{'{(known or ['heater'])[0]}': True}}, got {shown(given)}; {type(model).__name__}"
-            f" has {has}",
-            "relays",
-        )
+    if given is not None:
+        check_relays(system, given)
+    asked = dict(given or {})
     q, v = (half.tolist() if half.size > 1 else half.item() for half in np.split(start, 2))
     state = tuple(tuple(x) if isinstance(x, list) else x for x in (q, v))
     load = DeclaredLoad(system.load, model)
@@ -278,6 +271,19 @@ def relays_at(
             )
         found[relay.name] = 1 if on > 0.0 or (off <= 0.0 and side in (True, 1)) else -1
     return found
+
+
+def check_relays(system: System, given: Any) -> None:
+    """Refuse anything but a dictionary from relays of a system's model."""
+    known = [relay.name for relay in system.model.relays]
+    if not isinstance(given, Mapping) or not known or not set(given) <= set(known):
+        has = ", ".join(known) or "no relays"
+        raise ParameterError(
+            f"relays must be a dictionary from relays to whether they are on, such as"
+            f" {{'{(known or ['heater'])[0]}': True}}, got {shown(given)};"
+            f" {type(system.model).__name__} has {has}",
+            "relays",
+        )
 
 
 class _CheckedPlan(NamedTuple):

@@ -9,7 +9,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -114,6 +114,8 @@ class Ends:
     # event
     rates: np.ndarray
     samples: np.ndarray  # (n, kept, columns asked for)
+    # (n, relays): the side of each relay, +1 or -1, of models with some
+    sides: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int8))
 
 
 _sharing: list[Callable[[], int]] = [lambda: 1]  # how many processes share the cores
