@@ -70,16 +70,15 @@ def check_agreement(system: System, traced: Trace) -> None:
 def _compare(
     system: System, traced: Trace, leaves: dict[Expr, Any], state: tuple[float, Any, Any, int]
 ) -> None:
-    frictions = len(traced.friction_coordinates)
+    frictions = len(traced.sided)
     directions = [1.0 if k % 2 else -1.0 for k in range(frictions)]
     if traced.rows:  # they are compared without friction
         directions[: len(system.model.frictions)] = [0.0] * len(system.model.frictions)
     leaves |= {Expr("free", (), i): 1.0 for i in range(traced.flags)}
     leaves |= {Expr("slide", (), k): direction for k, direction in enumerate(directions)}
-    first = len(traced.friction_coordinates) - len(traced.switches)
+    first = len(traced.sided) - len(traced.switches)
     # Sides of functions are those of the state, as a formula may have the same switch.
-    remembered = {*traced.relays, *traced.resetting}
-    functions = [k for k in traced.functions if k < first and k not in remembered]
+    functions = [k for k in traced.functions if k < first and k not in traced.keeping_sides]
     for k in (*functions, *range(first, len(directions))):
         value = substitute(traced.reactions[len(traced.signs) + 2 * k], leaves)
         if value.op != "number":
@@ -111,7 +110,7 @@ WORDS = {
     "acceleration": "an acceleration is",
     "mass": "an entry of the mass matrix is",
     "positions": "the position of a contact is",
-    "ground_speeds": "the ground speed of a friction, or the position of a surface, is",
+    "levels": "the ground speed of a friction, or the position of a surface, is",
     "gap": "the gap is",
 }
 
@@ -146,7 +145,7 @@ def _own_values(
                     for k, surface in enumerate(model.surfaces)
                 ]
                 switches = [0.0] * len(traced.switches)
-                found.append(("ground_speeds", [*speeds, *places, *switches]))
+                found.append(("levels", [*speeds, *places, *switches]))
             else:
                 value = model.acceleration(time, x, rate, side, load)
                 found.append(("acceleration", value if len(q) > 1 else [value]))

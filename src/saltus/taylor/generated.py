@@ -488,8 +488,7 @@ def _traced_parts(system: System) -> dict[str, str]:
     signs = (
         traced.signs,
         traced.contact_coordinates,
-        traced.friction_coordinates,
-        *traced.friction_contacts,
+        traced.sided,
     )
     texts |= {"margins": _margins(system), "signs": repr(signs)}
     return {name: digest(text) for name, text in texts.items()}

@@ -67,6 +67,36 @@ MOST_BITS = (
 )
 
 
+@dataclass(frozen=True)
+class SidedPart:
+    """A part with two sides: what the row of a friction, a surface or a switch of the force says
+    of it, by the names of `PartKind` and `PartColumn` (`flow/kernel/contact_layout.py`).
+    """
+
+    kind: str  # in lower case: "friction", "surface", "function", "relay"
+    # that it acts along, or looks at; of a function, which has none, the number of coordinates
+    coordinate: int
+    contact: int = -1  # whose reaction presses it, -1 for none
+    # further columns of its row, with their numbers: RESETS of one that resets the state
+    marks: tuple[tuple[str, int], ...] = ()
+    remembered: bool = False  # whether the state does not tell its side
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether it is no friction."""
+        return self.kind != "friction"
+
+    @property
+    def is_function(self) -> bool:
+        """Whether its guard is a function, whose series is in the place of its first margin."""
+        return self.kind not in ("friction", "surface")
+
+    @property
+    def place(self) -> int:
+        """The coordinate of a friction; -1 less that of all others."""
+        return -1 - self.coordinate if self.is_surface else self.coordinate
+
+
 @dataclass(eq=False)
 class Trace:
     """The expressions of a system's motion; leaves are the time, the coordinates, the velocities,
@@ -80,9 +110,9 @@ class Trace:
     A model with several contacts has `reactions`; `mass`, the mass matrix row by row;
     `restitution`, the rows of E; `positions`. Its leaves include `free`, 1 for each coordinate that
     no contact holds, else 0. With frictions there are, behind the reactions, the two margins of
-    each (`stick_margins`), `ground_speeds`, and the leaves `slide`, the direction in which each
-    slides, 0 if it sticks. A surface has rows as a friction, with margins of 1, its position, and
-    its side.
+    each (`stick_margins`), and the leaves `slide`, the direction in which each slides, 0 if it
+    sticks. A surface has two numbers in the place of these margins, and its side. Frictions,
+    surfaces and switches of the force are the parts `sided`, in this order, with their `levels`.
 
     With a tangent `acceleration` goes on after the model's own `dof` with that of its `columns`.
     Column j is the derivative to the j-th initial coordinate, then to the j-th initial velocity,
@@ -129,18 +159,13 @@ class Trace:
     jumps: list[Expr] = field(default_factory=list)
     # for each surface that resets the state, the coordinates, then the velocities, after its event
     resets: list[Expr] = field(default_factory=list)
-    resetting: tuple[int, ...] = ()  # the rows of these surfaces, among frictions and surfaces
-    relays: frozenset[int] = frozenset()  # the rows of surfaces that remember their side
     signs: tuple[int, ...] = ()  # of the contacts
     contact_coordinates: tuple[int, ...] = ()  # the coordinate that each contact holds
-    ground_speeds: list[Expr] = field(default_factory=list)
+    sided: tuple[SidedPart, ...] = ()  # frictions, surfaces, switches of the force
+    # at which the guards of these are 0: the speed of a friction's ground, a surface's position
+    levels: list[Expr] = field(default_factory=list)
     # with frictions in contacts: `has_phases`, then each
     coefficients: list[Expr] = field(default_factory=list)
-    # then the contact whose reaction presses each of them, -1 for none
-    friction_contacts: tuple[int, ...] = ()
-    # the coordinate of each friction, then -1 less that of each surface; in the place of that of a
-    # function, whose series stands in the place of its first margin, the number of coordinates
-    friction_coordinates: tuple[int, ...] = ()
     # of switches of the force, which are the last of the rows of frictions and surfaces, the names
     switches: tuple[str, ...] = ()
     jumping: frozenset[int] = frozenset()  # the rows of those at which the force may jump
@@ -178,7 +203,7 @@ class Trace:
     @property
     def several(self) -> bool:
         """Whether there are contacts or frictions that may hold its coordinates, one by one."""
-        return bool(self.signs or self.friction_coordinates)
+        return bool(self.signs or self.sided)
 
     @property
     def contact_numbers(self) -> list[Expr]:
@@ -192,14 +217,14 @@ class Trace:
             *self.jumps,
             *self.resets,
             *self.coefficients,
-            *self.ground_speeds,
+            *self.levels,
             *self.rows,
         ]
 
     @property
     def multipliers(self) -> int:
         """How many rows multipliers may hold, of contacts and frictions; surfaces are among them."""
-        return len(self.signs) + len(self.friction_coordinates) if self.rows else 0
+        return len(self.signs) + len(self.sided) if self.rows else 0
 
     @property
     def flags(self) -> int:
@@ -250,15 +275,26 @@ class Trace:
 
     @property
     def functions(self) -> tuple[int, ...]:
-        """The rows of frictions and surfaces that are functions."""
-        return tuple(
-            k for k, place in enumerate(self.friction_coordinates) if place == -1 - self.dof
+        """The rows of sided parts that are functions."""
+        return tuple(k for k, part in enumerate(self.sided) if part.is_function)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """The coordinate of each friction, then -1 less that of each other sided part."""
+        return tuple(part.place for part in self.sided)
+
+    @property
+    def keeping_sides(self) -> frozenset[int]:
+        """The rows of sided parts whose side is not always the sign of their guard: they remember
+        it, or reset the state."""
+        return frozenset(
+            k for k, part in enumerate(self.sided) if part.remembered or dict(part.marks)
         )
 
     def append_switches(self, names: tuple[str, ...], functions: list[Expr]) -> None:
         """Append the rows of the switches of the force, behind those of the surfaces."""
         count = len(self.signs)
-        first = len(self.friction_coordinates)
+        first = len(self.sided)
         more = len(functions)
         if more and count + 2 * (first + more) > MOST_BITS:
             raise TraceError(
@@ -277,9 +313,8 @@ class Trace:
             self.rows = self.rows[:gaps] + empty * (self.dof + 1) + self.rows[gaps:]
         if self.coefficients:
             self.coefficients = self.coefficients + empty
-            self.friction_contacts += (-1,) * more
-        self.ground_speeds = self.ground_speeds + empty
-        self.friction_coordinates += (-1 - self.dof,) * more
+        self.levels = self.levels + empty
+        self.sided += (SidedPart("function", self.dof),) * more
         self.switches = tuple(called(function, names, self.parameters) for function in functions)
 
     def let_slide(self, kept: set[Expr]) -> None:
@@ -293,11 +328,11 @@ class Trace:
         is.
         """
         found = dict[Expr, Any]()
-        declared = len(self.friction_coordinates) - len(self.switches)
+        declared = len(self.sided) - len(self.switches)
         for k in self.functions:
             side = Expr("slide", (), k)
             place = len(self.signs) + 2 * k
-            if (k >= declared and k not in self.jumping) or k in (*self.relays, *self.resetting):
+            if (k >= declared and k not in self.jumping) or k in self.keeping_sides:
                 continue
             own = {part: part for part in kept if side in ordered([part.args[0]])}
             means = [_mean_of_sides(a, side, own) for a in self.acceleration]
@@ -485,9 +520,9 @@ def trace(
     declared = {
         k: result.reactions[len(result.signs) + 2 * k]
         for k in result.functions
-        if k not in (*result.relays, *result.resetting)
+        if k not in result.keeping_sides
     }
-    switches = Switches(len(result.friction_coordinates), declared)
+    switches = Switches(len(result.sided), declared)
     if several:
         result.acceleration = switches.written(result.acceleration)
         result.reactions = switches.written(result.reactions)
@@ -502,7 +537,7 @@ def trace(
         result.margins = dict(zip(result.margins, margins, strict=True))
         # a force may have none under the load that is given
         none = model.has_switches and not result.several and not switches.functions
-        first = len(result.friction_coordinates)
+        first = len(result.sided)
         result.jumping = frozenset(first + place for place in switches.jumping)
         result.append_switches(inner.coordinates, [number(1.0)] if none else switches.functions)
         result.let_slide(switches.kept)
@@ -671,12 +706,6 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         else None
         for number, part in enumerate(model.surfaces)
     ]
-    result.relays = frozenset(
-        first + number for number, part in enumerate(model.surfaces) if isinstance(part, Relay)
-    )
-    result.resetting = tuple(
-        first + number for number, part in enumerate(model.surfaces) if part.after_event is not None
-    )
     result.resets = [
         combine("add", x, 0.0)
         for part in model.surfaces
@@ -711,8 +740,6 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     if model.rubs_in_contacts:
         given = float(twin.impact.has_phases), *(getattr(part, "kinetic", 0.0) for part in parts)
         result.coefficients = [combine("add", mu, 0.0) for mu in given]
-        presses = {None: -1} | {contact.name: i for i, contact in enumerate(contacts)}
-        result.friction_contacts = tuple(presses[getattr(part, "contact", None)] for part in parts)
     speeds = (
         # in a row the speed of the ground is part of the drift
         *(0.0 if model.has_multipliers else friction.ground_speed for friction in frictions),
@@ -721,13 +748,8 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
             for part, function in zip(model.surfaces, functions, strict=True)
         ),
     )
-    result.ground_speeds = [combine("add", w, 0.0) for w in speeds]
-    own = [0 if model.has_multipliers else names.index(part.coordinate) for part in frictions]
-    passed = [
-        -1 - (names.index(part.coordinate) if function is None else result.dof)
-        for part, function in zip(model.surfaces, functions, strict=True)
-    ]
-    result.friction_coordinates = (*own, *passed)
+    result.levels = [combine("add", w, 0.0) for w in speeds]
+    result.sided = _sided_parts(model, functions)
     result.mass = [
         combine("add", x, 0.0)
         for i, row in enumerate(mass_rows(model, q, t, load))
@@ -758,6 +780,34 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
         )
         found += [Expr("mode", (), i) for i in range(local, result.dof)]
     return found
+
+
+def _sided_parts(model: Any, functions: list[Any]) -> tuple[SidedPart, ...]:
+    """The rows of a model's frictions and surfaces; with each surface the expression that it
+    is, or None where it is a coordinate."""
+    names = model.coordinates
+    presses = {None: -1} | {contact.name: i for i, contact in enumerate(model.contacts)}
+    rows = [
+        SidedPart(
+            "friction",
+            0 if model.has_multipliers else names.index(part.coordinate),
+            presses[part.contact] if model.rubs_in_contacts else -1,
+        )
+        for part in model.frictions
+    ]
+    resets = 0
+    for part, function in zip(model.surfaces, functions, strict=True):
+        marks: tuple[tuple[str, int], ...] = ()
+        if part.after_event is not None:
+            resets += 1
+            marks = (("RESETS", part.sign * resets),)
+        if function is None:
+            rows.append(SidedPart("surface", names.index(part.coordinate), marks=marks))
+        else:
+            relay = isinstance(part, Relay)
+            kind = "relay" if relay else "function"
+            rows.append(SidedPart(kind, len(names), marks=marks, remembered=relay))
+    return tuple(rows)
 
 
 def _after_event(model: Any, name: str, at: tuple[Any, ...]) -> list[Any]:
@@ -841,7 +891,7 @@ def _trace_margins(
         free: list[Any] = [Expr("free", (), i) for i in range(result.local)] + [1.0] * (
             result.dof - result.local
         )
-        slides = [Expr("slide", (), i) for i in range(len(result.ground_speeds))]
+        slides = [Expr("slide", (), i) for i in range(len(result.sided))]
         margins |= friction_margins(twin.model, t, q, v, twin.load, free, slides)
     for name in stop_at:
         if name not in margins:

@@ -26,6 +26,24 @@ Accumulations of impacts in several blocks that end at one instant are also trea
 other. Their order makes no difference, as no speed is left. At a release nothing jumps, however
 many contacts open.
 
+A contact is a part of the kind CONTACT. Its answers to the questions of `parts.py`:
+
+1. A row before all others; COORDINATE is the one that it holds, or the row has entries that
+   multipliers hold (`rows.py`).
+2. The gap while it is open (`open_gap_series`).
+3. Its state is OPEN or CLOSED; the functions read 0 for each coordinate, or row, that is not free.
+4. While it is closed, its reaction, which only pushes. One that follows from what else is held is
+   IDLE and carries nothing.
+5. Gaps and reactions bound the step (`contact_step_size`).
+6. The simple root of the gap or of the reaction (`first_guard`).
+7. At 0 of the gap the impact law acts (`contact_impact`), and ends of accumulations are looked for
+   (`end_accumulation_of`); at 0 of the reaction nothing jumps.
+8. Contacts at rest at their positions stay closed or open, together with frictions
+   (`choose_closed`).
+9. IMPACT, GRAZING, RELEASE and REST.
+10. The saltation of the impact law (`tangent.py`); a contact that closes takes its columns along.
+11. Closed where gap and rate are 0; beyond it there is no start.
+
 Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
 `flow/kernel/memory.py`.
 """
@@ -40,7 +58,6 @@ from saltus.flow.contacts.complementarity import exchanged, fill_rubbing, is_pre
 from saltus.flow.contacts.frictions import (
     ALIKE,
     choose_slides,
-    hold_frictions,
     leans,
     margin_size,
     rubs_along,
@@ -69,6 +86,7 @@ from saltus.flow.contacts.impacts import (
     settle_contact,
     undecide,
 )
+from saltus.flow.contacts.parts import hold_sides
 from saltus.flow.contacts.rows import gives, pull_of
 from saltus.flow.contacts.rubbing import rest_columns, rubbing_impact
 from saltus.flow.contacts.tangent import (
@@ -90,21 +108,18 @@ from saltus.flow.kernel.contact_layout import (
     ROW_ROUNDING,
     SAME_MOTION,
     TIED,
-    ContactColumn,
-    FrictionColumn,
     ImpactDetail,
+    PartColumn,
+    Reached,
+    Side,
+    Touch,
     contact_position,
     copy_all,
     restitution,
 )
 from saltus.flow.kernel.layout import ZERO, EventCode, Status
 from saltus.flow.kernel.roots import growth_of, leading
-from saltus.flow.kernel.steps import (
-    clear_shifts,
-    expand,
-    forget,
-    move_columns,
-)
+from saltus.flow.kernel.steps import clear_shifts, expand, forget, move_columns
 from saltus.taylor import jit, lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -136,11 +151,11 @@ def violated(motion, candidates, zero):
     for i in range(count):
         if not candidates >> i & 1:
             continue
-        if motion.multipliers > 0 and motion.contacts[i, ContactColumn.IDLE] == 1:
-            motion.contacts[i, ContactColumn.SKIP] = 0
+        if motion.multipliers > 0 and motion.contacts[i, PartColumn.IDLE] == 1:
+            motion.contacts[i, PartColumn.SKIP] = 0
             continue  # see `all_idle_stay`
-        known = motion.contacts[i, ContactColumn.RELEASED]
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        known = motion.contacts[i, PartColumn.REACHED]
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             k = deciding(motion, motion.margin_series[i], known, zero, press_of(motion, i), 0)
             if k < order and motion.margin_series[i, k] < 0.0:
                 wrong |= 1 << i
@@ -151,7 +166,7 @@ def violated(motion, candidates, zero):
             k = deciding(motion, g, 2 + known, zero, motion.press, 2)
             if k == order or g[k] < 0.0:
                 wrong |= 1 << i
-        motion.contacts[i, ContactColumn.SKIP] = k
+        motion.contacts[i, PartColumn.SKIP] = k
     return wrong
 
 
@@ -166,9 +181,9 @@ def set_choice(motion, candidates, still, number):
         forget_idle(motion)
     for i in range(count):
         if candidates >> i & 1:
-            motion.contacts[i, ContactColumn.CLOSED] = 1
+            motion.contacts[i, PartColumn.STATE] = Touch.CLOSED
             if count <= MOST_TRIED:
-                motion.contacts[i, ContactColumn.CLOSED] = 1 - number % 2
+                motion.contacts[i, PartColumn.STATE] = 1 - number % 2
                 number //= 2
     return choose_slides(motion, still, number)
 
@@ -180,10 +195,10 @@ def changes_of(motion, candidates, still, held):
     """
     changes = 0
     for i in range(motion.contacts.shape[0]):
-        if candidates >> i & 1 and motion.contacts[i, ContactColumn.CLOSED] == 0:
+        if candidates >> i & 1 and motion.contacts[i, PartColumn.STATE] == Touch.OPEN:
             changes += LETS_GO
-    for k in range(motion.frictions.shape[0]):
-        if still >> k & 1 and abs(motion.frictions[k, FrictionColumn.SLIDES]) == 1:
+    for k in range(motion.sided.shape[0]):
+        if still >> k & 1 and abs(motion.sided[k, PartColumn.STATE]) == 1:
             changes += LETS_GO if held >> k & 1 else 1
     return changes
 
@@ -204,30 +219,30 @@ def first_decide(motion, candidates, still, zero):
         if candidates >> i & 1:
             first = abs(motion.margin_series[i, 0])
             size = press_of(motion, i)
-            if motion.contacts[i, ContactColumn.CLOSED] == 0:
-                place = motion.contacts[i, ContactColumn.COORDINATE]
+            if motion.contacts[i, PartColumn.STATE] == Touch.OPEN:
+                place = motion.contacts[i, PartColumn.COORDINATE]
                 first = abs(motion.coordinate_series[place, 2])
                 if motion.multipliers > 0:
                     first = abs(pull_of(motion, i))
                 size = motion.press
-            if motion.contacts[i, ContactColumn.RELEASED] == 1 or not first > zero * size:
+            if motion.contacts[i, PartColumn.REACHED] == Reached.FIRST or not first > zero * size:
                 return False
-    for k in range(motion.frictions.shape[0]):
-        slides = motion.frictions[k, FrictionColumn.SLIDES]
-        if not still >> k & 1 or slides == 2 or leans(motion, k):
+    for k in range(motion.sided.shape[0]):
+        slides = motion.sided[k, PartColumn.STATE]
+        if not still >> k & 1 or slides == Side.OFF or leans(motion, k):
             continue
         row = count + 2 * k
-        reached = motion.frictions[k, FrictionColumn.REACHED]
-        place = motion.frictions[k, FrictionColumn.COORDINATE]
+        reached = motion.sided[k, PartColumn.REACHED]
+        place = motion.sided[k, PartColumn.COORDINATE]
         first = abs(motion.velocity_series[place, 1])
         if motion.multipliers > 0:
             first = abs(pull_of(motion, count + k))
         size = motion.press
-        if slides == 0:
+        if slides == Side.HELD:
             first = min(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
             size = margin_size(motion, k)
-        known = slides == 0 and (reached == 1 or reached == 2)
-        if known or not first > (ALIKE if reached > 0 else ZERO) * size:
+        known = slides == Side.HELD and (reached == Reached.FIRST or reached == Reached.SECOND)
+        if known or not first > (ALIKE if reached != Reached.NO else ZERO) * size:
             return False
     return True
 
@@ -246,7 +261,7 @@ def is_consistent(motion, candidates, still, held, t, zero):
         return False
     for _ in range(count * count if count > MOST_TRIED else 1):
         hold_coordinates(motion)
-        hold_frictions(motion)
+        hold_sides(motion)
         expand(motion, t, 1.0, FIRST_TERMS)
         if not first_decide(motion, candidates, still, zero):
             expand(motion, t, 1.0, motion.order)
@@ -259,7 +274,7 @@ def is_consistent(motion, candidates, still, held, t, zero):
             closed, least = exchanged(closed, wrong, least)
             for i in range(count):
                 if candidates >> i & 1:
-                    motion.contacts[i, ContactColumn.CLOSED] = closed >> i & 1
+                    motion.contacts[i, PartColumn.STATE] = closed >> i & 1
     return False
 
 
@@ -321,7 +336,7 @@ def count_choices(motion, candidates, still):
     for i in range(motion.contacts.shape[0]):
         if motion.contacts.shape[0] <= MOST_TRIED and candidates >> i & 1:
             numbers *= 2
-    for k in range(motion.frictions.shape[0]):
+    for k in range(motion.sided.shape[0]):
         if still >> k & 1:
             numbers *= 3
     return numbers
@@ -416,10 +431,10 @@ def slides_beside_idle(motion):
     idle = False
     slides = False
     for i in range(motion.contacts.shape[0]):
-        idle = idle or motion.contacts[i, ContactColumn.IDLE] == 1
-    for k in range(motion.frictions.shape[0]):
-        pressed = motion.frictions[k, FrictionColumn.PRESSED] > 0
-        slides = slides or (pressed and abs(motion.frictions[k, FrictionColumn.SLIDES]) == 1)
+        idle = idle or motion.contacts[i, PartColumn.IDLE] == 1
+    for k in range(motion.sided.shape[0]):
+        pressed = motion.sided[k, PartColumn.PRESSED] > 0
+        slides = slides or (pressed and abs(motion.sided[k, PartColumn.STATE]) == 1)
     return idle and slides
 
 
@@ -430,7 +445,7 @@ def is_undetermined(motion, candidates, still, held, t):
     if not slides_beside_idle(motion):
         return False
     contacts = motion.contacts.copy()
-    frictions = motion.frictions.copy()
+    frictions = motion.sided.copy()
     note_motion(motion)
     differs = False
     for number in range(count_choices(motion, candidates, still)):
@@ -440,8 +455,8 @@ def is_undetermined(motion, candidates, still, held, t):
         differs = differs or (consistent and not moves_alike(motion))
     for i in range(motion.contacts.shape[0]):
         copy_all(contacts[i], motion.contacts[i])
-    for k in range(motion.frictions.shape[0]):
-        copy_all(frictions[k], motion.frictions[k])
+    for k in range(motion.sided.shape[0]):
+        copy_all(frictions[k], motion.sided[k])
     return differs
 
 
@@ -455,7 +470,7 @@ def note_ties(motion, candidates, t):
     """
     for i in range(motion.contacts.shape[0]):
         if candidates >> i & 1:
-            motion.contacts[i, ContactColumn.CLOSED] = 1
+            motion.contacts[i, PartColumn.STATE] = Touch.CLOSED
     if motion.multipliers > 0:
         forget_idle(motion)
         if not mark_idle(motion, candidates, 0):
@@ -464,7 +479,7 @@ def note_ties(motion, candidates, t):
     expand(motion, t, 1.0, 2)
     for i in range(motion.contacts.shape[0]):
         if candidates >> i & 1 and abs(motion.margin_series[i, 0]) <= TIED * press_of(motion, i):
-            motion.contacts[i, ContactColumn.RELEASED] = 1
+            motion.contacts[i, PartColumn.REACHED] = Reached.FIRST
 
 
 @lean_jit
@@ -491,7 +506,7 @@ def block_of(motion, hit, backwards):
         return block_of_rows(motion, hit, backwards)
     while not hit >> start & 1 or (backwards and start < count - 1 and hit >> start + 1):
         start += 1
-    joined[motion.contacts[start, ContactColumn.COORDINATE]] = True
+    joined[motion.contacts[start, PartColumn.COORDINATE]] = True
     if motion.columns > 0:
         fill_slopes(motion)
     while grows:
@@ -506,20 +521,18 @@ def block_of(motion, hit, backwards):
                     joined[b] = grows = True
         for i in range(count):
             for k in range(count):
-                a = motion.contacts[i, ContactColumn.COORDINATE]
-                b = motion.contacts[k, ContactColumn.COORDINATE]
+                a = motion.contacts[i, PartColumn.COORDINATE]
+                b = motion.contacts[k, PartColumn.COORDINATE]
                 if joined[a] != joined[b] and is_there(motion, local * local + count * i + k):
                     joined[a] = joined[b] = grows = True
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.PRESSED] > 0:
-                a = motion.contacts[
-                    motion.frictions[k, FrictionColumn.PRESSED] - 1, ContactColumn.COORDINATE
-                ]
-                b = motion.frictions[k, FrictionColumn.COORDINATE]
+        for k in range(motion.sided.shape[0]):
+            if motion.sided[k, PartColumn.PRESSED] > 0:
+                a = motion.contacts[motion.sided[k, PartColumn.PRESSED] - 1, PartColumn.COORDINATE]
+                b = motion.sided[k, PartColumn.COORDINATE]
                 if joined[a] != joined[b]:
                     joined[a] = joined[b] = grows = True
     for i in range(count):
-        block |= 1 << i if joined[motion.contacts[i, ContactColumn.COORDINATE]] else 0
+        block |= 1 << i if joined[motion.contacts[i, PartColumn.COORDINATE]] else 0
     return block
 
 
@@ -532,12 +545,8 @@ def are_coupled(motion, i, j):
         return True
     for r in range(motion.multipliers):
         for s in range(motion.multipliers):
-            one = r == i or (
-                r >= count and motion.frictions[r - count, FrictionColumn.PRESSED] == i + 1
-            )
-            other = s == j or (
-                s >= count and motion.frictions[s - count, FrictionColumn.PRESSED] == j + 1
-            )
+            one = r == i or (r >= count and motion.sided[r - count, PartColumn.PRESSED] == i + 1)
+            other = s == j or (s >= count and motion.sided[s - count, PartColumn.PRESSED] == j + 1)
             size = math.sqrt(motion.mobilities[r] * motion.mobilities[s])
             if one and other and abs(gives(motion, r, s)) > ROW_ROUNDING * size:
                 return True
@@ -573,7 +582,7 @@ def impact_of(motion, t, hit):
     regular = fill_contact_matrices(motion)
     chosen = hit
     for i in range(count):
-        chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
+        chosen |= motion.contacts[i, PartColumn.STATE] << i
     if motion.multipliers > 0:
         onto(motion, chosen, 0, -1)
         regular = fill_contact_matrices(motion)
@@ -620,9 +629,9 @@ def rates_between(motion, t, hit):
     candidates = closed_bits(motion)
     if candidates & hit and not choose_closed(motion, candidates, 0, 0, t, ZERO):
         for i in range(motion.contacts.shape[0]):
-            motion.contacts[i, ContactColumn.CLOSED] = candidates >> i & 1
+            motion.contacts[i, PartColumn.STATE] = candidates >> i & 1
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
     expand(motion, t, 1.0, 0)
     return candidates & ~closed_bits(motion)
 
@@ -710,7 +719,7 @@ def impacts_in_any_order(motion, t, hit):
     for i in range(motion.contacts.shape[0]):
         copy_all(rows[i], motion.contacts[i])
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
     detail = impacts_in_a_row(motion, t, hit, False)
     opened = rates_between(motion, t, hit)
     if compare_orders(motion, other) and detail == ImpactDetail.REGULAR:
@@ -752,7 +761,7 @@ def rests_in_a_row(motion, t, near, end):
         block = near & block_of(motion, jumped, False) if jumped & (jumped - 1) else near
         if several and motion.columns > 0:
             hold_coordinates(motion)
-            hold_frictions(motion)
+            hold_sides(motion)
             expand(motion, t, 1.0, 0)
             move_columns(motion, -1.0)
             clear_shifts(motion)

@@ -18,11 +18,10 @@ from saltus.flow.kernel.contact_layout import (
     MOST_TRIED,
     SPANNED,
     VIOLATED,
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
+    PartColumn,
     first_flag,
-    ground_speed,
+    guard_level,
     restitution,
     rub_coefficient,
 )
@@ -185,16 +184,16 @@ def complementary(matrix, right, size, block, tried, z):
 def is_pressed(motion):
     """Whether the reaction of any contact presses a friction."""
     found = False
-    for k in range(motion.frictions.shape[0]):
-        found = found or motion.frictions[k, FrictionColumn.PRESSED] > 0
+    for k in range(motion.sided.shape[0]):
+        found = found or motion.sided[k, PartColumn.PRESSED] > 0
     return found
 
 
 @lean_jit
 def rub_of(motion, i):
     """The friction that a contact's reaction presses, or -1."""
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.PRESSED] == i + 1:
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.PRESSED] == i + 1:
             return k
     return -1
 
@@ -204,7 +203,7 @@ def slip_sign(motion, k):
     """The direction in which a friction slides after the impact, +1 or -1; 0 if it has no impulse
     or sticks.
     """
-    way = motion.frictions[k, FrictionColumn.STRUCK]
+    way = motion.sided[k, PartColumn.STRUCK]
     return (
         1.0 if way == FrictionImpact.FORWARDS else -1.0 if way == FrictionImpact.BACKWARDS else 0.0
     )
@@ -222,10 +221,10 @@ def push(motion, a, i):
             slips = slip_sign(motion, k) * rub_coefficient(motion, k)
             gain -= slips * motion.pushes[a, motion.contacts.shape[0] + k]
         return gain
-    gain = motion.inverse[a, motion.contacts[i, ContactColumn.COORDINATE]] * motion.signs[i]
+    gain = motion.inverse[a, motion.contacts[i, PartColumn.COORDINATE]] * motion.signs[i]
     if k >= 0:
         slips = slip_sign(motion, k) * rub_coefficient(motion, k)
-        gain -= slips * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+        gain -= slips * motion.inverse[a, motion.sided[k, PartColumn.COORDINATE]]
     return gain
 
 
@@ -238,11 +237,11 @@ def fill_rubbing(motion):
     if motion.multipliers > 0:
         fill_rubbing_rows(motion)
         return
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.PRESSED] > 0:
-            c = motion.frictions[k, FrictionColumn.COORDINATE]
-            rate = motion.velocities[c] - ground_speed(motion, k)
-            motion.frictions[k, FrictionColumn.STRUCK] = (
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.PRESSED] > 0:
+            c = motion.sided[k, PartColumn.COORDINATE]
+            rate = motion.velocities[c] - guard_level(motion, k)
+            motion.sided[k, PartColumn.STRUCK] = (
                 FrictionImpact.FORWARDS
                 if rate > 0.0
                 else FrictionImpact.BACKWARDS
@@ -260,7 +259,7 @@ def fill_rubbing(motion):
     for i in range(motion.contacts.shape[0]):
         for j in range(motion.contacts.shape[0]):
             motion.coupling[i, j] = motion.signs[i] * push(
-                motion, motion.contacts[i, ContactColumn.COORDINATE], j
+                motion, motion.contacts[i, PartColumn.COORDINATE], j
             )
 
 
@@ -270,11 +269,11 @@ def fill_rubbing_rows(motion):
     all others."""
     local = motion.local
     count = motion.contacts.shape[0]
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.PRESSED] <= 0:
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.PRESSED] <= 0:
             continue
         rate = motion.slide_rates[k]
-        motion.frictions[k, FrictionColumn.STRUCK] = (
+        motion.sided[k, PartColumn.STRUCK] = (
             FrictionImpact.FORWARDS
             if rate > 0.0
             else FrictionImpact.BACKWARDS
@@ -312,8 +311,8 @@ def friction_rate(motion, k):
     """The sliding speed of a friction, exactly 0 at rest."""
     if motion.multipliers > 0:
         return motion.slide_rates[k]
-    place = motion.frictions[k, FrictionColumn.COORDINATE]
-    return motion.velocities[place] - ground_speed(motion, k)
+    place = motion.sided[k, PartColumn.COORDINATE]
+    return motion.velocities[place] - guard_level(motion, k)
 
 
 @lean_jit
@@ -331,13 +330,13 @@ def slides_on(motion, near):
         if near >> i & 1:
             e = restitution(motion, i, i)
             speed = max(speed, abs(motion.rates[i]) * (1.0 + e) / (1.0 - e) if e < 1.0 else np.inf)
-    for k in range(motion.frictions.shape[0]):
-        i = motion.frictions[k, FrictionColumn.PRESSED] - 1
+    for k in range(motion.sided.shape[0]):
+        i = motion.sided[k, PartColumn.PRESSED] - 1
         if i >= 0 and near >> i & 1:
-            c = motion.frictions[k, FrictionColumn.COORDINATE]
+            c = motion.sided[k, PartColumn.COORDINATE]
             mu = rub_coefficient(motion, k)
             rate = abs(friction_rate(motion, k))
-            across = motion.contacts[i, ContactColumn.COORDINATE]
+            across = motion.contacts[i, PartColumn.COORDINATE]
             if motion.multipliers > 0:
                 own = motion.mobilities[motion.contacts.shape[0] + k]
                 other = gives(motion, motion.contacts.shape[0] + k, i)
@@ -359,17 +358,17 @@ def choose_ways(motion, chosen, acts, number):
     """Let each friction that has an impulse at an impact stick or slide, by the base-3 digits of
     `number`; False if another one has a digit other than 0. `impulses` are those that the contacts
     have besides those of the contacts in `acts`."""
-    for k in range(motion.frictions.shape[0]):
+    for k in range(motion.sided.shape[0]):
         digit, number, contact = (
             number % 3,
             number // 3,
-            motion.frictions[k, FrictionColumn.PRESSED] - 1,
+            motion.sided[k, PartColumn.PRESSED] - 1,
         )
         pushed = contact >= 0 and chosen >> contact & 1
         if pushed and (acts >> contact & 1 or motion.impulses[contact] > 0.0):
-            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.STUCK + digit
+            motion.sided[k, PartColumn.STRUCK] = FrictionImpact.STUCK + digit
         else:
-            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+            motion.sided[k, PartColumn.STRUCK] = FrictionImpact.NOT
             if digit > 0:
                 return False
     return True
@@ -387,12 +386,12 @@ def fill_sticking(motion, row, a, acts, last):
         if acts >> j & 1:
             block[row, column] = pushed(motion, a, j) if in_rows else push(motion, a, j)
             column += 1
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
             if in_rows:
                 block[row, column] = gives(motion, a, motion.contacts.shape[0] + k)
             else:
-                c = motion.frictions[k, FrictionColumn.COORDINATE]
+                c = motion.sided[k, PartColumn.COORDINATE]
                 block[row, column] = motion.inverse[a, c]
             column += 1
     block[row, column] = last
@@ -406,8 +405,8 @@ def unknown_impulses(motion, acts):
     size = 0
     for i in range(motion.contacts.shape[0]):
         size += acts >> i & 1
-    for k in range(motion.frictions.shape[0]):
-        size += 1 if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK else 0
+    for k in range(motion.sided.shape[0]):
+        size += 1 if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK else 0
     return size
 
 
@@ -435,16 +434,16 @@ def struck_velocities(motion, acts, after):
             fill_sticking(motion, row, i, acts, -motion.right[i] - rate_at(motion, i, after))
             row += 1
         elif acts >> i & 1:
-            a = motion.contacts[i, ContactColumn.COORDINATE]
+            a = motion.contacts[i, PartColumn.COORDINATE]
             fill_sticking(motion, row, a, acts, -motion.signs[i] * motion.right[i] - after[a])
             row += 1
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-            a = motion.frictions[k, FrictionColumn.COORDINATE]
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
+            a = motion.sided[k, PartColumn.COORDINATE]
             if in_rows:
                 fill_sticking(motion, row, count + k, acts, -rate_at(motion, count + k, after))
             else:
-                fill_sticking(motion, row, a, acts, ground_speed(motion, k) - after[a])
+                fill_sticking(motion, row, a, acts, guard_level(motion, k) - after[a])
             row += 1
     if not eliminate(motion.block, size, size + 1):
         return False
@@ -462,12 +461,12 @@ def add_unknown(motion, acts, after):
             if acts >> j & 1:
                 after[a] += push(motion, a, j) * motion.block[column, size]
                 column += 1
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+        for k in range(motion.sided.shape[0]):
+            if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
                 if motion.multipliers > 0:
                     gain = motion.pushes[a, motion.contacts.shape[0] + k]
                 else:
-                    gain = motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
+                    gain = motion.inverse[a, motion.sided[k, PartColumn.COORDINATE]]
                 after[a] += gain * motion.block[column, size]
                 column += 1
 
@@ -491,16 +490,15 @@ def worst_violation(motion, chosen, acts, after):
             if in_rows:
                 rate = rate_at(motion, i, after)
             else:
-                rate = motion.signs[i] * after[motion.contacts[i, ContactColumn.COORDINATE]]
+                rate = motion.signs[i] * after[motion.contacts[i, PartColumn.COORDINATE]]
             worst = max(worst, -rate - motion.right[i])
-    for k in range(motion.frictions.shape[0]):
-        way = motion.frictions[k, FrictionColumn.STRUCK]
-        c = motion.frictions[k, FrictionColumn.COORDINATE]
+    for k in range(motion.sided.shape[0]):
+        way = motion.sided[k, PartColumn.STRUCK]
+        c = motion.sided[k, PartColumn.COORDINATE]
         own = motion.mobilities[count + k] if in_rows else motion.inverse[c, c]
         if way == FrictionImpact.STUCK:
             most = (
-                rub_coefficient(motion, k)
-                * motion.tried[motion.frictions[k, FrictionColumn.PRESSED] - 1]
+                rub_coefficient(motion, k) * motion.tried[motion.sided[k, PartColumn.PRESSED] - 1]
             )
             worst = max(worst, (abs(motion.block[column, size]) - most) * own)
             column += 1
@@ -508,7 +506,7 @@ def worst_violation(motion, chosen, acts, after):
             if in_rows:
                 slides = rate_at(motion, count + k, after)
             else:
-                slides = after[c] - ground_speed(motion, k)
+                slides = after[c] - guard_level(motion, k)
             worst = max(worst, -slip_sign(motion, k) * slides)
     return worst
 

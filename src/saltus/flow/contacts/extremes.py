@@ -10,10 +10,11 @@ import numpy as np
 
 from saltus.flow.contacts.impacts import gap_series
 from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
+    PartColumn,
     SegmentEnd,
     SegmentExtremes,
     SegmentPlan,
+    Touch,
     contact_position,
 )
 from saltus.flow.kernel.layout import EventCode
@@ -99,7 +100,7 @@ def extremes_at_step(motion, t, h, begin, end, after_event, units, seen):
             seen[SegmentExtremes.BOTTOM] = min(seen[SegmentExtremes.BOTTOM], x)
     for i in range(count):
         guard = motion.gap_series
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             guard = motion.margin_series[i]
         else:
             gap_series(motion, i, contact_position(motion, i), order, guard)
@@ -110,7 +111,7 @@ def extremes_at_step(motion, t, h, begin, end, after_event, units, seen):
         find_minimum(motion, guard, t, h)
         place = (
             SegmentExtremes.FORCE
-            if motion.contacts[i, ContactColumn.CLOSED] == 1
+            if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
             else SegmentExtremes.GAP
         )
         inside = ENDS * (end - begin) < least[1] - begin < (1.0 - ENDS) * (end - begin)
@@ -138,8 +139,8 @@ def extremes_at_start(motion, hit, units, seen):
     seen[SegmentExtremes.TOP] = -np.inf
     for i in range(motion.contacts.shape[0]):
         pull = np.inf
-        coordinate = motion.contacts[i, ContactColumn.COORDINATE]
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        coordinate = motion.contacts[i, PartColumn.COORDINATE]
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             pull = motion.margin_series[i, 0] / unit_of(units, SegmentExtremes.PULL)
         elif i == hit and abs(motion.velocities[coordinate]) * time < AT_REST * length:
             pull = motion.signs[i] * motion.acceleration_series[coordinate, 0] * time**2 / length
@@ -155,8 +156,8 @@ def extremes_at_section(motion, t, units, seen):
     """
     count = motion.contacts.shape[0]
     for i in range(count):
-        closed = motion.contacts[i, ContactColumn.CLOSED] == 1
-        x = motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]]
+        closed = motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
+        x = motion.coordinates[motion.contacts[i, PartColumn.COORDINATE]]
         gap = motion.signs[i] * (x - contact_position(motion, i))
         value = motion.margin_series[i, 0] if closed else gap
         place = SegmentExtremes.FORCE if closed else SegmentExtremes.GAP
@@ -175,7 +176,7 @@ def extremes_at_end(motion, released, units, seen):
     for i in range(motion.contacts.shape[0]):
         reaction = motion.margin_series[i, 0] / unit_of(units, SegmentExtremes.TAIL)
         if (
-            motion.contacts[i, ContactColumn.CLOSED] == 1
+            motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
             and i != released
             and reaction < seen[SegmentExtremes.TAIL]
         ):
@@ -202,7 +203,7 @@ def gap_beside(motion, plan, s, duration, ends, units, seen):
         if i == hit or plan[s, SegmentPlan.ALONG] >> i & 1 or motion.coupling[i, hit] == 0.0:
             continue
         sign = motion.signs[i]
-        place = SegmentEnd.NUMBERS + motion.contacts[i, ContactColumn.COORDINATE]
+        place = SegmentEnd.NUMBERS + motion.contacts[i, PartColumn.COORDINATE]
         position = contact_position(motion, i)
         gap = sign * (ends[place + 4 * own] - position) / length
         if sign * (ends[place] - position) < AT_REST * length:

@@ -23,9 +23,11 @@ from saltus.flow.contacts.rows import (
 from saltus.flow.kernel.contact_layout import (
     PULLED,
     SPANNED,
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
+    PartColumn,
+    Reached,
+    Side,
+    Touch,
     first_flag,
     first_row,
     is_surface,
@@ -70,8 +72,8 @@ def fill_rows(motion):
     for i in range(count):
         for j in range(count):
             motion.coupling[i, j] = gives(motion, i, j)
-        closed = motion.contacts[i, ContactColumn.CLOSED] == 1
-        touches = closed or motion.contacts[i, ContactColumn.SKIP] > 0
+        closed = motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
+        touches = closed or motion.contacts[i, PartColumn.SKIP] > 0
         motion.gaps[i] = 0.0 if touches else row_gap(motion, i)
         motion.rates[i] = 0.0 if closed else told_rate(motion, i)
     return regular
@@ -81,9 +83,9 @@ def fill_rows(motion):
 def forget_idle(motion):
     """Let nothing be idle."""
     for i in range(motion.contacts.shape[0]):
-        motion.contacts[i, ContactColumn.IDLE] = 0
-    for k in range(motion.frictions.shape[0]):
-        motion.frictions[k, FrictionColumn.IDLE] = 0
+        motion.contacts[i, PartColumn.IDLE] = 0
+    for k in range(motion.sided.shape[0]):
+        motion.sided[k, PartColumn.IDLE] = 0
 
 
 @lean_jit
@@ -94,27 +96,27 @@ def mark_idle(motion, candidates, still):
     if independence(motion, -1, -1) <= SPANNED:
         return False
     for i in range(count):
-        opens = candidates >> i & 1 and motion.contacts[i, ContactColumn.CLOSED] == 0
+        opens = candidates >> i & 1 and motion.contacts[i, PartColumn.STATE] == Touch.OPEN
         if opens and independence(motion, -1, i) <= SPANNED:
-            motion.contacts[i, ContactColumn.CLOSED] = 1
-            motion.contacts[i, ContactColumn.IDLE] = 1
-    for k in range(motion.frictions.shape[0]):
-        row = motion.frictions[k]
+            motion.contacts[i, PartColumn.STATE] = Touch.CLOSED
+            motion.contacts[i, PartColumn.IDLE] = 1
+    for k in range(motion.sided.shape[0]):
+        row = motion.sided[k]
         if not has_speed(motion, k):
             continue
-        pressed = row[FrictionColumn.PRESSED] - 1
-        lifted = row[FrictionColumn.SLIDES] == 2
-        if lifted and pressed >= 0 and motion.contacts[pressed, ContactColumn.CLOSED] == 1:
+        pressed = row[PartColumn.PRESSED] - 1
+        lifted = row[PartColumn.STATE] == Side.OFF
+        if lifted and pressed >= 0 and motion.contacts[pressed, PartColumn.STATE] == Touch.CLOSED:
             # in an idle contact, which does not press it
             rate = motion.slide_rates[k]
-            row[FrictionColumn.SLIDES] = 1 if rate >= 0.0 else -1
+            row[PartColumn.STATE] = 1 if rate >= 0.0 else -1
             if rate == 0.0 and independence(motion, -1, count + k) > SPANNED:
                 return False
             lifted = False
-        resting = still >> k & 1 and abs(row[FrictionColumn.SLIDES]) == 1
+        resting = still >> k & 1 and abs(row[PartColumn.STATE]) == 1
         if resting and not lifted and independence(motion, -1, count + k) <= SPANNED:
-            row[FrictionColumn.IDLE] = row[FrictionColumn.SLIDES]
-            row[FrictionColumn.SLIDES] = 0
+            row[PartColumn.IDLE] = row[PartColumn.STATE]
+            row[PartColumn.STATE] = Side.HELD
     return True
 
 
@@ -139,9 +141,9 @@ def some_idle(motion):
     """Whether anything is idle."""
     found = False
     for i in range(motion.contacts.shape[0]):
-        found = found or motion.contacts[i, ContactColumn.IDLE] != 0
-    for k in range(motion.frictions.shape[0]):
-        found = found or motion.frictions[k, FrictionColumn.IDLE] != 0
+        found = found or motion.contacts[i, PartColumn.IDLE] != 0
+    for k in range(motion.sided.shape[0]):
+        found = found or motion.sided[k, PartColumn.IDLE] != 0
     return found
 
 
@@ -150,10 +152,10 @@ def all_idle_stay(motion):
     """`stays_idle` of all that are idle."""
     count = motion.contacts.shape[0]
     for i in range(count):
-        if motion.contacts[i, ContactColumn.IDLE] != 0 and not stays_idle(motion, i):
+        if motion.contacts[i, PartColumn.IDLE] != 0 and not stays_idle(motion, i):
             return False
-    for k in range(motion.frictions.shape[0]):
-        if motion.frictions[k, FrictionColumn.IDLE] != 0 and not stays_idle(motion, count + k):
+    for k in range(motion.sided.shape[0]):
+        if motion.sided[k, PartColumn.IDLE] != 0 and not stays_idle(motion, count + k):
             return False
     return True
 
@@ -176,16 +178,16 @@ def measure_slides(motion):
     count = motion.contacts.shape[0]
     struck = False
     for i in range(count):
-        struck = struck or motion.contacts[i, ContactColumn.SKIP] > 0
+        struck = struck or motion.contacts[i, PartColumn.SKIP] > 0
     struck = struck and motion.mode == Mode.CONTACT
-    for k in range(motion.frictions.shape[0]):
-        row = motion.frictions[k]
+    for k in range(motion.sided.shape[0]):
+        row = motion.sided[k]
         if is_surface(motion, k):
             continue
-        sticks = row[FrictionColumn.SLIDES] == 0
+        sticks = row[PartColumn.STATE] == Side.HELD
         if struck:
-            sticks = row[FrictionColumn.STRUCK] == FrictionImpact.STUCK
-        sticks = sticks or row[FrictionColumn.REACHED] == 3
+            sticks = row[PartColumn.STRUCK] == FrictionImpact.STUCK
+        sticks = sticks or row[PartColumn.REACHED] == Reached.GUARD
         motion.slide_rates[k] = 0.0 if sticks else told_rate(motion, count + k)
 
 
@@ -369,9 +371,9 @@ def row_step(motion, natural, longest):
     no step is longer than `longest`."""
     count = motion.contacts.shape[0]
     for r in range(motion.multipliers):
-        watched = r < count and motion.contacts[r, ContactColumn.CLOSED] == 0
+        watched = r < count and motion.contacts[r, PartColumn.STATE] == Touch.OPEN
         if r >= count and has_speed(motion, r - count):
-            watched = abs(motion.frictions[r - count, FrictionColumn.SLIDES]) == 1
+            watched = abs(motion.sided[r - count, PartColumn.STATE]) == 1
         if not watched:
             continue
         natural = guard_step(motion, row_series(motion, r), natural, longest)
@@ -395,7 +397,7 @@ def away_in_rows(motion, bits, tau, penetrated):
     """Whether, at the end of a step, a gap is negative, or one in `bits` that closes is not 0, by
     more than rounding of the terms of its series."""
     for i in range(motion.contacts.shape[0]):
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             continue
         gap = row_gap(motion, i)
         gap = -abs(gap) if bits >> i & 1 else gap

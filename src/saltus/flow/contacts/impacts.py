@@ -20,9 +20,11 @@ from saltus.flow.kernel.contact_layout import (
     MOST_FROZEN_IMPACTS,
     UNCOUPLED,
     VANISHED,
-    ContactColumn,
-    FrictionColumn,
     NoPress,
+    PartColumn,
+    Reached,
+    Side,
+    Touch,
     contact_position,
     first_flag,
     is_function,
@@ -47,8 +49,8 @@ def hold_coordinates(motion):
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     for i in range(motion.contacts.shape[0]):
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            motion.parameters[first + motion.contacts[i, ContactColumn.COORDINATE]] = 0.0
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
+            motion.parameters[first + motion.contacts[i, PartColumn.COORDINATE]] = 0.0
 
 
 @lean_jit
@@ -56,7 +58,7 @@ def closed_bits(motion):
     """The contacts that are closed, as bits."""
     bits = 0
     for i in range(motion.contacts.shape[0]):
-        bits |= motion.contacts[i, ContactColumn.CLOSED] << i
+        bits |= motion.contacts[i, PartColumn.STATE] << i
     return bits
 
 
@@ -82,7 +84,7 @@ def row_gap_series(motion, i, order, g):
 def coordinate_series(motion, i, order, g):
     """`gap_series` of a contact that holds a coordinate, at the position 0."""
     sign = motion.signs[i]
-    series = motion.coordinate_series[motion.contacts[i, ContactColumn.COORDINATE]]
+    series = motion.coordinate_series[motion.contacts[i, PartColumn.COORDINATE]]
     for k in range(order + 1):
         g[k] = sign * series[k]
 
@@ -90,10 +92,10 @@ def coordinate_series(motion, i, order, g):
 @lean_jit
 def measure_gap(motion, i):
     """Set the gap of a contact that is kept beside the coordinate."""
-    place = motion.contacts[i, ContactColumn.COORDINATE]
+    place = motion.contacts[i, PartColumn.COORDINATE]
     gap = motion.coordinates[place] - contact_position(motion, i)
     motion.open_gaps[i] = motion.signs[i] * gap
-    motion.contacts[i, ContactColumn.EXCESS] = 0
+    motion.contacts[i, PartColumn.EXCESS] = 0
 
 
 @lean_jit
@@ -101,10 +103,10 @@ def keep_gap(motion, i):
     """Keep the digits of a gap that the difference of the coordinate and the position does not have
     for the next call of the kernel."""
     position = contact_position(motion, i)
-    difference = motion.coordinates[motion.contacts[i, ContactColumn.COORDINATE]] - position
+    difference = motion.coordinates[motion.contacts[i, PartColumn.COORDINATE]] - position
     excess = (motion.open_gaps[i] - motion.signs[i] * difference) / (EXCESS * abs(position))
     if abs(excess) < MOST_EXCESS:
-        motion.contacts[i, ContactColumn.EXCESS] = int(excess)
+        motion.contacts[i, PartColumn.EXCESS] = int(excess)
     else:
         measure_gap(motion, i)
 
@@ -134,7 +136,7 @@ def contact_step_size(motion, t, target, size, with_columns):
     sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
     for i in range(motion.contacts.shape[0]):
         row = motion.contacts[i]
-        if row[ContactColumn.CLOSED] == 1 and row[ContactColumn.IDLE] == 0:
+        if row[PartColumn.STATE] == Touch.CLOSED and row[PartColumn.IDLE] == 0:
             r = motion.margin_series[i : i + 1]
             reaction = max(press_of(motion, i), abs(r[0, 0]))
             if reaction > 0.0:
@@ -161,9 +163,9 @@ def fill_contact_matrices(motion):
         motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse
     )
     for i in range(count):
-        a = motion.contacts[i, ContactColumn.COORDINATE]
+        a = motion.contacts[i, PartColumn.COORDINATE]
         for j in range(count):
-            b = motion.contacts[j, ContactColumn.COORDINATE]
+            b = motion.contacts[j, PartColumn.COORDINATE]
             motion.coupling[i, j] = signs[i] * signs[j] * motion.inverse[a, b]
         motion.gaps[i] = signs[i] * (motion.coordinates[a] - contact_position(motion, i))
         motion.rates[i] = signs[i] * motion.velocities[a]
@@ -274,7 +276,7 @@ def apply_impulses(motion):
     """Add the effect of the impulses to the velocities."""
     for i in range(motion.local):
         for j in range(motion.contacts.shape[0]):
-            gain = motion.inverse[i, motion.contacts[j, ContactColumn.COORDINATE]] * motion.signs[j]
+            gain = motion.inverse[i, motion.contacts[j, PartColumn.COORDINATE]] * motion.signs[j]
             motion.velocities[i] += gain * motion.impulses[j]
 
 
@@ -321,18 +323,18 @@ def settle_contact(motion, i, rate):
     """Put the coordinate of a contact that takes part in an impact exactly at its position, with
     the rate after the impact.
     """
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    coordinate = motion.contacts[i, PartColumn.COORDINATE]
     if motion.multipliers > 0:  # a closed one is kept at 0 as all that is held
-        motion.contacts[i, ContactColumn.IDLE] = 0
+        motion.contacts[i, PartColumn.IDLE] = 0
     else:
         motion.coordinates[coordinate] = contact_position(motion, i)
         motion.velocities[coordinate] = motion.signs[i] * rate + 0.0
         for j in range(motion.contacts.shape[0]):
-            if motion.contacts[j, ContactColumn.COORDINATE] == coordinate:
+            if motion.contacts[j, PartColumn.COORDINATE] == coordinate:
                 measure_gap(motion, j)
-    motion.contacts[i, ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
-    motion.contacts[i, ContactColumn.SKIP] = 1
-    motion.contacts[i, ContactColumn.RELEASED] = 0
+    motion.contacts[i, PartColumn.STATE] = 1 if rate == 0.0 else 0
+    motion.contacts[i, PartColumn.SKIP] = 1
+    motion.contacts[i, PartColumn.REACHED] = Reached.NO
 
 
 @lean_jit
@@ -530,21 +532,21 @@ def keep_sums(motion, near):
         lacking = 0.0
         for i in range(motion.contacts.shape[0]):
             if near >> i & 1:
-                place = motion.contacts[i, ContactColumn.COORDINATE]
+                place = motion.contacts[i, PartColumn.COORDINATE]
                 moved = contact_position(motion, i) - motion.coordinates[place]
                 lacking += motion.solver_numbers[d * local + place] * moved
         widest = -1
         room = 0.0
         for i in range(motion.contacts.shape[0]):
-            place = motion.contacts[i, ContactColumn.COORDINATE]
-            shut = near >> i & 1 or motion.contacts[i, ContactColumn.CLOSED] == 1
+            place = motion.contacts[i, PartColumn.COORDINATE]
+            shut = near >> i & 1 or motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
             if shut or place >= local - motion.first_order:
                 continue
             if motion.solver_numbers[d * local + place] != 0.0 and motion.open_gaps[i] > room:
                 widest = i
                 room = motion.open_gaps[i]
         if widest >= 0 and abs(lacking) < room:
-            place = motion.contacts[widest, ContactColumn.COORDINATE]
+            place = motion.contacts[widest, PartColumn.COORDINATE]
             moved = -lacking / motion.solver_numbers[d * local + place]
             motion.coordinates[place] += moved
             motion.open_gaps[widest] += motion.signs[widest] * moved
@@ -575,17 +577,17 @@ def contact_mobility(motion, i):
     if motion.multipliers > 0:
         entry = motion.mobilities[i]
         return entry if entry > 0.0 else 1.0
-    return mobility(motion, motion.contacts[i, ContactColumn.COORDINATE])
+    return mobility(motion, motion.contacts[i, PartColumn.COORDINATE])
 
 
 @lean_jit
 def friction_mobility(motion, k):
     """The acceleration along a friction or a surface by a force of 1 along it."""
-    row = motion.frictions[k]
+    row = motion.sided[k]
     if motion.multipliers > 0 and not is_surface(motion, k):
         entry = motion.mobilities[motion.contacts.shape[0] + k]
         return entry if entry > 0.0 else 1.0
-    return mobility(motion, row[FrictionColumn.COORDINATE])
+    return mobility(motion, row[PartColumn.COORDINATE])
 
 
 @lean_jit
@@ -609,9 +611,9 @@ def note_press(motion):
         if motion.multipliers > 0:
             press = abs(pull_of(motion, i))
         else:
-            coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+            coordinate = motion.contacts[i, PartColumn.COORDINATE]
             press = abs(motion.acceleration_series[coordinate, 0])
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             reaction = abs(motion.margin_series[i, 0])
             press = max(press, reaction * contact_mobility(motion, i))
         motion.press = max(motion.press, press)
@@ -621,19 +623,19 @@ def note_press(motion):
 def note_rubs(motion):
     """Note what presses on frictions and surfaces at the start of a step, and sliding speeds, for
     the natural scales."""
-    for k in range(motion.frictions.shape[0]):
-        inert = motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT
+    for k in range(motion.sided.shape[0]):
+        inert = motion.sided[k, PartColumn.PRESSED] == NoPress.INERT
         if inert or is_function(motion, k):
             continue
         if motion.multipliers > 0 and not is_surface(motion, k):
             press = abs(pull_of(motion, motion.contacts.shape[0] + k))
             speed = abs(motion.slide_rates[k])
         else:
-            coordinate = motion.frictions[k, FrictionColumn.COORDINATE]
+            coordinate = motion.sided[k, PartColumn.COORDINATE]
             press = abs(motion.acceleration_series[coordinate, 0])
             speed = abs(motion.velocities[coordinate])
         motion.swiftest = max(motion.swiftest, speed)
-        if motion.frictions[k, FrictionColumn.SLIDES] == 0:
+        if motion.sided[k, PartColumn.STATE] == Side.HELD:
             row = motion.contacts.shape[0] + 2 * k
             margin = max(abs(motion.margin_series[row, 0]), abs(motion.margin_series[row + 1, 0]))
             press = max(press, margin * friction_mobility(motion, k))
@@ -645,7 +647,7 @@ def only_open(contacts):
     """Whether the only guards known to be 0 are the gaps of contacts that have just opened."""
     known = True
     for i in range(contacts.shape[0]):
-        known = known and contacts[i, ContactColumn.SKIP] <= 1 - contacts[i, ContactColumn.CLOSED]
+        known = known and contacts[i, PartColumn.SKIP] <= 1 - contacts[i, PartColumn.STATE]
     return known
 
 
@@ -653,7 +655,7 @@ def only_open(contacts):
 def is_smooth(motion):
     """Whether a motion without friction, and not in eigenmodes, is on a smooth arc, with no guards
     known to be 0 but those of `only_open`."""
-    together = motion.frictions.shape[0] == 0 and motion.eigenmodes.size == 0
+    together = motion.sided.shape[0] == 0 and motion.eigenmodes.size == 0
     return motion.mode == Mode.ARC and together and only_open(motion.contacts)
 
 
@@ -665,9 +667,8 @@ def undecide(motion, opened):
     for i in range(motion.contacts.shape[0]):
         if opened >> i & 1 and motion.multipliers > 0:
             if told_rate(motion, i) == 0.0:
-                motion.contacts[i, ContactColumn.CLOSED] = 1
+                motion.contacts[i, PartColumn.STATE] = Touch.CLOSED
         elif (
-            opened >> i & 1
-            and motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] == 0.0
+            opened >> i & 1 and motion.velocities[motion.contacts[i, PartColumn.COORDINATE]] == 0.0
         ):
-            motion.contacts[i, ContactColumn.CLOSED] = 1
+            motion.contacts[i, PartColumn.STATE] = Touch.CLOSED

@@ -4,15 +4,15 @@ impacts, rest.
 The compiled parts of the files that `programs/compiled.py` names, of this file and of
 `programs/loop.py`, which calls it, are compiled as one module, once for every model. All of a
 motion's memory is in `motion` (see `kernel/memory.py`): `motion.contacts` has a row for each
-contact, in the columns of `ContactColumn`, and the last of `motion.parameters` say for each
+contact, in the columns of `PartColumn`, and the last of `motion.parameters` say for each
 coordinate whether it is free (1) or held (0).
 
 In a smooth step the closed contacts hold their coordinates, and the model's series are those of the
 constrained motion. Each contact has a guard: the gap if it is open, the reaction if it is closed.
 If a gap reaches 0, the impact law acts. After this, and if a reaction reaches 0 or the load jumps,
 it is decided again which of the contacts that are at rest at their positions stay closed. Frictions
-have rows behind those of the contacts (`frictions.py`), and it is decided together which of them
-stick.
+and surfaces have rows behind those of the contacts (`parts.py`), and it is decided together which of
+them stick.
 """
 
 from __future__ import annotations
@@ -30,25 +30,8 @@ from saltus.flow.contacts.closings import (
     rests_in_a_row,
 )
 from saltus.flow.contacts.complementarity import is_pressed, slides_on
-from saltus.flow.contacts.frictions import (
-    all_stand,
-    any_to_read,
-    begin_on_surfaces,
-    choose_sides,
-    first_friction,
-    friction_step_size,
-    hold_frictions,
-    note_jumps,
-    on_surfaces,
-    reach_ground_speed,
-    record_slides,
-    slide_bits,
-    slides_before,
-    stick_columns,
-    sticking,
-    tear_loose,
-    undecided,
-)
+from saltus.flow.contacts.frictions import all_stand, stick_columns, sticking, tear_loose
+from saltus.flow.contacts.functions import any_to_read, choose_sides, note_jumps
 from saltus.flow.contacts.held_rows import (
     away_in_rows,
     end_in_rows,
@@ -74,6 +57,14 @@ from saltus.flow.contacts.impacts import (
     slow_impacts,
     smaller_set,
 )
+from saltus.flow.contacts.part_events import (
+    first_sided,
+    reach_guard,
+    record_sides,
+    sided_step_size,
+    undecided,
+)
+from saltus.flow.contacts.parts import hold_sides, side_bits, states_before
 from saltus.flow.contacts.propagators import (
     carries_columns,
     carry_columns,
@@ -81,12 +72,7 @@ from saltus.flow.contacts.propagators import (
     columns_from_modes,
     input_step,
 )
-from saltus.flow.contacts.resets import (
-    keep_reached,
-    lead_to_events,
-    reset_state,
-    resets_state,
-)
+from saltus.flow.contacts.resets import keep_reached, lead_to_events, reset_state, resets_state
 from saltus.flow.contacts.rows import has_speed, largest_pull, limits_begin, row_series
 from saltus.flow.contacts.rubbing import (
     free_pulls,
@@ -95,6 +81,7 @@ from saltus.flow.contacts.rubbing import (
     turns_with,
     unknown_shifts,
 )
+from saltus.flow.contacts.surfaces import begin_on_surfaces, on_surfaces
 from saltus.flow.contacts.tangent import (
     accumulation_shifts,
     event_shifts,
@@ -110,14 +97,16 @@ from saltus.flow.kernel.contact_layout import (
     NEAR,
     TIED,
     TRIED_AGAIN,
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
-    NoMargin,
+    Guard,
     NoPress,
+    PartColumn,
+    PartKind,
+    Reached,
+    Touch,
     contact_position,
     first_flag,
-    ground_speed,
+    guard_level,
     is_function,
     solver_arrays,
 )
@@ -179,9 +168,9 @@ def end_accumulation_of(motion, t):
         if 0.0 < motion.rates[i] <= below and motion.gaps[i] == 0.0:
             slowest = motion.rates[i]
             last = i
-    if last < 0 or motion.contacts[last, ContactColumn.WAITS] > 0:
+    if last < 0 or motion.contacts[last, PartColumn.WAITS] > 0:
         if last >= 0:
-            motion.contacts[last, ContactColumn.WAITS] -= 1
+            motion.contacts[last, PartColumn.WAITS] -= 1
         return t
     free_pulls(motion, t)
     near = near_contacts(motion, slow)
@@ -217,7 +206,7 @@ def end_accumulation_of(motion, t):
             again = rest_after(motion, near, -1, limit)
             left = again if again >= 0.0 else left + again
     if left < 0.0:
-        motion.contacts[last, ContactColumn.WAITS] = int(-left) // TRIED_AGAIN
+        motion.contacts[last, PartColumn.WAITS] = int(-left) // TRIED_AGAIN
         return t
     if motion.columns > 0:
         if turns:
@@ -241,8 +230,8 @@ def decide_columns(motion, t):
             motion.parameters[i] = 1.0
         start_columns(motion, t, closed_bits(motion))
         hold_coordinates(motion)
-        hold_frictions(motion)
-    if motion.frictions.shape[0] > 0 or motion.multipliers > 0:
+        hold_sides(motion)
+    if motion.sided.shape[0] > 0 or motion.multipliers > 0:
         if is_pressed(motion) or motion.multipliers > 0:
             fill_contact_matrices(motion)
         fill_slopes(motion)
@@ -284,7 +273,7 @@ def choose_all(motion, candidates, still, held, t):
         if not choose_holding(motion, candidates, still, held, t):
             return False
         hold_coordinates(motion)
-        hold_frictions(motion)
+        hold_sides(motion)
         moved = begin_on_surfaces(motion, t) if on else 1
         if read and moved > 0:
             turned = choose_sides(motion, t)
@@ -306,21 +295,21 @@ def first_press(motion, t):
     for i in range(motion.local):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
-    for row in range(motion.contacts.shape[0] + motion.frictions.shape[0]):
+    for row in range(motion.contacts.shape[0] + motion.sided.shape[0]):
         place = 0
         if row < motion.contacts.shape[0]:
-            place = motion.contacts[row, ContactColumn.COORDINATE]
+            place = motion.contacts[row, PartColumn.COORDINATE]
         else:
             k = row - motion.contacts.shape[0]
-            inert = motion.frictions[k, FrictionColumn.PRESSED] == NoPress.INERT
+            inert = motion.sided[k, PartColumn.PRESSED] == NoPress.INERT
             if inert or is_function(motion, k):
                 continue
-            place = motion.frictions[k, FrictionColumn.COORDINATE]
+            place = motion.sided[k, PartColumn.COORDINATE]
         a = motion.acceleration_series[place]
         size = max(abs(a[0]), abs(a[1]) * span, 2.0 * abs(a[2]) * span * span)
         motion.press = max(motion.press, size)
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
 
 
 @lean_jit
@@ -334,7 +323,7 @@ def first_row_press(motion, t, span):
         if r < motion.contacts.shape[0] or has_speed(motion, r - motion.contacts.shape[0]):
             motion.press = max(motion.press, largest_pull(motion, r, span))
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
 
 
 @lean_jit
@@ -361,7 +350,7 @@ def decide_contacts(motion):
         first_press(motion, t)
     settled = end_accumulation_of(motion, t)
     candidates = closed_bits(motion)
-    before = slides_before(motion)
+    before = states_before(motion)
     fill_contact_matrices(motion)
     still = undecided(motion)
     held = sticking(motion, before)
@@ -373,7 +362,7 @@ def decide_contacts(motion):
     if motion.multipliers > 0 and is_undetermined(motion, candidates, still, held, t):
         return Status.NOT_UNIQUE
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
     opened = candidates & ~closed_bits(motion)
     if opened and motion.leave_by == 0:
         for i in range(count):
@@ -384,29 +373,29 @@ def decide_contacts(motion):
                 else:
                     note_shifts(motion, motion.shifts)
     if motion.leave_by == 0:
-        record_slides(motion, before, t)
+        record_sides(motion, before, t)
     if motion.multipliers > 0:
-        for k in range(motion.frictions.shape[0]):
-            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+        for k in range(motion.sided.shape[0]):
+            motion.sided[k, PartColumn.STRUCK] = FrictionImpact.NOT
         onto_rows(motion)
     decide_columns(motion, t)
     motion.leave_by = 0
     motion.rested = 1 if all_stand(motion) else 0
     for i in range(count):
-        motion.contacts[i, ContactColumn.RELEASED] = 0
-    for k in range(motion.frictions.shape[0]):
-        motion.frictions[k, FrictionColumn.REACHED] = 0
+        motion.contacts[i, PartColumn.REACHED] = Reached.NO
+    for k in range(motion.sided.shape[0]):
+        motion.sided[k, PartColumn.REACHED] = Reached.NO
         if is_function(motion, k):
-            motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+            motion.sided[k, PartColumn.STRUCK] = FrictionImpact.NOT
     if motion.rested == 1 and not rested:
         all_bits = closed_bits(motion)
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.PRESSED] != NoPress.INERT:
+        for k in range(motion.sided.shape[0]):
+            if motion.sided[k, PartColumn.PRESSED] != NoPress.INERT:
                 all_bits |= 1 << (count + k)
         record_contact_event(motion, EventCode.REST, all_bits, settled)
         note_shifts(motion, motion.event_shifts)
     motion.mode = Mode.REST if motion.rested == 1 else Mode.ARC
-    motion.side = 1 + (closed_bits(motion) | slide_bits(motion, count))
+    motion.side = 1 + (closed_bits(motion) | side_bits(motion, count))
     return Status.PAUSED
 
 
@@ -430,10 +419,10 @@ def first_guard(motion, h, whole):
     first = NEVER
     shorter = False
     for i in range(count):
-        skip = motion.contacts[i, ContactColumn.SKIP]
+        skip = motion.contacts[i, PartColumn.SKIP]
         guard = motion.gap_series
-        if motion.contacts[i, ContactColumn.CLOSED] == 1:
-            if motion.contacts[i, ContactColumn.IDLE] == 1:
+        if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
+            if motion.contacts[i, PartColumn.IDLE] == 1:
                 continue
             guard = motion.margin_series[i]
             if skip == 0 and guard[0] < -ZERO * press_of(motion, i):
@@ -467,11 +456,11 @@ def earlier_guard(motion, h, hit, rubs, first):
     rounding of a series that is scaled to the step.
     """
     for i in range(motion.contacts.shape[0]):
-        open_beside = i != hit and motion.contacts[i, ContactColumn.CLOSED] == 0
+        open_beside = i != hit and motion.contacts[i, PartColumn.STATE] == Touch.OPEN
         if not open_beside or not 0.0 < first < SMALL_SHARE:
             continue
         open_gap_series(motion, i, motion.order, motion.gap_series)
-        skip = motion.contacts[i, ContactColumn.SKIP]
+        skip = motion.contacts[i, PartColumn.SKIP]
         kind, share, _ = contact_root(
             motion.gap_series, skip, motion.order, first * h, motion.polynomial
         )
@@ -492,7 +481,7 @@ def contacts_closing_with(motion, hit, tau):
     bits = 1 << hit
     g = motion.gap_series
     for i in range(count):
-        if i == hit or motion.contacts[i, ContactColumn.CLOSED] == 1:
+        if i == hit or motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
             continue
         open_gap_series(motion, i, order, g)
         size = (
@@ -522,17 +511,17 @@ def short_order(motion, t):
     fast = FAST_IMPACT * natural_speed(motion)
     radius = RADIUS * time_scale(motion)
     for i in range(motion.contacts.shape[0]):
-        rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
+        rate = motion.signs[i] * motion.velocities[motion.contacts[i, PartColumn.COORDINATE]]
         if (
-            motion.contacts[i, ContactColumn.CLOSED] == 0
-            and motion.contacts[i, ContactColumn.SKIP] == 1
+            motion.contacts[i, PartColumn.STATE] == Touch.OPEN
+            and motion.contacts[i, PartColumn.SKIP] == 1
             and 0.0 < rate < fast
         ):
             if flight == np.inf:
                 expand(motion, t, 1.0, 0)
             pull = (
                 motion.signs[i]
-                * motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE], 0]
+                * motion.acceleration_series[motion.contacts[i, PartColumn.COORDINATE], 0]
             )
             if pull < 0.0:
                 flight = min(flight, -2.0 * rate / pull)
@@ -563,11 +552,11 @@ def seek_event(motion, t, target):
     natural = contact_step_size(motion, t, target, size, not carried)
     if carried and natural > 0.0:
         natural = min(natural, input_step(motion, order, min(natural, target - t)))
-    natural = friction_step_size(motion, count, natural, target - t)
+    natural = sided_step_size(motion, count, natural, target - t)
     h = min(natural, target - t)
     whole = h == natural
     hit, first, shorter = first_guard(motion, h, whole)
-    rubs, first_rub, which, shorter_rub = first_friction(motion, count, h, whole)
+    rubs, first_rub, which, shorter_rub = first_sided(motion, count, h, whole)
     if rubs >= 0 and first_rub < first:
         hit = -1
         first = first_rub
@@ -597,7 +586,10 @@ def keep_gaps(motion, tau):
     """Take the gaps of open contacts that are not at 0 to `tau` within the step."""
     g = motion.gap_series
     for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
-        if contact_position(motion, i) != 0.0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
+        if (
+            contact_position(motion, i) != 0.0
+            and motion.contacts[i, PartColumn.STATE] == Touch.OPEN
+        ):
             open_gap_series(motion, i, motion.order, g)
             motion.open_gaps[i] = horner(g, motion.order, tau)
 
@@ -606,7 +598,10 @@ def keep_gaps(motion, tau):
 def measure_gaps(motion):
     """Set the gaps of contacts that are closed, or at 0, and keep those of the others."""
     for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
-        if contact_position(motion, i) == 0.0 or motion.contacts[i, ContactColumn.CLOSED] == 1:
+        if (
+            contact_position(motion, i) == 0.0
+            or motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
+        ):
             measure_gap(motion, i)
         else:
             keep_gap(motion, i)
@@ -626,7 +621,7 @@ def note_hit(motion, bits, tau):
                 speed = speed * tau + k * series[k]
             note_impact(motion, speed, pull)
         elif bits >> i & 1:
-            place = motion.contacts[i, ContactColumn.COORDINATE]
+            place = motion.contacts[i, PartColumn.COORDINATE]
             speed, pull = value_and_slope(motion.velocity_series[place], motion.order, tau)
             note_impact(motion, speed, pull)
 
@@ -639,20 +634,20 @@ def passes(motion, bits, rubs, tau):
     """
     # gaps of rows are looked at in `away_in_rows`
     first = motion.contacts.shape[0] if motion.multipliers > 0 else 0
-    for row in range(first, motion.contacts.shape[0] + motion.frictions.shape[0]):
+    for row in range(first, motion.contacts.shape[0] + motion.sided.shape[0]):
         i = row
         k = row - motion.contacts.shape[0]
         place = 0
         position = 0.0
         gap = 0.0
-        if k < 0 and motion.contacts[i, ContactColumn.CLOSED] == 0:
-            place = motion.contacts[i, ContactColumn.COORDINATE]
+        if k < 0 and motion.contacts[i, PartColumn.STATE] == Touch.OPEN:
+            place = motion.contacts[i, PartColumn.COORDINATE]
             position = contact_position(motion, i)
             gap = motion.signs[i] * (motion.coordinates[place] - position)
             gap = -abs(gap) if bits >> i & 1 else gap
-        if k >= 0 and k == rubs and motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.SURFACE:
-            place = motion.frictions[k, FrictionColumn.COORDINATE]
-            position = ground_speed(motion, k)
+        if k >= 0 and k == rubs and motion.sided[k, PartColumn.KIND] == PartKind.SURFACE:
+            place = motion.sided[k, PartColumn.COORDINATE]
+            position = guard_level(motion, k)
             gap = -abs(motion.coordinates[place] - position)
         if gap < 0.0 and is_away(motion, gap, place, position, tau):
             return True
@@ -677,7 +672,7 @@ def contact_arc(motion, target):
     found = hit >= 0 or rubs >= 0
     tau = first * h if found or limit >= 0 else h
     bits = 0
-    if hit >= 0 and motion.contacts[hit, ContactColumn.CLOSED] == 0:
+    if hit >= 0 and motion.contacts[hit, PartColumn.STATE] == Touch.OPEN:
         bits = contacts_closing_with(motion, hit, tau)
     note_hit(motion, bits, tau)
     keep_gaps(motion, tau)
@@ -688,7 +683,7 @@ def contact_arc(motion, target):
     if found or limit >= 0:
         settle(motion)
     measure_gaps(motion)
-    passed = passes(motion, bits, rubs if which == 2 else -1, tau)
+    passed = passes(motion, bits, rubs if which == Guard.ITSELF else -1, tau)
     if motion.multipliers > 0 and finite:
         motion.time = t + tau
         finite = end_in_rows(motion, tau)
@@ -704,11 +699,11 @@ def contact_arc(motion, target):
         return Status.PASSED
     motion.time = target if not found and limit < 0 and h == target - t else t + tau
     for i in range(count):
-        motion.contacts[i, ContactColumn.SKIP] = 0
-    for k in range(motion.frictions.shape[0]):
+        motion.contacts[i, PartColumn.SKIP] = 0
+    for k in range(motion.sided.shape[0]):
         # at an event at the same instant as the last one, what has just begun to slide goes on
         if tau > 0.0 or k == rubs or bits != 0:
-            motion.frictions[k, FrictionColumn.SKIP] = 0
+            motion.sided[k, PartColumn.SKIP] = 0
     if bits != 0:  # the sign is the bit of the 64th contact
         note_jumps(motion)
         motion.mode = Mode.CONTACT
@@ -718,13 +713,13 @@ def contact_arc(motion, target):
         if motion.columns > 0:
             release_columns(motion, motion.time, hit)
         motion.mode = Mode.CONTACT
-        motion.contacts[hit, ContactColumn.RELEASED] = 1 if first > 0.0 else 0
+        motion.contacts[hit, PartColumn.REACHED] = Reached.FIRST if first > 0.0 else Reached.NO
         if first > 0.0:
             tear_loose(motion, hit)
     if rubs >= 0:
         fill_slopes(motion)
         resets = resets_state(motion, rubs, which)
-        reach_ground_speed(motion, count, motion.time, rubs, which, first > 0.0)
+        reach_guard(motion, count, motion.time, rubs, which, first > 0.0)
         motion.mode = Mode.CONTACT
         if resets:
             return reset_state(motion, rubs, motion.time)
@@ -747,13 +742,13 @@ def begin(motion):
         note_terms(motion)
         measure_slides(motion)
     for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
-        excess = motion.contacts[i, ContactColumn.EXCESS]
+        excess = motion.contacts[i, PartColumn.EXCESS]
         measure_gap(motion, i)
         if excess != 0:
             motion.open_gaps[i] += excess * EXCESS * abs(contact_position(motion, i))
-            motion.contacts[i, ContactColumn.EXCESS] = excess
+            motion.contacts[i, PartColumn.EXCESS] = excess
     hold_coordinates(motion)
-    hold_frictions(motion)
+    hold_sides(motion)
 
 
 @lean_jit
@@ -767,7 +762,7 @@ def spare_events(motion):
     """The number of events that one pass may record at most: impacts, or ends of accumulations and
     releases, of all contacts, what all frictions do, and a rest.
     """
-    return 4 + 2 * (motion.contacts.shape[0] + motion.frictions.shape[0])
+    return 4 + 2 * (motion.contacts.shape[0] + motion.sided.shape[0])
 
 
 @lean_jit
@@ -779,14 +774,14 @@ def at_corner(motion):
         forget(motion)
         return
     columns_to_corner(motion, 1.0)
-    if closed_bits(motion) == 0 and motion.frictions.shape[0] == 0:
+    if closed_bits(motion) == 0 and motion.sided.shape[0] == 0:
         columns_from_corner(motion, 1.0)
 
 
 @lean_jit
 def one_pass(motion, target, t_end):
     """A step up to `target` at most, or a decision. Returns PAUSED, or why the motion ends."""
-    held = closed_bits(motion) != 0 or motion.frictions.shape[0] > 0
+    held = closed_bits(motion) != 0 or motion.sided.shape[0] > 0
     if motion.new_piece > 0 and held and motion.mode != Mode.CONTACT:
         motion.mode = Mode.CONTACT
         note_jumps(motion)

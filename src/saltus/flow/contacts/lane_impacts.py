@@ -12,7 +12,7 @@ closed contacts. Lanes in which neither is a solution are solved one at a time (
 
 from __future__ import annotations
 
-from saltus.flow.kernel.contact_layout import ContactColumn
+from saltus.flow.kernel.contact_layout import PartColumn, Touch
 from saltus.flow.kernel.layout import LEAST_LOSS
 from saltus.flow.lane_steps.memory import Closing
 from saltus.taylor import inline_jit, lean_jit
@@ -27,8 +27,8 @@ def write_closed(lane, contacts):
     for d in range(lane.sizes.local):
         lane.free[d] = 1.0
     for i in range(contacts.shape[0]):
-        if contacts[i, ContactColumn.CLOSED] == 1:
-            lane.free[contacts[i, ContactColumn.COORDINATE]] = 0.0
+        if contacts[i, PartColumn.STATE] == Touch.CLOSED:
+            lane.free[contacts[i, PartColumn.COORDINATE]] = 0.0
 
 
 @lean_jit
@@ -43,10 +43,10 @@ def read_contacts(lane, contacts):
         coordinate = lane.sizes.coordinates[i]
         there = lane.position[coordinate] == lane.contacts[i]
         free = lane.free[coordinate] > 0.5
-        contacts[i, ContactColumn.COORDINATE] = coordinate
-        contacts[i, ContactColumn.CLOSED] = 1 if there and not free else 0
-        contacts[i, ContactColumn.SKIP] = 1 if there and free else 0
-        contacts[i, ContactColumn.RELEASED] = contacts[i, ContactColumn.EXCESS] = 0
+        contacts[i, PartColumn.COORDINATE] = coordinate
+        contacts[i, PartColumn.STATE] = 1 if there and not free else 0
+        contacts[i, PartColumn.SKIP] = 1 if there and free else 0
+        contacts[i, PartColumn.REACHED] = contacts[i, PartColumn.EXCESS] = 0
 
 
 @inline_jit

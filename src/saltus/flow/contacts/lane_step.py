@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from saltus.flow.contacts.lane_impacts import closed_lanes, resolve_impacts, write_closed
 from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
-    NoMargin,
     NoPress,
+    PartColumn,
+    PartKind,
+    Reached,
+    Side,
 )
 from saltus.flow.kernel.layout import Mode
 from saltus.flow.lane_steps.memory import FAST, Gap, Step, Stretch
@@ -83,11 +84,11 @@ def begin_contact(lane, env, state):
         lane.contacts[i] = position
         gap = sign * (state[coordinate] - position)
         rate = sign * state[state.size // 2 + coordinate]
-        contacts[i, ContactColumn.COORDINATE] = coordinate
-        contacts[i, ContactColumn.CLOSED] = 1 if gap == 0.0 and rate == 0.0 else 0
-        contacts[i, ContactColumn.SKIP] = 1 if gap == 0.0 else 0
-        contacts[i, ContactColumn.RELEASED] = 0
-        contacts[i, ContactColumn.WAITS] = contacts[i, ContactColumn.EXCESS] = 0
+        contacts[i, PartColumn.COORDINATE] = coordinate
+        contacts[i, PartColumn.STATE] = 1 if gap == 0.0 and rate == 0.0 else 0
+        contacts[i, PartColumn.SKIP] = 1 if gap == 0.0 else 0
+        contacts[i, PartColumn.REACHED] = Reached.NO
+        contacts[i, PartColumn.WAITS] = contacts[i, PartColumn.EXCESS] = 0
         if not (gap > 0.0 or (gap == 0.0 and rate >= 0.0)):
             mode = Mode.BEYOND
         elif gap == 0.0 and mode == Mode.ARC:
@@ -104,20 +105,22 @@ def begin_contact(lane, env, state):
         if not surface:
             beyond = rate
         beyond -= solved[solved.size - sizes.frictions + k]
-        row[FrictionColumn.COORDINATE] = coordinate
-        row[FrictionColumn.SKIP] = 0
-        row[FrictionColumn.SLIDES] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
-        row[FrictionColumn.MARGIN] = row[FrictionColumn.REACHED] = 0
+        row[PartColumn.COORDINATE] = coordinate
+        row[PartColumn.SKIP] = 0
+        row[PartColumn.STATE] = 1 if beyond > 0.0 else -1 if beyond < 0.0 else 0
+        row[PartColumn.KIND] = PartKind.FRICTION
+        row[PartColumn.MARGIN] = 0
+        row[PartColumn.REACHED] = Reached.NO
         if surface:
-            row[FrictionColumn.MARGIN] = NoMargin.SURFACE
+            row[PartColumn.KIND] = PartKind.SURFACE
             if beyond == 0.0:
-                row[FrictionColumn.SLIDES] = -1 if rate < 0.0 else 1
-        elif row[FrictionColumn.PRESSED] == NoPress.INERT:
-            row[FrictionColumn.SLIDES] = 2
+                row[PartColumn.STATE] = -1 if rate < 0.0 else 1
+        elif row[PartColumn.PRESSED] == NoPress.INERT:
+            row[PartColumn.STATE] = Side.OFF
         if function:  # the kernel reads its side
-            row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
-            row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED
-            row[FrictionColumn.SLIDES] = 1
+            row[PartColumn.KIND] = PartKind.FUNCTION
+            row[PartColumn.STRUCK] = FrictionImpact.JUMPED
+            row[PartColumn.STATE] = Side.ABOVE
         mode = Mode.CONTACT if mode == Mode.ARC else mode
     lane.leave_by = 1 if mode == Mode.CONTACT else 0  # derivatives are then one-sided
     write_closed(lane, contacts[:count])

@@ -239,7 +239,7 @@ def equations_of_one_free(trace: Trace, margins: list[Expr]) -> OneFree | None:
         len(trace.signs) < 2
         # of many it is rare that only one is free, and the equation would choose among as many
         or own > MOST_TRIED
-        or trace.friction_coordinates
+        or trace.sided
         or sorted(trace.contact_coordinates) != list(range(own))
         or trace.columns
     ):

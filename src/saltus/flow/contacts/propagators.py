@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from saltus.flow.kernel.contact_layout import ContactColumn
+from saltus.flow.kernel.contact_layout import PartColumn
 from saltus.flow.kernel.layout import ROUGHER
 from saltus.flow.kernel.steps import drive_mode, inputs_of_modes, places_of_modes
 from saltus.taylor import lean_jit
@@ -283,7 +283,7 @@ def begin_remainders(motion, contact, power, slopes):
     """Note what the series of the columns of parameters have in front of the terms from the p-th
     power on, at the start of an excursion: they begin at 0, with an acceleration.
     """
-    place = motion.contacts[contact, ContactColumn.COORDINATE]
+    place = motion.contacts[contact, PartColumn.COORDINATE]
     for j in range(2 * motion.own, motion.columns):
         if power == 3:
             slopes[j] = 0.5 * motion.acceleration_series[motion.own * (1 + j) + place, 0]
@@ -294,7 +294,7 @@ def parameter_remainders(motion, contact, span, slopes):
     """The displacement of a contact's coordinate in the columns of parameters at the end of an
     excursion, without the first p terms of its series.
     """
-    place = motion.contacts[contact, ContactColumn.COORDINATE]
+    place = motion.contacts[contact, PartColumn.COORDINATE]
     for j in range(2 * motion.own, motion.columns):
         slopes[j] = motion.coordinates[motion.own * (1 + j) + place] - slopes[j] * span * span
 
@@ -341,7 +341,7 @@ def state_remainders(motion, contact, power, span, slopes):
     states = 2 * own
     table = motion.eigenmodes
     values, _, _, vectors, _, _, _ = places_of_modes(motion)
-    place = vectors + motion.contacts[contact, ContactColumn.COORDINATE] * states
+    place = vectors + motion.contacts[contact, PartColumn.COORDINATE] * states
     for j in range(states):
         slopes[j] = 0.0
     row = 0

@@ -6,6 +6,11 @@ The values of the map, and its derivatives along the tangent's columns, are amon
 are taken at the event: there the columns hold u + v dt and z + a dt, with the event's shift dt, so
 that the derivatives of the map make of them what they are after it.
 
+A surface with a reset has the number of the reset in RESETS, and answers the questions 7 and 8 of
+`parts.py` here: its event resets the state (`reset_state`), behind which all sides are read anew
+(`read_sides`) and contacts may be hit (`place_contacts`). At the instant of another event it keeps
+its side and has its own event next (`keep_reached`, `lead_to_events`).
+
 Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
 `flow/kernel/memory.py`.
 """
@@ -13,28 +18,26 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 from __future__ import annotations
 
 from saltus.flow.contacts.closings import contact_impact
-from saltus.flow.contacts.frictions import (
-    IS_ON,
-    VANISHES,
-    note_jumps,
-    sliding_series,
-    span_of_terms,
-)
+from saltus.flow.contacts.functions import IS_ON, VANISHES, note_jumps, span_of_terms
 from saltus.flow.contacts.impacts import (
     fill_contact_matrices,
     jump_place,
     measure_gap,
     record_contact_event,
 )
+from saltus.flow.contacts.parts import guard_series
 from saltus.flow.contacts.tangent import fill_slopes, note_shifts, slope
 from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
+    Guard,
+    Kept,
+    PartColumn,
+    Reached,
+    Touch,
     contact_position,
-    ground_speed,
+    guard_level,
     is_function,
-    is_relay,
+    is_remembered,
     is_surface,
     jumping,
 )
@@ -55,9 +58,9 @@ DISAGREES = 2.0**-30
 @lean_jit
 def resets_state(motion, k, which):
     """Whether the motion, at the event of a guard, is at a surface that resets its state."""
-    resets = motion.frictions[k, FrictionColumn.RESETS]
-    slides = motion.frictions[k, FrictionColumn.SLIDES]
-    return which == 2 and resets * slides < 0
+    resets = motion.sided[k, PartColumn.RESETS]
+    slides = motion.sided[k, PartColumn.STATE]
+    return which == Guard.ITSELF and resets * slides < 0
 
 
 @lean_jit
@@ -73,14 +76,12 @@ def reset_state(motion, k, t):
     if some_disagree(motion, k, t):
         return Status.UNORDERED
     expand(motion, t, 1.0, motion.order)
-    sliding_series(
-        motion, k, 1.0 * motion.frictions[k, FrictionColumn.SLIDES], 0, motion.gap_series
-    )
+    guard_series(motion, k, 1.0 * motion.sided[k, PartColumn.STATE], 0, motion.gap_series)
     before = motion.gap_series[0]
     record_contact_event(motion, EventCode.CROSSING, 1 << (motion.contacts.shape[0] + k), t)
     note_shifts(motion, motion.shifts)
     fill_contact_matrices(motion)
-    number = abs(motion.frictions[k, FrictionColumn.RESETS]) - 1
+    number = abs(motion.sided[k, PartColumn.RESETS]) - 1
     first = jump_place(motion, motion.contacts.shape[0], 0) + 2 * own * number
     if motion.columns > 0:
         fill_slopes(motion)
@@ -138,16 +139,16 @@ def follows_at_once(motion, k, t):
 def would_reset(motion, k):
     """Whether a row is that of a surface that resets the state where the motion goes on through
     it."""
-    resets = motion.frictions[k, FrictionColumn.RESETS]
-    return resets * motion.frictions[k, FrictionColumn.SLIDES] < 0
+    resets = motion.sided[k, PartColumn.RESETS]
+    return resets * motion.sided[k, PartColumn.STATE] < 0
 
 
 @lean_jit
 def size_of_guard(motion, k):
     """The size of the terms of a surface's guard, whose series on its side is in `gap_series`
     afterwards."""
-    side = 1.0 * motion.frictions[k, FrictionColumn.SLIDES]
-    sliding_series(motion, k, side, motion.order, motion.gap_series)
+    side = 1.0 * motion.sided[k, PartColumn.STATE]
+    guard_series(motion, k, side, motion.order, motion.gap_series)
     unit = span_of_terms(motion)
     size = 0.0
     power = 1.0
@@ -163,8 +164,8 @@ def is_at(motion, k):
     in `gap_series` afterwards."""
     bound = IS_ON * size_of_guard(motion, k)
     if not is_function(motion, k):
-        place = motion.coordinates[motion.frictions[k, FrictionColumn.COORDINATE]]
-        bound += RESET_ROUNDING * (abs(place) + abs(ground_speed(motion, k)))
+        place = motion.coordinates[motion.sided[k, PartColumn.COORDINATE]]
+        bound += RESET_ROUNDING * (abs(place) + abs(guard_level(motion, k)))
     return abs(motion.gap_series[0]) <= bound
 
 
@@ -176,19 +177,19 @@ def keep_reached(motion, t):
     """
     found = False
     expanded = False
-    for k in range(motion.frictions.shape[0]):
-        row = motion.frictions[k]
-        passes_on = row[FrictionColumn.KEPT] == 2
-        row[FrictionColumn.KEPT] = 0
-        begins = motion.leave_by != 0 or row[FrictionColumn.REACHED] != 0
+    for k in range(motion.sided.shape[0]):
+        row = motion.sided[k]
+        passes_on = row[PartColumn.KEPT] == Kept.PASSED
+        row[PartColumn.KEPT] = Kept.NO
+        begins = motion.leave_by != 0 or row[PartColumn.REACHED] != Reached.NO
         if begins or passes_on or not would_reset(motion, k):
             continue
         if not expanded:
             expand(motion, t, 1.0, motion.order)
             expanded = True
         if is_at(motion, k):
-            row[FrictionColumn.KEPT] = 1
-            row[FrictionColumn.STRUCK] = FrictionImpact.NOT
+            row[PartColumn.KEPT] = Kept.ON_ITS_SIDE
+            row[PartColumn.STRUCK] = FrictionImpact.NOT
             found = True
     return found
 
@@ -199,11 +200,11 @@ def lead_to_events(motion, t):
     all that it passes with a speed; one that it passes without would reset the state for ever.
     """
     expand(motion, t, 1.0, motion.order)
-    for k in range(motion.frictions.shape[0]):
-        row = motion.frictions[k]
-        if row[FrictionColumn.KEPT] == 0:
+    for k in range(motion.sided.shape[0]):
+        row = motion.sided[k]
+        if row[PartColumn.KEPT] == Kept.NO:
             continue
-        row[FrictionColumn.KEPT] = 0
+        row[PartColumn.KEPT] = Kept.NO
         size = size_of_guard(motion, k)
         unit = span_of_terms(motion)
         power = 1.0
@@ -215,7 +216,7 @@ def lead_to_events(motion, t):
             if term != 0.0 and abs(term) >= VANISHES * size:
                 break
         passes_it = motion.gap_series[leading] < 0.0
-        row[FrictionColumn.SKIP] = 0 if passes_it else leading
+        row[PartColumn.SKIP] = 0 if passes_it else leading
         if passes_it and leading > 1:
             return False
     return True
@@ -247,7 +248,7 @@ def some_disagree(motion, k, t):
     """Whether, at the event of the surface `k`, the motion reaches another one too that resets the
     state, and the order of the two makes a difference."""
     expanded = False
-    for other in range(motion.frictions.shape[0]):
+    for other in range(motion.sided.shape[0]):
         if other == k or not would_reset(motion, other):
             continue
         if not expanded:
@@ -263,8 +264,8 @@ def disagree(motion, k, other):
     """Whether the resets of two surfaces, one after the other, give another state in the other
     order."""
     own = motion.own
-    one = abs(motion.frictions[k, FrictionColumn.RESETS]) - 1
-    two = abs(motion.frictions[other, FrictionColumn.RESETS]) - 1
+    one = abs(motion.sided[k, PartColumn.RESETS]) - 1
+    two = abs(motion.sided[other, PartColumn.RESETS]) - 1
     here = motion.recorded_events  # places of events that this pass may still record
     there = here + 1
     note_state(motion, here)
@@ -298,24 +299,24 @@ def read_sides(motion, k, t, before):
     guard was `before`."""
     note_jumps(motion)
     expand(motion, t, 1.0, motion.order)
-    for i in range(motion.frictions.shape[0]):
+    for i in range(motion.sided.shape[0]):
         if not is_surface(motion, i):
             continue
-        row = motion.frictions[i]
-        row[FrictionColumn.REACHED] = 0
-        row[FrictionColumn.SKIP] = 0
-        row[FrictionColumn.KEPT] = 0
+        row = motion.sided[i]
+        row[PartColumn.REACHED] = Reached.NO
+        row[PartColumn.SKIP] = 0
+        row[PartColumn.KEPT] = Kept.NO
         size = size_of_guard(motion, i)
         if i == k and abs(motion.gap_series[0] - before) <= RESET_ROUNDING * size:
-            row[FrictionColumn.KEPT] = 2
+            row[PartColumn.KEPT] = Kept.PASSED
         if is_function(motion, i):
             continue
-        distance = motion.coordinates[row[FrictionColumn.COORDINATE]] - ground_speed(motion, i)
+        distance = motion.coordinates[row[PartColumn.COORDINATE]] - guard_level(motion, i)
         stays_there = would_reset(motion, i) and is_at(motion, i)
         if distance != 0.0 and not stays_there:
-            row[FrictionColumn.SLIDES] = 1 if distance > 0.0 else -1
-    if is_relay(motion, k):
-        motion.frictions[k, FrictionColumn.SLIDES] *= -1
+            row[PartColumn.STATE] = 1 if distance > 0.0 else -1
+    if is_remembered(motion, k):
+        motion.sided[k, PartColumn.STATE] *= -1
 
 
 @lean_jit
@@ -326,18 +327,18 @@ def place_contacts(motion):
     hit = 0
     for i in range(motion.contacts.shape[0]):
         row = motion.contacts[i]
-        place = row[ContactColumn.COORDINATE]
+        place = row[PartColumn.COORDINATE]
         position = contact_position(motion, i)
         gap = motion.signs[i] * (motion.coordinates[place] - position)
         rate = motion.signs[i] * motion.velocities[place]
-        row[ContactColumn.RELEASED] = 0
-        row[ContactColumn.WAITS] = 0
-        row[ContactColumn.CLOSED] = 0
-        row[ContactColumn.SKIP] = 0
+        row[PartColumn.REACHED] = Reached.NO
+        row[PartColumn.WAITS] = 0
+        row[PartColumn.STATE] = Touch.OPEN
+        row[PartColumn.SKIP] = 0
         if abs(gap) <= RESET_ROUNDING * (abs(motion.coordinates[place]) + abs(position)):
             motion.coordinates[place] = position
-            row[ContactColumn.SKIP] = 1
-            row[ContactColumn.CLOSED] = 1 if rate == 0.0 else 0
+            row[PartColumn.SKIP] = 1
+            row[PartColumn.STATE] = 1 if rate == 0.0 else 0
             hit |= 1 << i if rate < 0.0 else 0
         elif gap < 0.0:
             return -1

@@ -24,10 +24,11 @@ import math
 from saltus.flow.kernel.contact_layout import (
     ROW_ROUNDING,
     SPANNED,
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
     NoPress,
+    PartColumn,
+    Side,
+    Touch,
     first_row,
     is_function,
     is_surface,
@@ -89,8 +90,8 @@ def gives(motion, r, s):
 @lean_jit
 def has_speed(motion, k):
     """Whether a row behind those of the contacts is that of a friction with a force."""
-    row = motion.frictions[k]
-    inert = row[FrictionColumn.PRESSED] == NoPress.INERT
+    row = motion.sided[k]
+    inert = row[PartColumn.PRESSED] == NoPress.INERT
     return not is_surface(motion, k) and not inert
 
 
@@ -100,11 +101,11 @@ def is_held(motion, r):
     count = motion.contacts.shape[0]
     if r < count:
         row = motion.contacts[r]
-        return row[ContactColumn.CLOSED] == 1 and row[ContactColumn.IDLE] == 0
+        return row[PartColumn.STATE] == Touch.CLOSED and row[PartColumn.IDLE] == 0
     if is_function(motion, r - count):
         return False
-    friction = motion.frictions[r - count]
-    return friction[FrictionColumn.SLIDES] == 0 and friction[FrictionColumn.IDLE] == 0
+    friction = motion.sided[r - count]
+    return friction[PartColumn.STATE] == Side.HELD and friction[PartColumn.IDLE] == 0
 
 
 @lean_jit
@@ -114,7 +115,7 @@ def is_stopped(motion, r, acts):
     count = motion.contacts.shape[0]
     if r < count:
         return (acts >> r & 1) == 1
-    return motion.frictions[r - count, FrictionColumn.STRUCK] == FrictionImpact.STUCK
+    return motion.sided[r - count, PartColumn.STRUCK] == FrictionImpact.STUCK
 
 
 @lean_jit
@@ -162,7 +163,7 @@ def independence(motion, acts, last):
 @lean_jit
 def row_series(motion, r):
     """The place among the margins of the series of a gap or, behind those, of a sliding speed."""
-    return motion.contacts.shape[0] + 2 * motion.frictions.shape[0] + r
+    return motion.contacts.shape[0] + 2 * motion.sided.shape[0] + r
 
 
 @lean_jit

@@ -43,12 +43,11 @@ from saltus.flow.kernel.contact_layout import (
     SAME_IMPACT,
     SPANNED,
     VIOLATED,
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
+    PartColumn,
     first_flag,
     first_row,
-    ground_speed,
+    guard_level,
     has_phases,
     restitution,
     rub_coefficient,
@@ -64,8 +63,8 @@ from saltus.taylor import jit, lean_jit
 def depends_on_choice(motion, chosen):
     """Whether the contacts in `chosen`, of which one has a friction, depend on one another, so that
     the impulses may not be the only ones."""
-    for k in range(motion.frictions.shape[0]):
-        motion.frictions[k, FrictionColumn.STRUCK] = FrictionImpact.NOT
+    for k in range(motion.sided.shape[0]):
+        motion.sided[k, PartColumn.STRUCK] = FrictionImpact.NOT
     return is_pressed(motion) and independence(motion, chosen, -1) <= SPANNED
 
 
@@ -97,7 +96,7 @@ def rubbing_phase(motion, chosen, scale):
     """
     local = motion.local
     count = motion.contacts.shape[0]
-    frictions = motion.frictions.shape[0]
+    frictions = motion.sided.shape[0]
     after = np.zeros(local)
     found = -1
     ways = 0
@@ -131,7 +130,7 @@ def rubbing_phase(motion, chosen, scale):
     column = unknown_impulses(motion, found)
     for k in range(frictions - 1, -1 if motion.multipliers > 0 else frictions - 1, -1):
         motion.stuck_impulses[k] = 0.0
-        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+        if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
             column -= 1
             motion.stuck_impulses[k] = motion.block[column, unknown_impulses(motion, found)]
     for a in range(local):
@@ -139,14 +138,12 @@ def rubbing_phase(motion, chosen, scale):
     for i in range(count):
         motion.impulses[i] = max(motion.tried[i], 0.0)
         if found >> i & 1 and motion.multipliers == 0:
-            motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]] = (
+            motion.velocities[motion.contacts[i, PartColumn.COORDINATE]] = (
                 -motion.signs[i] * motion.right[i] + 0.0
             )
     for k in range(frictions if motion.multipliers == 0 else 0):
-        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-            motion.velocities[motion.frictions[k, FrictionColumn.COORDINATE]] = ground_speed(
-                motion, k
-            )
+        if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
+            motion.velocities[motion.sided[k, PartColumn.COORDINATE]] = guard_level(motion, k)
     return found
 
 
@@ -164,7 +161,7 @@ def begin_rubbing(motion, chosen):
             motion.right[i] += (
                 restitution(motion, i, j) * motion.rates[j] if chosen >> j & 1 else 0.0
             )
-    for k in range(motion.frictions.shape[0]):
+    for k in range(motion.sided.shape[0]):
         scale = max(scale, abs(friction_rate(motion, k)))
     return scale
 
@@ -174,11 +171,11 @@ def has_one_impulse(motion, chosen):
     """Whether the impulses of frictions in the contacts in `chosen` are certainly the only ones:
     G_nn > mu abs(G_nt) of each.
     """
-    for k in range(motion.frictions.shape[0]):
-        i = motion.frictions[k, FrictionColumn.PRESSED] - 1
+    for k in range(motion.sided.shape[0]):
+        i = motion.sided[k, PartColumn.PRESSED] - 1
         if i >= 0 and chosen >> i & 1:
-            a = motion.contacts[i, ContactColumn.COORDINATE]
-            c = motion.frictions[k, FrictionColumn.COORDINATE]
+            a = motion.contacts[i, PartColumn.COORDINATE]
+            c = motion.sided[k, PartColumn.COORDINATE]
             if motion.multipliers > 0:
                 across = abs(gives(motion, i, motion.contacts.shape[0] + k))
                 if not motion.mobilities[i] > rub_coefficient(motion, k) * across:
@@ -225,7 +222,7 @@ def rubbing_impact(motion, chosen, slopes):
         if motion.multipliers > 0:
             rate = told_rate(motion, i)
         else:
-            rate = motion.signs[i] * motion.velocities[motion.contacts[i, ContactColumn.COORDINATE]]
+            rate = motion.signs[i] * motion.velocities[motion.contacts[i, PartColumn.COORDINATE]]
         motion.rates[i] = (
             -motion.right[i] + 0.0 if acts >> i & 1 else max(rate, 0.0) if chosen >> i & 1 else rate
         )
@@ -272,7 +269,7 @@ def rubbing_columns(motion, acts, chosen, first):
         size = unknown_impulses(motion, acts)
         for i in range(count):
             if acts >> i & 1:
-                a = motion.contacts[i, ContactColumn.COORDINATE]
+                a = motion.contacts[i, PartColumn.COORDINATE]
                 change = 0.0
                 for k in range(count):
                     if chosen >> k & 1:
@@ -280,10 +277,10 @@ def rubbing_columns(motion, acts, chosen, first):
                         change += slope(motion, j, local * local + count * i + k) * motion.gaps[k]
                 fill_sticking(motion, row, a, acts, -motion.signs[i] * change - given[a])
                 row += 1
-        for k in range(motion.frictions.shape[0]):
-            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
-                a = motion.frictions[k, FrictionColumn.COORDINATE]
-                place = motion.solver_numbers.size - motion.frictions.shape[0] + k
+        for k in range(motion.sided.shape[0]):
+            if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
+                a = motion.sided[k, PartColumn.COORDINATE]
+                place = motion.solver_numbers.size - motion.sided.shape[0] + k
                 fill_sticking(motion, row, a, acts, slope(motion, j, place) - given[a])
                 row += 1
         eliminate(motion.block, size, size + 1)
@@ -308,7 +305,7 @@ def rubbing_row_columns(motion, acts, chosen, first):
     own = motion.own
     local = motion.local
     count = motion.contacts.shape[0]
-    frictions = motion.frictions.shape[0]
+    frictions = motion.sided.shape[0]
     size = motion.solver_numbers.size
     begin = first_row(motion)
     width = local + 1
@@ -321,7 +318,7 @@ def rubbing_row_columns(motion, acts, chosen, first):
     fill_slopes(motion)
     unknown = unknown_impulses(motion, acts)
     for k in range(frictions):
-        if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+        if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
             stuck[k] = motion.stuck_impulses[k]
     for a in range(local):
         after[a] = motion.velocities[a]
@@ -368,7 +365,7 @@ def rubbing_row_columns(motion, acts, chosen, first):
                 fill_sticking(motion, row, i, acts, -change - row_lift(motion, j, i, after))
                 row += 1
         for k in range(frictions):
-            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
                 for a in range(local):
                     z[a] = given[a]
                 fill_sticking(motion, row, count + k, acts, -row_lift(motion, j, count + k, after))
@@ -390,12 +387,8 @@ def push_slope(motion, j, a, i):
     k = rub_of(motion, i)
     if k < 0:
         return 0.0
-    moved = slope(motion, j, motion.solver_numbers.size - 2 * motion.frictions.shape[0] + k)
-    return (
-        -slip_sign(motion, k)
-        * moved
-        * motion.inverse[a, motion.frictions[k, FrictionColumn.COORDINATE]]
-    )
+    moved = slope(motion, j, motion.solver_numbers.size - 2 * motion.sided.shape[0] + k)
+    return -slip_sign(motion, k) * moved * motion.inverse[a, motion.sided[k, PartColumn.COORDINATE]]
 
 
 @lean_jit
@@ -403,21 +396,21 @@ def rest_row_columns(motion, near):
     """`rest_columns` where contacts have rows: the impulses of frictions that stick follow from
     those of the contacts, as they keep the sliding speeds at 0."""
     count = motion.contacts.shape[0]
-    frictions = motion.frictions.shape[0]
+    frictions = motion.sided.shape[0]
     invert(motion.solver_numbers, motion.local, motion.first_order, motion.block, motion.inverse)
     fill_pushes(motion)
     size = 0
     for k in range(frictions):
-        size += 1 if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK else 0
+        size += 1 if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK else 0
     row = 0
     for k in range(frictions):
         motion.stuck_impulses[k] = 0.0
-        if motion.frictions[k, FrictionColumn.STRUCK] != FrictionImpact.STUCK:
+        if motion.sided[k, PartColumn.STRUCK] != FrictionImpact.STUCK:
             continue
         column = 0
         left = 0.0
         for other in range(frictions):
-            if motion.frictions[other, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            if motion.sided[other, PartColumn.STRUCK] == FrictionImpact.STUCK:
                 motion.block[row, column] = gives(motion, count + k, count + other)
                 column += 1
         for i in range(count):
@@ -427,7 +420,7 @@ def rest_row_columns(motion, near):
     if eliminate(motion.block, size, size + 1):
         row = 0
         for k in range(frictions):
-            if motion.frictions[k, FrictionColumn.STRUCK] == FrictionImpact.STUCK:
+            if motion.sided[k, PartColumn.STRUCK] == FrictionImpact.STUCK:
                 motion.stuck_impulses[k] = motion.block[row, size]
                 row += 1
     for j in range(motion.columns):
@@ -472,7 +465,7 @@ def free_pulls(motion, t):
         motion.parameters[first + i] = 1.0
     expand(motion, t, 1.0, 3)  # one more than is read, for coordinates of first order
     for i in range(motion.contacts.shape[0]):
-        a = motion.acceleration_series[motion.contacts[i, ContactColumn.COORDINATE]]
+        a = motion.acceleration_series[motion.contacts[i, PartColumn.COORDINATE]]
         motion.pulls[i] = motion.signs[i] * a[0]
         # bodies that fall together do not press on one another, and go on so
         motion.falling_pulls[i] = change_rate(a)
@@ -513,7 +506,7 @@ def turns_with(motion, i):
     turns with its bounces; or 0.
     """
     rubs = rubs_along(motion, i)
-    return rubs if rubs and ground_speed(motion, rubs - 1) == 0.0 else 0
+    return rubs if rubs and guard_level(motion, rubs - 1) == 0.0 else 0
 
 
 OTHERS = 10.0  # A contact is beside an accumulation if it closes later by this factor.
@@ -527,7 +520,7 @@ def fall_beside(motion, t, i, closed):
     for j in range(motion.contacts.shape[0]):
         if closed >> j & 1 and not motion.margin_series[j, 0] > 0.0:
             return -1.0
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    coordinate = motion.contacts[i, PartColumn.COORDINATE]
     return -motion.signs[i] * motion.acceleration_series[coordinate, 0]
 
 
@@ -551,7 +544,7 @@ def rubbed_accumulation(motion, t, closed, i, limit):
             limit = min(limit, time_to_close(motion.gaps[j], rate, motion.pulls[j]) / OTHERS)
     hold_coordinates(motion)
     place = first_flag(motion)
-    place += k - 2 - motion.frictions.shape[0]
+    place += k - 2 - motion.sided.shape[0]
     motion.parameters[place] = motion.signs[i]
     rising = fall_beside(motion, t, i, closed)
     motion.parameters[place] = -motion.signs[i]

@@ -51,7 +51,7 @@ from saltus.flow.contacts.tangent import (
     note_velocities,
 )
 from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
+    PartColumn,
     SegmentEnd,
     SegmentPlan,
     contact_position,
@@ -103,9 +103,9 @@ def hold_contacts(motion, closed):
     count = motion.contacts.shape[0]
     fill_slopes(motion)
     for i in range(count):
-        motion.contacts[i, ContactColumn.CLOSED] = closed >> i & 1
+        motion.contacts[i, PartColumn.STATE] = closed >> i & 1
         if closed >> i & 1:
-            place = motion.contacts[i, ContactColumn.COORDINATE]
+            place = motion.contacts[i, PartColumn.COORDINATE]
             motion.coordinates[place], motion.velocities[place] = contact_position(motion, i), 0.0
     hold_columns(motion, closed)
     hold_coordinates(motion)
@@ -207,7 +207,7 @@ def given_impact(motion, hit, after):
     fill_contact_matrices(motion)
     chosen = 1 << hit
     for i in range(count):
-        chosen |= motion.contacts[i, ContactColumn.CLOSED] << i
+        chosen |= motion.contacts[i, PartColumn.STATE] << i
         unit[i] = -1.0 if i == hit else 0.0
         motion.gaps[i] = motion.rates[i]
     solved, acts = impact_impulses(motion, chosen, unit)
@@ -226,7 +226,7 @@ def given_impact(motion, hit, after):
     for i in range(count):
         if acts >> i & 1:
             rate = 0.0
-            place = motion.contacts[i, ContactColumn.COORDINATE]
+            place = motion.contacts[i, PartColumn.COORDINATE]
             for k in range(count):
                 if chosen >> k & 1:
                     rate -= restitution(motion, i, k) * motion.gaps[k]
@@ -282,7 +282,7 @@ def excursion_guard(motion, contact, power, h, ends, slopes):
     """
     own = motion.own
     sign = motion.signs[contact]
-    coordinate = motion.contacts[contact, ContactColumn.COORDINATE]
+    coordinate = motion.contacts[contact, PartColumn.COORDINATE]
     q = motion.coordinate_series
     value = 0.0
     by_length = 0.0
@@ -324,7 +324,7 @@ def along_excursion(motion, contact, power, left, h, carried, slopes):
     """Add a step of an excursion of several steps to what `end_excursion` divides."""
     own = motion.own
     order = motion.order
-    place = motion.contacts[contact, ContactColumn.COORDINATE]
+    place = motion.contacts[contact, PartColumn.COORDINATE]
     q = motion.coordinate_series[place]
     motion.excursion[0] += remainder(q, power, power, order, left, h)
     motion.excursion[1] += remainder(q, power, power - 1, order, left, h)
@@ -390,7 +390,7 @@ def guard_at_end(motion, t, kind, contact, carried, ends, slopes):
             motion.shifts[j] = 0.0
         return
     sign = motion.signs[contact]
-    place = motion.contacts[contact, ContactColumn.COORDINATE]
+    place = motion.contacts[contact, PartColumn.COORDINATE]
     ends[SegmentEnd.GUARD] = sign * (motion.coordinates[place] - contact_position(motion, contact))
     ends[SegmentEnd.BY_END] = ends[SegmentEnd.RATE] = sign * motion.velocities[place]
     for j in range(motion.columns):
@@ -468,7 +468,7 @@ def follow_with(numbers, parts, request, results):
             extremes_at_end(motion, contact if kind == EventCode.RELEASE else -1, units, seen)
         if kind >= 0:
             if single or short:
-                velocity = motion.velocities[motion.contacts[contact, ContactColumn.COORDINATE]]
+                velocity = motion.velocities[motion.contacts[contact, PartColumn.COORDINATE]]
                 ends[s, SegmentEnd.RATE] = motion.signs[contact] * velocity
             else:
                 guard_at_end(motion, end, kind, contact, carried, ends[s], columns[s, 2 * own])

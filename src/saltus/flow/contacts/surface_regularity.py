@@ -41,14 +41,13 @@ def continuous_surfaces(
         for i, (path, value) in enumerate(zip(traced.parameters, values, strict=True))
         if path not in free
     } | {Expr("free", (), i): constant(1.0) for i in range(traced.dof)}
-    parts = traced.friction_coordinates
-    frictions = sum(place >= 0 for place in parts)
+    frictions = sum(not part.is_surface for part in traced.sided)
     return frozenset(
-        part - frictions
-        for part, place in enumerate(parts)
-        if place < 0
-        and part not in (*traced.relays, *traced.resetting)
-        and _is_continuous(traced, leaves, part, -1 - place)
+        k - frictions
+        for k, part in enumerate(traced.sided)
+        if part.is_surface
+        and k not in traced.keeping_sides
+        and _is_continuous(traced, leaves, k, part.coordinate)
     )
 
 
@@ -56,7 +55,7 @@ def _places_on(traced: Trace, part: int, coordinate: int) -> list[dict[Expr, Any
     """The leaves on a surface, where there is no speed along it: of a coordinate its position, of a
     function one of the leaves in which it is linear."""
     if coordinate < traced.dof:
-        position = traced.ground_speeds[part]
+        position = traced.levels[part]
         return [
             {Expr("coordinate", (), coordinate): position, Expr("velocity", (), coordinate): 0.0}
         ]

@@ -33,8 +33,10 @@ from saltus.flow.kernel.contact_layout import (
     APART,
     RELATIVE_STEP,
     TIED,
-    ContactColumn,
     ImpactDetail,
+    PartColumn,
+    Reached,
+    Touch,
     copy_all,
     restitution,
 )
@@ -65,7 +67,7 @@ def gap_derivative(motion, j, i):
         return left_of(motion, i, 0, j)
     own = motion.own
     count = motion.contacts.shape[0]
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    coordinate = motion.contacts[i, PartColumn.COORDINATE]
     moved = slope(motion, j, motion.local * motion.local + count * count + i)
     return motion.signs[i] * (motion.coordinates[own * (1 + j) + coordinate] - moved)
 
@@ -76,7 +78,7 @@ def lift_rate(motion, j, i):
     if motion.multipliers > 0:
         return row_lift(motion, j, i, motion.velocities)
     own = motion.own
-    coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+    coordinate = motion.contacts[i, PartColumn.COORDINATE]
     return motion.signs[i] * motion.velocities[own * (1 + j) + coordinate]
 
 
@@ -111,11 +113,11 @@ def hold_columns(motion, chosen):
     for j in range(motion.columns):
         for i in range(count):
             if chosen >> i & 1:
-                place = own * (1 + j) + motion.contacts[i, ContactColumn.COORDINATE]
+                place = own * (1 + j) + motion.contacts[i, PartColumn.COORDINATE]
                 motion.coordinates[place] = slope(
                     motion, j, motion.local * motion.local + count * count + i
                 )
-                if motion.contacts[i, ContactColumn.CLOSED] == 1:
+                if motion.contacts[i, PartColumn.STATE] == Touch.CLOSED:
                     motion.velocities[place] = 0.0
 
 
@@ -142,7 +144,7 @@ def release_columns(motion, t, released):
     for i in range(motion.contacts.shape[0]):
         if (
             i != released
-            and motion.contacts[i, ContactColumn.CLOSED] == 1
+            and motion.contacts[i, PartColumn.STATE] == Touch.CLOSED
             and abs(motion.margin_series[i, 0]) <= TIED * press_of(motion, i)
         ):
             release_shifts(motion, t, i)
@@ -220,7 +222,7 @@ def impulse_columns(motion, acts, chosen):
         for i in range(count):
             right[i] = (
                 lift_rate(motion, j, i)
-                - signs[i] * twist[motion.contacts[i, ContactColumn.COORDINATE]]
+                - signs[i] * twist[motion.contacts[i, PartColumn.COORDINATE]]
             )
             for k in range(count):
                 if chosen >> k & 1:
@@ -232,7 +234,7 @@ def impulse_columns(motion, acts, chosen):
             motion.velocities[place] -= twist[a]
             for i in range(count):
                 motion.velocities[place] += (
-                    inverse[a, motion.contacts[i, ContactColumn.COORDINATE]]
+                    inverse[a, motion.contacts[i, PartColumn.COORDINATE]]
                     * signs[i]
                     * motion.tried[i]
                 )
@@ -291,7 +293,7 @@ def pull_slopes(motion, t):
     expand(motion, t, 1.0, 2)
     for j in range(motion.columns):
         for i in range(motion.contacts.shape[0]):
-            coordinate = motion.contacts[i, ContactColumn.COORDINATE]
+            coordinate = motion.contacts[i, PartColumn.COORDINATE]
             change = a[own * (1 + j) + coordinate, 0] + motion.shifts[j] * a[coordinate, 1]
             motion.pull_slopes[j, i] = motion.signs[i] * change
     move_columns(motion, 1.0)
@@ -330,8 +332,8 @@ def perturb(motion, j, step):
                 motion.coupling[i, k] = gives(motion, i, k)
                 continue
             entry = motion.inverse[
-                motion.contacts[i, ContactColumn.COORDINATE],
-                motion.contacts[k, ContactColumn.COORDINATE],
+                motion.contacts[i, PartColumn.COORDINATE],
+                motion.contacts[k, PartColumn.COORDINATE],
             ]
             motion.coupling[i, k] = signs[i] * signs[k] * entry
     if is_pressed(motion):
@@ -490,7 +492,7 @@ def event_shifts(motion):
     """Fill `EVENT_SHIFTS` with the shifts in the state, or with those recorded for an impact at
     this instant, which are nan if contacts close at several instants in neighbouring motions."""
     for i in range(motion.contacts.shape[0]):
-        if motion.contacts[i, ContactColumn.RELEASED] == 1:
+        if motion.contacts[i, PartColumn.REACHED] == Reached.FIRST:
             return  # `release_columns` has filled them
     first = 1 + 2 * motion.own + motion.contacts.shape[0]
     for j in range(motion.columns):

@@ -77,7 +77,7 @@ def check_device(
             "device",
         )
     if device == "cuda":
-        if trace(system.in_gap_coordinates).friction_coordinates:
+        if trace(system.in_gap_coordinates).sided:
             raise ParameterError(f"{RUBBING} on a card: leave device out", "device")
         card()
     return str(device)
@@ -144,7 +144,7 @@ def target_of(device: str, run: Program, motions: int, periods: float, cores: in
 
 def _refused(run: Program) -> str:
     """Why the motions of a program are not followed on a card, or nothing."""
-    if run.trace.friction_coordinates:
+    if run.trace.sided:
         return RUBBING
     if run.structure.several and run.model.eigenmodes.size:
         return "stiff structures, which move in eigenmodes, are not followed"

@@ -11,53 +11,90 @@ from saltus.flow.kernel.memory import SolverArrays
 from saltus.taylor import jit, lean_jit
 
 
-class ContactColumn(IntEnum):
-    """Columns of the array `contacts` of whole numbers, with a row for each contact."""
+class PartKind(IntEnum):
+    """The kinds of parts, in the order of their rows. All behind the contacts have two sides, and
+    from SURFACE on they are surfaces. From FUNCTION on the guard is a series of the model. From
+    RELAY on the side is remembered, as the state does not tell it."""
 
-    COORDINATE = 0  # the coordinate that it holds
-    CLOSED = 1  # 1 if it is closed: its gap and the gap's rate are then exactly 0
+    CONTACT = 0
+    FRICTION = 1  # its guard is the sliding speed q' - w
+    SURFACE = 2  # its guard is the distance q - p of a coordinate from a position
+    FUNCTION = 3  # its guard is a function, whose series is in the place of its first margin
+    RELAY = 4  # a function that depends on its own side
+
+
+class Touch(IntEnum):
+    """The state of a contact."""
+
+    OPEN = 0
+    CLOSED = 1  # its gap and the gap's rate are exactly 0
+
+
+class Side(IntEnum):
+    """The state of a part with two sides, +1 or -1 times which its guard is not negative."""
+
+    BELOW = -1  # a friction slides backwards
+    HELD = 0  # the guard stays 0: a friction sticks, a motion slides along a function
+    ABOVE = 1  # a friction slides forwards
+    OFF = 2  # of a friction in a contact that is open, or that is inert: it has no force
+
+
+class Reached(IntEnum):
+    """Which guard of a part is 0 at the start of a step, as its event has just been."""
+
+    NO = 0
+    FIRST = 1  # the first margin of what is held; of a contact the reaction
+    SECOND = 2  # the second margin
+    GUARD = 3  # the guard itself: a sliding speed, a surface
+    LIMIT = 4  # a margin was at 0, or below, at the start of the last step already
+
+
+class Guard(IntEnum):
+    """Which guard of a part with two sides becomes 0."""
+
+    FIRST = 0  # its first margin, of what is held
+    SECOND = 1
+    ITSELF = 2  # the guard itself
+
+
+class Kept(IntEnum):
+    """What a surface that resets the state does at an instant at which the motion is at it."""
+
+    NO = 0  # the motion is not at it
+    ON_ITS_SIDE = 1  # it stays on its side, apart from rounding, and has its own event next
+    PASSED = 2  # its own event has not changed its function: its side is read behind it
+
+
+class PartColumn(IntEnum):
+    """Columns of the table of parts, of whole numbers: a row for each contact (`motion.contacts`),
+    then for each friction and for each surface (`motion.sided`). Columns that a kind does not use
+    are 0."""
+
+    COORDINATE = 0  # the coordinate that it holds, along which it acts, or that it looks at
+    STATE = 1  # of a contact a `Touch`, of all others a `Side`
     # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a
     # step
     SKIP = 2
-    RELEASED = 3  # 1 if its reaction has just fallen to 0, and is known to be 0
-    WAITS = 4  # after how many more of its impacts the end of an accumulation is looked for again
+    KIND = 3  # a `PartKind`
+    MARGIN = 4  # of a friction that sticks, the number of the margin that SKIP refers to
+    REACHED = 5  # a `Reached`
+    # of what is held and follows from what else is: not 0, of a friction the direction of its
+    # static limit, which it carries; a contact then carries nothing
+    IDLE = 6
+    # of a friction 1 plus the number of the contact whose reaction presses it, 0 for none; or a
+    # `NoPress`
+    PRESSED = 7
+    STRUCK = 8  # of a friction or a function, a `FrictionImpact`
+    # of a surface that resets the state where its side becomes +1, 1 plus the number of its reset;
+    # minus that where -1 is the side in STATE that the motion comes to
+    RESETS = 9
+    KEPT = 10  # of a surface that resets the state, a `Kept`
+    # of a contact, after how many more of its impacts the end of an accumulation is looked for
+    # again
+    WAITS = 11
     # of an open contact, between two calls of the kernel: what its gap has more than the difference
     # of its coordinate and its position, in units of EXCESS times the position
-    EXCESS = 5
-    # of a closed contact whose row follows from others that are held: 1, and it carries nothing
-    IDLE = 6
-
-
-class FrictionColumn(IntEnum):
-    """Columns of the rows behind those of the contacts, one row for each friction, then one for
-    each surface.
-    """
-
-    COORDINATE = 0  # the coordinate along which it acts
-    # the direction in which it slides, +1 or -1; 0 if it sticks; of a surface the side, +1 above
-    # its position; 2 of a friction in a contact that is open, or that is inert
-    SLIDES = 1
-    # how many of the first Taylor coefficients of its guard are known to be 0 at the start of a
-    # step
-    SKIP = 2
-    # if it sticks, the number of the margin that SKIP refers to; a `NoMargin` for a surface
-    MARGIN = 3
-    # 1 or 2: this margin has just reached 0; 3: the sliding speed has, or the surface is reached;
-    # 4: a margin was at 0, or below, at the start of the step
-    REACHED = 4
-    # 1 plus the number of the contact whose reaction presses it, 0 for none; or a `NoPress`
-    PRESSED = 5
-    STRUCK = 6  # a `FrictionImpact`
-    # of a sticking friction whose row follows from others that are held: +1 or -1, the direction of
-    # its static limit, which it carries; else 0
-    IDLE = 7
-    # of a surface that resets the state where its side becomes +1, 1 plus the number of its reset;
-    # minus that where -1 is the side in SLIDES that the motion comes to; else 0
-    RESETS = 8
-    # of a surface that would reset the state where the motion goes on through it, and at which it is
-    # at this instant, apart from rounding: 1; its side stays as it was, so that it has its own event.
-    # 2 behind its own event, if that has not changed its function: its side is read; else 0
-    KEPT = 9
+    EXCESS = 12
 
 
 class FrictionImpact(IntEnum):
@@ -74,14 +111,6 @@ class NoPress(IntEnum):
     """In place of the contact that presses a friction."""
 
     INERT = -1  # the coefficients are 0, and nothing that it does changes a motion
-
-
-class NoMargin(IntEnum):
-    """In place of the number of a margin in a row of `FrictionColumn`."""
-
-    SURFACE = -1  # the row is that of a surface
-    FUNCTION = -2  # of one that is a function, whose series is in the place of its first margin
-    RELAY = -3  # of a function that depends on its own side, which is remembered
 
 
 class SegmentPlan(IntEnum):
@@ -299,19 +328,19 @@ def jumping(motion, i):
 @lean_jit
 def is_surface(motion, k):
     """Whether a row behind those of the contacts is that of a surface."""
-    return motion.frictions[k, FrictionColumn.MARGIN] < 0
+    return motion.sided[k, PartColumn.KIND] >= PartKind.SURFACE
 
 
 @lean_jit
 def is_function(motion, k):
     """Whether it is that of a surface that is a function."""
-    return motion.frictions[k, FrictionColumn.MARGIN] <= NoMargin.FUNCTION
+    return motion.sided[k, PartColumn.KIND] >= PartKind.FUNCTION
 
 
 @lean_jit
-def is_relay(motion, k):
-    """Whether it is that of a relay, whose side the state does not tell."""
-    return motion.frictions[k, FrictionColumn.MARGIN] == NoMargin.RELAY
+def is_remembered(motion, k):
+    """Whether its side is remembered, as that of a relay, and the state does not tell it."""
+    return motion.sided[k, PartColumn.KIND] >= PartKind.RELAY
 
 
 @lean_jit
@@ -324,21 +353,21 @@ def first_row(motion):
 
 
 @lean_jit
-def ground_speed(motion, k):
+def guard_level(motion, k):
     """The speed of a friction's ground, in a row 0; the position of a surface."""
-    return motion.solver_numbers[first_row(motion) - motion.frictions.shape[0] + k]
+    return motion.solver_numbers[first_row(motion) - motion.sided.shape[0] + k]
 
 
 @lean_jit
 def has_phases(motion):
     """Whether impacts with friction have a phase of compression and one of expansion."""
-    return motion.solver_numbers[first_row(motion) - 2 * motion.frictions.shape[0] - 1] > 0.0
+    return motion.solver_numbers[first_row(motion) - 2 * motion.sided.shape[0] - 1] > 0.0
 
 
 @lean_jit
 def rub_coefficient(motion, k):
     """The coefficient of a friction in a contact, at impacts."""
-    return motion.solver_numbers[first_row(motion) - 2 * motion.frictions.shape[0] + k]
+    return motion.solver_numbers[first_row(motion) - 2 * motion.sided.shape[0] + k]
 
 
 @lean_jit

@@ -216,7 +216,7 @@ def time_left(trace: Trace) -> Expr:
 def places_at_event(trace: Trace) -> dict[str, tuple[str, int]]:
     """The places of an event's instant, velocities and shifts."""
     count = len(trace.acceleration)
-    first = len(trace.parameters) + len(trace.friction_coordinates)
+    first = len(trace.parameters) + len(trace.sided)
     instant = {op: ("parameters", first + i) for i, op in enumerate(INSTANT)}
     return instant | {"velocity": ("state", count), "shift": ("state", 2 * count)}
 

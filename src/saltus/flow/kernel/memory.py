@@ -334,8 +334,8 @@ class ContactsParts(NamedTuple):
     )
     breaks: Any
     functions: ContactsFunctions
-    contacts: Any  # a row for each contact, in the columns of `ContactColumn`
-    frictions: Any  # a row for each friction, in the columns of `FrictionColumn`
+    contacts: Any  # a row for each contact, in the columns of `PartColumn`
+    sided: Any  # behind them, a row for each friction and surface, in the same columns
     step_arrays: StepArrays
     mode_arrays: ModeArrays
     solver: SolverArrays
@@ -351,7 +351,7 @@ class ContactsSegmentParts(NamedTuple):
     parameters: Any
     functions: ContactsFunctions
     contacts: Any
-    frictions: Any  # none
+    sided: Any  # none
     step_arrays: StepArrays
     mode_arrays: ModeArrays
     solver: SolverArrays

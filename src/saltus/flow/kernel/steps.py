@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from saltus.flow.kernel.contact_layout import ContactColumn, FrictionColumn
+from saltus.flow.kernel.contact_layout import PartColumn
 from saltus.flow.kernel.layout import (
     CANCELLED,
     DEFECT,
@@ -671,9 +671,9 @@ def closed_rows(motion):
     count = motion.contacts.shape[0]
     bits = 0
     for i in range(count):
-        bits |= motion.contacts[i, ContactColumn.CLOSED] << i
-    for k in range(motion.frictions.shape[0]):  # the rows of surfaces
-        bits |= (1 if motion.frictions[k, FrictionColumn.SLIDES] > 0 else 0) << (count + k)
+        bits |= motion.contacts[i, PartColumn.STATE] << i
+    for k in range(motion.sided.shape[0]):  # the rows of surfaces
+        bits |= (1 if motion.sided[k, PartColumn.STATE] > 0 else 0) << (count + k)
     return bits
 
 

@@ -42,13 +42,7 @@ from saltus.flow.programs.compiled_lanes import (
 )
 from saltus.flow.programs.lane_threads import Jobs, Lanes
 from saltus.progress import Progress, silent
-from saltus.systems import (
-    System,
-    check_system,
-    inert_frictions,
-    natural_units,
-    numbers,
-)
+from saltus.systems import System, check_system, inert_frictions, natural_units, numbers
 from saltus.taylor import record_tables
 
 if TYPE_CHECKING:

@@ -17,11 +17,13 @@ import numpy as np
 from saltus.checks import LIMITS, free_memory
 from saltus.errors import MotionError, ParameterError
 from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
-    FrictionColumn,
     FrictionImpact,
-    NoMargin,
     NoPress,
+    PartColumn,
+    PartKind,
+    Reached,
+    Side,
+    Touch,
 )
 from saltus.flow.kernel.layout import EventCode, Mode, Status, side_of_state
 from saltus.flow.kernel.memory import (
@@ -74,7 +76,7 @@ NEVER_SLOW = 1e3
 FAR_FROM_SLOW = 10.0
 POWER_OF_RATIO = 3
 NO_COORDINATE = -1  # of a contact whose gap is a row
-NO_ROWS = np.zeros((0, len(FrictionColumn)), dtype=np.int64)
+NO_ROWS = np.zeros((0, len(PartColumn)), dtype=np.int64)
 
 
 def natural_time(system: System, length: float, run: Program) -> float:
@@ -375,8 +377,8 @@ def _parts(system: System) -> tuple[Any, Any, Any]:
 
 
 class ContactState(KernelState):
-    """What the kernel changes; the `rows` are in the columns of `ContactColumn`, then of
-    `FrictionColumn`.
+    """What the kernel changes; the `rows` are the table of parts, in the columns of
+    `PartColumn`.
     """
 
     def _at_contact(self, request: MotionRequest, run: Program) -> tuple[int, int, int]:
@@ -395,16 +397,18 @@ class ContactState(KernelState):
         own_contacts, own_frictions, surfaces = _parts(request.system)
         held = run.trace.contact_coordinates
         self._count = len(held)
-        rubbed = run.trace.friction_coordinates
-        self.rows = contacts = np.zeros((len(held) + len(rubbed), NO_ROWS.shape[1]), dtype=np.int64)
-        if run.trace.friction_contacts:
-            contacts[len(held) :, FrictionColumn.PRESSED] = np.add(run.trace.friction_contacts, 1)
-        contacts[:, ContactColumn.COORDINATE] = held + tuple(
-            max(place, -1 - place) for place in rubbed
-        )
+        sided = run.trace.sided
+        self.rows = contacts = np.zeros((len(held) + len(sided), NO_ROWS.shape[1]), dtype=np.int64)
+        contacts[: len(held), PartColumn.COORDINATE] = held
+        for row, part in zip(contacts[len(held) :], sided, strict=True):
+            row[PartColumn.KIND] = PartKind[part.kind.upper()]
+            row[PartColumn.COORDINATE] = 0 if part.is_function else part.coordinate
+            row[PartColumn.PRESSED] = 1 + part.contact
+            for column, number in part.marks:
+                row[PartColumn[column]] = number
         rates = None
         if run.structure.sizes.multipliers:
-            contacts[: len(held), ContactColumn.COORDINATE] = NO_COORDINATE
+            contacts[: len(held), PartColumn.COORDINATE] = NO_COORDINATE
             rates = self._close_rows(request, run, own_contacts)
         for row, contact in zip(contacts[: len(held)], own_contacts, strict=True):
             if rates is not None:
@@ -423,8 +427,8 @@ class ContactState(KernelState):
                     f"{where} {what} at {contact.coordinate} = {float(contact.position):g}",
                     contact.coordinate,
                 )
-            row[ContactColumn.CLOSED] = int(gap == 0.0 and rate == 0.0)
-            row[ContactColumn.SKIP] = int(gap == 0.0)
+            row[PartColumn.STATE] = int(gap == 0.0 and rate == 0.0)
+            row[PartColumn.SKIP] = int(gap == 0.0)
             if gap == 0.0:
                 self.state[place] = float(contact.position)
         for k, (row, friction) in enumerate(
@@ -435,33 +439,26 @@ class ContactState(KernelState):
                 if rates is None
                 else rates[len(held) + k]
             )
-            row[FrictionColumn.SLIDES] = int(np.sign(rate))
+            row[PartColumn.STATE] = int(np.sign(rate))
         for k in inert_frictions(request.system, dict.fromkeys(request.sensitivities or (), ())):
-            contacts[len(held) + k, FrictionColumn.PRESSED] = NoPress.INERT
-            contacts[len(held) + k, FrictionColumn.SLIDES] = 2
+            contacts[len(held) + k, PartColumn.PRESSED] = NoPress.INERT
+            contacts[len(held) + k, PartColumn.STATE] = Side.OFF
         first = len(held) + len(own_frictions)
         for row, surface in zip(contacts[first : first + len(surfaces)], surfaces, strict=True):
             if surface.function is not None:
                 continue
             place = names.index(surface.coordinate)
-            row[FrictionColumn.MARGIN] = NoMargin.SURFACE
-            row[FrictionColumn.SLIDES] = int(
+            row[PartColumn.STATE] = int(
                 np.sign(position[place] - float(surface.position)) or np.sign(speeds[place]) or 1
             )
         named = [part.name for part in (*own_frictions, *surfaces)] + [*run.trace.switches]
         self._functions = {len(held) + k: named[k] for k in run.trace.functions}
         for number in self._functions:
             row = contacts[number]
-            row[FrictionColumn.COORDINATE] = 0
-            row[FrictionColumn.MARGIN] = NoMargin.FUNCTION
-            row[FrictionColumn.SLIDES] = 1
-            row[FrictionColumn.STRUCK] = FrictionImpact.JUMPED  # the kernel reads its side
-            if number - len(held) in run.trace.relays:
-                row[FrictionColumn.MARGIN] = NoMargin.RELAY
-                row[FrictionColumn.SLIDES] = request.relays[self._functions[number]]
-        for reset, k in enumerate(run.trace.resetting):
-            sign = surfaces[k - len(own_frictions)].sign
-            contacts[len(held) + k, FrictionColumn.RESETS] = sign * (1 + reset)
+            row[PartColumn.STATE] = Side.ABOVE
+            row[PartColumn.STRUCK] = FrictionImpact.JUMPED  # the kernel reads its side
+            if sided[number - len(held)].remembered:
+                row[PartColumn.STATE] = request.relays[self._functions[number]]
         return Mode.CONTACT, 0, 1  # no release is recorded at the start
 
     def _close_rows(self, request: MotionRequest, run: Program, contacts: Any) -> np.ndarray:
@@ -490,15 +487,15 @@ class ContactState(KernelState):
                     f" {gap:.6g} there and has the rate {rates[i]:.6g}",
                     contact.name,
                 )
-            self.rows[i, ContactColumn.CLOSED] = int(touches and rates[i] == 0.0)
-            self.rows[i, ContactColumn.SKIP] = int(touches)
+            self.rows[i, PartColumn.STATE] = int(touches and rates[i] == 0.0)
+            self.rows[i, PartColumn.SKIP] = int(touches)
         return rates
 
     @property
     def touching(self) -> list[int]:
         """The contacts that are closed, or have just been."""
         rows = self.rows[: self._count]
-        touches = (rows[:, ContactColumn.CLOSED] == 1) | (rows[:, ContactColumn.SKIP] > 0)
+        touches = (rows[:, PartColumn.STATE] == Touch.CLOSED) | (rows[:, PartColumn.SKIP] > 0)
         found: list[int] = np.flatnonzero(touches).tolist()
         return found
 
@@ -509,10 +506,10 @@ class ContactState(KernelState):
         return [
             name
             for row, name in self._functions.items()
-            if rows[row, FrictionColumn.REACHED] == 3
+            if rows[row, PartColumn.REACHED] == Reached.GUARD
             or (
-                rows[row, FrictionColumn.STRUCK] == FrictionImpact.JUMPED
-                and rows[row, FrictionColumn.SKIP] > 0
+                rows[row, PartColumn.STRUCK] == FrictionImpact.JUMPED
+                and rows[row, PartColumn.SKIP] > 0
             )
         ]
 
@@ -588,7 +585,7 @@ class Recorder:
         self._several = run.structure.several
         self._switches = run.trace.switches
         # what one pass of the kernel may record (`spare_events`)
-        parts = run.trace.contact_coordinates, run.trace.friction_coordinates
+        parts = run.trace.contact_coordinates, run.trace.sided
         self._spare = 2 * sum(map(len, parts)) if self._several else 0
         self._begin = request.start[: self._own]
         self._drops = not request.dense and request.sample_times is None

@@ -18,7 +18,7 @@ import numpy as np
 from saltus.checks import LIMITS
 from saltus.errors import SaltusError
 from saltus.flow.kernel import memory
-from saltus.flow.kernel.contact_layout import ContactColumn, FrictionColumn, NoPress
+from saltus.flow.kernel.contact_layout import NoPress, PartColumn, PartKind
 from saltus.flow.kernel.layout import EventCode, Geometry, Mode, Status
 from saltus.flow.kernel.memory import ADVANCE, ADVANCE_CONTACTS, MOTION, SIZES, behind_parameters
 from saltus.flow.motion.events import EventKind, Stop
@@ -50,7 +50,7 @@ from saltus.taylor import substitute as substitute_leaves
 from saltus.taylor.load_tables import AFTER, SINCE, WITHIN
 from saltus.taylor.vectors import SCALAR
 
-ENUMERATIONS = (Mode, Status, EventCode, Geometry, ContactColumn, FrictionColumn)
+ENUMERATIONS = (Mode, Status, EventCode, Geometry, PartKind, PartColumn)
 ENV = ("parameters", "constants", "breaks", "table")
 
 
@@ -209,7 +209,7 @@ class PortableMotion:
             ),
             "signs": list(trace.signs),
             "contact_coordinates": list(trace.contact_coordinates),
-            "friction_coordinates": list(trace.friction_coordinates),
+            "friction_coordinates": list(trace.places),
             "where_inert": where_inert(self.system),
             "inert": int(NoPress.INERT),
             "positions_at": before,

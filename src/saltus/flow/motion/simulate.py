@@ -38,13 +38,7 @@ from saltus.flow.motion.motion import Motion, in_own_coordinates, motion_of
 from saltus.flow.motion.validity import DenseOutput, crushed, paradox
 from saltus.flow.programs.compiled import Program, known_program, limits_of, taylor_order
 from saltus.progress import Progress, shown_if_long, silent
-from saltus.systems import (
-    DeclaredLoad,
-    System,
-    check_system,
-    natural_units,
-    read_start,
-)
+from saltus.systems import DeclaredLoad, System, check_system, natural_units, read_start
 from saltus.taylor import structure_key
 
 # The arguments of `simulate` and `sensitivities`: a misspelt one arrives among the coordinates.

@@ -16,14 +16,19 @@ import numpy as np
 
 from saltus.checks import check_names
 from saltus.flow.contacts import (
+    beside_powers,
     closings,
     complementarity,
     frictions,
+    functions,
     held_rows,
+    part_events,
+    parts,
     propagators,
     resets,
     rows,
     rubbing,
+    surfaces,
     tangent,
 )
 from saltus.flow.contacts import impacts as contact_impacts
@@ -193,8 +198,13 @@ CONTACTS_PARTS = (
     contact_impacts,
     tangent,
     propagators,
+    parts,
     rubbing,
     frictions,
+    surfaces,
+    beside_powers,
+    functions,
+    part_events,
     closings,
     resets,
     contacts_kernel,
@@ -268,7 +278,7 @@ def load_structure(trace: Trace) -> CompiledStructure:
         (made["constants"], made["matrices" if trace.several else "geometry"]),
         trace.several,
         trace.signs,
-        len(trace.friction_coordinates),
+        len(trace.sided),
     )
 
 
@@ -433,7 +443,7 @@ def _free(trace: Trace) -> dict[str, tuple[str, int]]:
     instant, what is free.
     """
     first = len(trace.parameters)
-    count = len(trace.friction_coordinates)
+    count = len(trace.sided)
     return {"slide": ("parameters", first), "free": ("parameters", first + count + len(INSTANT))}
 
 

@@ -196,7 +196,7 @@ def memory_plan(trace: Trace) -> MemoryPlan:
         local=trace.local,
         parameters=max(0 if trace.several else 1, len(trace.parameters)),
         contacts=len(trace.signs),
-        frictions=len(trace.friction_coordinates),
+        frictions=len(trace.sided),
         constants=max(1, len(constants(trace))),
         data=0 if trace.modes is None else trace.modes.data,
         records=len(trace.records),

@@ -15,14 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.kernel.contact_layout import FrictionColumn, NoPress, solver_arrays
-from saltus.flow.kernel.layout import (
-    CHATTER_SPEED,
-    LEAST_SHARE,
-    ROUGHER,
-    SERIES_LENGTH,
-    SLOW,
-)
+from saltus.flow.kernel.contact_layout import NoPress, PartColumn, PartKind, solver_arrays
+from saltus.flow.kernel.layout import CHATTER_SPEED, LEAST_SHARE, ROUGHER, SERIES_LENGTH, SLOW
 from saltus.flow.kernel.memory import MOTION
 from saltus.flow.lane_steps.memory import (
     END,
@@ -348,12 +342,11 @@ class Lanes:
         """The scalar kernel's rows of contacts and frictions, before a motion has begun."""
         trace = self.program.trace
         contacts = len(trace.signs)
-        frictions = len(trace.friction_coordinates)
-        rows = np.zeros((contacts + frictions, len(FrictionColumn)), dtype=np.int64)
-        rows[contacts:, FrictionColumn.PRESSED] = np.add(
-            trace.friction_contacts or [-1] * frictions, 1
-        )
-        rows[[contacts + k for k in self.inert_frictions], FrictionColumn.PRESSED] = NoPress.INERT
+        frictions = len(trace.sided)
+        rows = np.zeros((contacts + frictions, len(PartColumn)), dtype=np.int64)
+        rows[contacts:, PartColumn.KIND] = PartKind.FRICTION
+        rows[contacts:, PartColumn.PRESSED] = [1 + part.contact for part in trace.sided]
+        rows[[contacts + k for k in self.inert_frictions], PartColumn.PRESSED] = NoPress.INERT
         return rows
 
     def _sizes(self) -> LaneSizes:
@@ -386,12 +379,10 @@ class Lanes:
             guards=plan.guards or 0,
             constant_guards=plan.constant_guards,
             contacts=len(trace.signs),
-            frictions=len(trace.friction_coordinates),
+            frictions=len(trace.sided),
             repeats=sizes.repeats,
             contact_numbers=sizes.contact_numbers,
-            coordinates=np.array(
-                [*trace.contact_coordinates, *trace.friction_coordinates], dtype=np.int64
-            ),
+            coordinates=np.array([*trace.contact_coordinates, *trace.places], dtype=np.int64),
             signs=np.array(trace.signs, dtype=np.int64),
         )
 

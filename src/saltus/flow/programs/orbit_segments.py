@@ -10,23 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts import (
-    complementarity,
-    extremes,
-    held_rows,
-    propagators,
-    rows,
-    tangent,
-)
+from saltus.flow.contacts import complementarity, extremes, held_rows, propagators, rows, tangent
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import segments as contact_segments
 from saltus.flow.kernel import contact_layout, layout, roots, steps
-from saltus.flow.kernel.contact_layout import (
-    ContactColumn,
-    FrictionColumn,
-    SegmentEnd,
-    SegmentExtremes,
-)
+from saltus.flow.kernel.contact_layout import PartColumn, SegmentEnd, SegmentExtremes
 from saltus.flow.kernel.layout import SegmentColumn, SegmentValue
 from saltus.flow.kernel.memory import ContactsSegmentResults, SegmentResults, motion_record
 from saltus.flow.one_contact import impacts, segments
@@ -109,8 +97,8 @@ class SegmentFollower:
         held = self._run.trace.contact_coordinates
         n = len(request[0])
         own = self.own
-        contacts = np.zeros((len(held), len(FrictionColumn)), dtype=np.int64)
-        contacts[:, ContactColumn.COORDINATE] = held
+        contacts = np.zeros((len(held), len(PartColumn)), dtype=np.int64)
+        contacts[:, PartColumn.COORDINATE] = held
         ends = np.zeros((n, SegmentEnd.NUMBERS + 10 * own))
         columns = np.zeros((n, 2 * own + 1, self._columns))
         maps = np.zeros((n, 2 * own, self._columns))

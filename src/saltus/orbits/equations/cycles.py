@@ -455,7 +455,7 @@ def drifting_coordinates(trace: Any) -> list[int]:
     places = {node.value for node in ordered(roots) if node.op == "coordinate"}
     if not trace.rows:  # the gaps are coordinates themselves
         places |= {*trace.contact_coordinates}
-        places |= {-1 - place for place in trace.friction_coordinates if place < 0}
+        places |= {part.coordinate for part in trace.sided if part.is_surface}
     return [i for i in range(trace.dof - trace.first_order) if i not in places]
 
 

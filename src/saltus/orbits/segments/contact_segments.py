@@ -93,7 +93,7 @@ def _refused(traced: Trace, signature: Signature) -> str | None:
         return f"models of more than {MOST_COORDINATES} coordinates are not enclosed yet"
     if traced.first_order or traced.dependent:
         return "coordinates of first order and dependent gaps are not enclosed yet"
-    if traced.friction_coordinates:
+    if traced.sided:
         return "frictions and surfaces are not enclosed yet"
     if signature.closed or any(not e.is_impact or e.closed for e in signature.events):
         return "orbits on which a contact stays closed are not proved yet"

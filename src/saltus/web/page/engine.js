@@ -14,7 +14,7 @@ import { BUFFER, Refusal, Run } from "./run.js";
  *
  * @typedef {object} Layout  Where all numbers are in memory, and what those of the kernel mean: Python's `PortableMotion.layout`.
  * @property {Enumeration} Mode @property {Enumeration} Status @property {Enumeration} EventCode
- * @property {Enumeration} ContactColumn @property {Enumeration} FrictionColumn
+ * @property {Enumeration} PartKind @property {Enumeration} PartColumn
  * @property {Record<string, [number, boolean]>} record  The place of each number of the motion, and whether it is whole.
  * @property {number} record_size @property {number} most_size @property {number} most_order @property {Argument[]} arguments @property {boolean} several
  * @property {Record<string, number>} sizes @property {number} constant_count @property {number[]} data @property {number[]} modes @property {number[]} signs
@@ -299,7 +299,7 @@ function lengthsOf({ layout, dof, contacts, frictions, description, width }) {
     parameters: [description.numbers.length + layout.modes.length], constants: [layout.constant_count],
     breaks: [most], table: [rows.length, most + 1, terms],
     geometry: [3], signs: [layout.signs.length], eigenmodes: [0],
-    rows: [contacts.length + frictions.length, (layout.FrictionColumn.STRUCK ?? 0) + 1],
+    rows: [contacts.length + frictions.length, Object.keys(layout.PartColumn).length],
     step_labels: [BUFFER, 2], step_spans: [BUFFER, 2], step_series: [BUFFER, dof, layout.most_order + 2],
     event_labels: [BUFFER, 4], event_values: [BUFFER, width],
   };

@@ -128,23 +128,23 @@ export class Run {
   beginContacts() {
     const { engine } = this;
     const { layout, dof } = engine;
-    const { COORDINATE = 0, CLOSED = 0, SKIP = 0 } = layout.ContactColumn;
+    const { COORDINATE = 0, STATE = 0, SKIP = 0, KIND = 0, PRESSED = 0 } = layout.PartColumn;
     const [count = 0, width = 0] = engine.lengths.rows ?? [];
     const rows = new BigInt64Array(count * width);
     const positions = this.system.geometry.subarray(layout.positions_at);
     layout.contact_coordinates.forEach((place, i) => {
       const { gap, rate } = this.gapAt(place, layout.signs[i] ?? 0, positions[i] ?? 0, engine.contacts[i] ?? "");
       rows[i * width + COORDINATE] = BigInt(place);
-      rows[i * width + CLOSED] = gap === 0 && rate === 0 ? 1n : 0n;
+      rows[i * width + STATE] = gap === 0 && rate === 0 ? 1n : 0n;
       rows[i * width + SKIP] = gap === 0 ? 1n : 0n;
       if (gap === 0) engine.doubles(engine.address("state"), 2 * dof)[place] = positions[i] ?? 0;
     });
-    const { COORDINATE: OF = 0, SLIDES = 0, PRESSED = 0 } = layout.FrictionColumn;
     const grounds = this.system.geometry.subarray(layout.grounds_at);
     layout.friction_coordinates.forEach((place, i) => {
       const row = (i + layout.contact_coordinates.length) * width;
-      rows[row + OF] = BigInt(place);
-      rows[row + SLIDES] = BigInt(Math.sign((this.speeds[place] ?? 0) - (grounds[i] ?? 0)));
+      rows[row + COORDINATE] = BigInt(place);
+      rows[row + KIND] = BigInt(layout.PartKind.FRICTION ?? 0);
+      rows[row + STATE] = BigInt(Math.sign((this.speeds[place] ?? 0) - (grounds[i] ?? 0)));
       if (this.isInert(layout.where_inert[i])) rows[row + PRESSED] = BigInt(layout.inert);
     });
     engine.longs(engine.address("rows"), rows.length).set(rows);
