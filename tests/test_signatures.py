@@ -49,7 +49,7 @@ SEVERAL = {
     "path": "a parameter's dotted path, or that of a file",
     "periods": "forcing periods; of one motion also a fraction",
     "points": "how many of a curve, or sums of displacements by name",
-    "relays": "whether each is on, of one motion or of many",
+    "relays": "whether each is on, of one motion, of many or of a picture",
     "result": "one result, or to be drawn also several",
     "special": "one special point, or seeds of several",
     "start": "when a pulse begins, or the state with which a record begins",

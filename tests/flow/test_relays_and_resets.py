@@ -627,7 +627,7 @@ def test_parts_that_are_none_are_refused():
 
 def test_other_questions_refuse_relays_and_resets_by_name():
     system = System(model=Neuron())
-    with pytest.raises(ParameterError, match="has 'threshold'; simulate, sensitivities"):
+    with pytest.raises(ParameterError, match="has 'threshold'; simulate, simulate_many"):
         saltus.search_orbits(system, "model.drive", [2.0, 3.0])
     room = System(model=Thermostat())
     with pytest.raises(ParameterError, match="search_orbits does not follow relays so far"):

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import saltus
-from saltus import Contact, Friction, Harmonic, Load, NewtonImpact, Surface, System
+from saltus import Contact, Friction, Harmonic, Load, NewtonImpact, Relay, Surface, System
 
 
 @saltus.register
@@ -188,6 +188,33 @@ class AsymmetricDamper(saltus.ContactModel):
         slope = self.bump + (self.rebound - self.bump) * (1.0 + sides.rebound) / 2.0
         pull = y - x + slope * (v - u)
         return load.force(t) - 2.0 * x - self.drag * u * abs(u) - self.damping * u + pull, -pull
+
+
+@saltus.register
+@dataclass(frozen=True, kw_only=True)
+class SwitchedMass(saltus.ContactModel):
+    """A mass that a relay pushes back, and slows down as it goes on."""
+
+    damping: float = 0.2
+    push: float = 0.2
+
+    coordinates: ClassVar[tuple[str, ...]] = ("x",)
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+    surfaces: ClassVar[tuple[Relay, ...]] = (
+        Relay(name="valve", on="high", off="low", after_event="slowed"),
+    )
+
+    def high(self, t, x, velocity, load):
+        return x - 0.1
+
+    def low(self, t, x, velocity, load):
+        return -0.1 - x
+
+    def slowed(self, t, x, velocity, load):
+        return x, 0.9 * velocity
+
+    def force(self, t, x, velocity, load, sides):
+        return load.force(t) - x - self.damping * velocity - self.push * sides.valve
 
 
 @saltus.register
@@ -468,6 +495,12 @@ CLASSES = (
         "your own: surfaces of velocities, and `abs` in a force",
         lambda: System(model=AsymmetricDamper(), load=_pushed()),
         {"x": 0.1, "y": 0.0},
+    ),
+    ModelClass(
+        "own, relays",
+        "your own: a `Relay` that resets the state",
+        lambda: System(model=SwitchedMass(), load=_pushed()),
+        {"x": 0.0, "relays": {"valve": False}},
     ),
 )
 NAMES = tuple(each.name for each in CLASSES)

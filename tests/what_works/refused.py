@@ -13,6 +13,7 @@ MANY = "lyapunov_many works on models with one coordinate"
 
 DIAGRAM = "are not drawn in diagrams yet"
 
+RELAYS = "does not follow relays so far"
 DISTANCES = "does not follow contacts of a distance"
 SEVERAL_COORDINATES = (
     "smooth",
@@ -43,6 +44,10 @@ REFUSED = {
     ("own, two feet that rub", "page"): DISTANCES,
     ("own, switches", "page"): SURFACES,
     ("own, switches", "of an ensemble"): MANY,
+    ("own, relays", "diagram"): RELAYS,
+    ("own, relays", "of an ensemble"): RELAYS,
+    ("own, relays", "fit"): RELAYS,
+    ("own, relays", "page"): RELAYS,
 }
 REASONS = {
     SUMS: (
@@ -58,4 +63,8 @@ REASONS = {
     FIRST_ORDER: "A page cannot show coordinates of first order yet.",
     DIAGRAM: "Cycles without a load are not drawn in diagrams yet; `continue_orbit` follows them.",
     DISTANCES: "A page cannot show contacts of a `distance` and frictions of a `rate` yet.",
+    RELAYS: (
+        "Relays, and surfaces that reset the state, are not followed there yet; `frequency_sweep`,"
+        " `continue_orbit` and `lyapunov_spectrum` follow them."
+    ),
 }

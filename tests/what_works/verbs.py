@@ -186,7 +186,10 @@ def basins(tried: Tried, folder: Path) -> None:
     first = tried.coordinates[0]
     speed = "velocity" if len(tried.coordinates) == 1 else f"{first}_velocity"
     axes = {first: [0.0, 0.02], speed: [0.0, 0.02]}
-    found = saltus.basins_of_attraction(tried.system, found=tried.attractors, periods=200, **axes)
+    sides = {name: tried.start[name] for name in ("relays",) if name in tried.start}
+    found = saltus.basins_of_attraction(
+        tried.system, found=tried.attractors, periods=200, **axes, **sides
+    )
     labels = found.label.values
     assert labels.shape == (2, 2)
     assert set(np.unique(labels)) <= {-1, *range(len(tried.attractors) + 2)}

@@ -22,7 +22,7 @@ from saltus.checks import as_numbers, check_number
 from saltus.errors import ParameterError, shown
 from saltus.flow import Ending
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import Box, System, check_along, check_path
+from saltus.systems import Box, System, check_along, check_path, size_with_sides
 
 if TYPE_CHECKING:
     import xarray
@@ -117,7 +117,7 @@ def attractors_along(
     """
     check_number("threshold", threshold, above=0.0)
     grid = _values(system, path, values)
-    followed = _Followed(threshold, system.dimension)
+    followed = _Followed(threshold, size_with_sides(system))
     for i, value in enumerate(grid):
         here = find_attractors(
             system.with_({path: float(value)}),

@@ -455,7 +455,7 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
     most = max([1, *(min(len(m.states), LAST_STATES) for m in members)])
     states = np.full((len(members), most, system.dimension), np.nan)
     for row, member in zip(states, members, strict=True):
-        row[: len(member.states)] = member.states[:LAST_STATES]
+        row[: len(member.states)] = member.states[:LAST_STATES, : system.dimension]
     columns: dict[str, Any] = {}
     for key, (part, units, text) in attractor_columns(system).items():
         found = [getattr(member, part) for member in members]
@@ -488,4 +488,4 @@ def attractor_table(members: tuple[Attractor, ...], system: System) -> dict[str,
 
 
 def _multiplier(member: Attractor) -> float:
-    return float("nan") if member.orbit is None else float(np.abs(member.orbit.multipliers).max())
+    return float("nan") if member.orbit is None else member.orbit.largest_multiplier

@@ -25,6 +25,7 @@ from saltus.attractors.judgement import Reason, reason_cycle, reason_unforced
 from saltus.attractors.stroboscopic_section import (
     certify_cycle,
     cycle_states,
+    section_of,
     section_states,
     solved_orbit,
     stays_at_rest,
@@ -42,6 +43,7 @@ from saltus.flow import (
     find_recurrence,
     motions_from,
     on_device,
+    relays_in_turns,
     simulate,
     stroboscopic,
 )
@@ -60,7 +62,9 @@ from saltus.systems import (
     middle_of,
     natural_units,
     rest_state,
-    state_of,
+    size_with_sides,
+    state_with_sides,
+    units_with_sides,
 )
 
 
@@ -104,7 +108,7 @@ class KnownAttractors:
 
     @property
     def _units(self) -> np.ndarray:
-        return natural_units(self.system).state
+        return units_with_sides(self.system)
 
     def _cycle(self, states: np.ndarray) -> Target:
         return Target(0, Ending.PERIODIC, states, self._units)
@@ -150,7 +154,7 @@ class KnownAttractors:
             return self.on_cycle(states[-1], cycle)
         orbit = solved_orbit(self.system, states[-1], len(states))
         far = SETTINGS.beside * self._near(states)
-        if orbit is None or self._cycle(states).distance(orbit.section_state) > far:
+        if orbit is None or self._cycle(states).distance(section_of(orbit)) > far:
             return self._fail(
                 f"motions repeat themselves every {len(states)} periods {where}, but no orbit "
                 "solves its equations there"
@@ -197,7 +201,7 @@ class KnownAttractors:
         if orbit.system.load.period is None:
             return self.add_cycle(orbit)
         if states is None:
-            states = section_states(self.system, orbit.section_state[None], orbit.period)[0]
+            states = section_states(self.system, section_of(orbit)[None], orbit.period)[0]
         known = self.label_of(states)
         if known is not None:
             return known
@@ -285,7 +289,8 @@ class KnownAttractors:
         longest = max(max_period, 16)
         verdict = classify(self.system, **start, periods=SETTINGS.second, max_period=longest)
         if verdict.kind is Ending.REST:
-            return self.add_rest(rest_state(self.system, state_of(self.system, verdict.state)))
+            end = state_with_sides(self.system, verdict.state)
+            return self.add_rest(rest_state(self.system, end))
         if verdict.orbit is not None and verdict.kind is Ending.PERIODIC:
             return self.add_orbit(verdict.orbit)
         where = f"from {_shown(state)}"
@@ -318,8 +323,10 @@ class KnownAttractors:
         """Add the mirror image of every attractor of a system with that symmetry: it is an
         attractor as well.
         """
-        # symmetries of distances are not looked for
-        if self.system.model.has_multipliers or not is_symmetric(self.system):
+        # symmetries of distances, of relays and of resets are not looked for
+        model = self.system.model
+        others = model.has_multipliers or model.relays or model.resets
+        if others or not is_symmetric(self.system):
             return
         for label in range(len(self.members)):
             image = (
@@ -361,6 +368,14 @@ def _shown(state: np.ndarray) -> str:
     return f"({', '.join(f'{value:.6g}' for value in state)})"
 
 
+def _further(system: System, also: Any) -> np.ndarray:
+    """The further states (n, d), with the sides of relays behind them."""
+    size = size_with_sides(system)
+    if size > system.dimension and np.shape(also)[-1:] == (size,):
+        return check_states("also", also, size)
+    return relays_in_turns(system, check_states("also", also, system.dimension))
+
+
 def _check(
     system: System,
     window: Any,
@@ -375,7 +390,7 @@ def _check(
 ) -> None:
     check_device(device, system)
     with_clock(system)
-    further = check_states("also", also, system.dimension)
+    further = _further(system, also)
     for place, coordinate in enumerate(system.model.coordinates):
         check_reached(system.model, coordinate, further[:, place], "also")
     check_starts(starts)
@@ -419,7 +434,8 @@ def find_attractors(
         Bounds of the states, ((least, largest coordinate), (least, largest velocity)), covered
         evenly by initial states; with several coordinates a pair for each of them, then for each
         velocity. By default half widths are 1.5 natural units around the contact, or around 0
-        without one; of angles 1.5 rad, and 1.5 of their rates. With several contacts the starts take turns as to which contacts are closed.
+        without one; of angles 1.5 rad, and 1.5 of their rates. With several contacts the starts take turns as to which contacts are closed, and with relays
+        as to which of these are on.
     starts
         The number of initial states.
     max_period
@@ -451,10 +467,10 @@ def find_attractors(
     [1]
     """
     clock = with_clock(system)
-    further = check_states("also", also, system.dimension)
+    further = _further(clock, also)
     area = check_window(window, system)
     progress(0.0, "motions")
-    states = initial_states(clock, starts, area, seed)
+    states = relays_in_turns(clock, initial_states(clock, starts, area, seed))
     found = KnownAttractors(clock)
     for orbit in _known(system, known):
         found.add_orbit(orbit)

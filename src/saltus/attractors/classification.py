@@ -6,6 +6,7 @@ does not by `judge`, which charts and diagrams ask too.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -33,16 +34,24 @@ from saltus.attractors.stroboscopic_section import (
 )
 from saltus.checks import Speeds, check_count, check_number
 from saltus.errors import MotionError
-from saltus.flow import RECURRENCE, Ending, EventKind, Recurrence, find_recurrence, simulate
+from saltus.flow import (
+    RECURRENCE,
+    Ending,
+    EventKind,
+    Recurrence,
+    find_recurrence,
+    simulate,
+    start_with_sides,
+)
 from saltus.orbits import PeriodicOrbit
 from saltus.progress import Progress, html_table, part_of, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, arguments_of, read_start, rest_state, state_of
+from saltus.systems import System, arguments_of, rest_state, state_with_sides
 
 if TYPE_CHECKING:
     import xarray
 
-NAMES = ("periods", "transient", "max_period", "seed", "tol")  # arguments of `classify`
+NAMES = ("relays", "periods", "transient", "max_period", "seed", "tol")  # arguments of `classify`
 # states of a motion that does not repeat, enough to see the shape of its attractor
 SECTION_STATES = 1000
 
@@ -133,7 +142,7 @@ class Verdict(Result):
         """States at phase 0 from the end of the motion on, (n, d): those of one period, or many if
         it does not repeat itself.
         """
-        end = state_of(self.system, self.state)
+        end = state_with_sides(self.system, self.state)
         lasting = (
             self.kind not in (Ending.REST, Ending.UNDECIDED) and self.system.load.period is not None
         )
@@ -222,6 +231,7 @@ def classify(
     system: System,
     *,
     velocity: Speeds = 0.0,
+    relays: Mapping[str, bool] | None = None,
     periods: int = 4000,
     transient: int = 500,
     max_period: int = RECURRENCE.compiled_max_period,
@@ -255,6 +265,9 @@ def classify(
         What moves, under constant or harmonic loads.
     velocity, coordinates
         The state at the start, at phase 0.
+    relays
+        Whether each `Relay` of the model is on at the start, as `simulate` takes it. A motion has
+        settled where its relays have the same sides again too.
     periods
         Forcing periods in which it may settle, after the transient, and as many again after it was
         judged; at least 32.
@@ -280,7 +293,7 @@ def classify(
     'periodic'
     """
     clock = with_clock(system)
-    start = read_start(system, velocity, coordinates, NAMES)
+    start = start_with_sides(system, velocity, relays, coordinates, NAMES)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
     check_count("max_period", max_period, RECURRENCE.compiled_max_period)
@@ -397,7 +410,7 @@ def _on_cycle(case: _Case, ends: Recurrence, otherwise: Reason) -> Verdict:
     orbit = found.orbit
     if orbit is None or not found.sound:
         return case.undecided(otherwise, ends, {}, evidence=found.evidence)
-    numbers = {"time": orbit.period, "multiplier": abs(orbit.multipliers[0])}
+    numbers = {"time": orbit.period, "multiplier": orbit.largest_multiplier}
     more: dict[str, Any] = {"period": orbit.period, "orbit": orbit, "evidence": found.evidence}
     return case.verdict(Ending.PERIODIC, Reason.CYCLE, ends, numbers, **more)
 

@@ -14,11 +14,17 @@ import numpy as np
 
 from saltus.attractors.lyapunov.growth import LargestExponents
 from saltus.attractors.nonperiodic import regular_motion
-from saltus.attractors.stroboscopic_section import creeping_orbit, is_unforced
+from saltus.attractors.stroboscopic_section import creeping_orbit, is_unforced, section_of
 from saltus.enumerations import NumberedSentence
 from saltus.flow import RECURRENCE, Ending, Recurrence, find_recurrence, return_period, simulate
 from saltus.progress import Progress, part_of, silent
-from saltus.systems import System, arguments_of, natural_units, states_beside
+from saltus.systems import (
+    System,
+    arguments_of,
+    natural_units,
+    states_beside,
+    units_with_sides,
+)
 
 
 class Reason(NumberedSentence):
@@ -364,12 +370,12 @@ class _Judgement:
         n = len(states)
         self.system = system
         self.settings = settings
-        self.settled = SettledLater.none(system.dimension)
+        self.settled = SettledLater.none(states.shape[-1])
         self.parameters = {
             path: np.broadcast_to(np.asarray(values, dtype=float), n)
             for path, values in parameters.items()
         }
-        self.states = np.full((n, settings.companions, system.dimension), np.nan)
+        self.states = np.full((n, settings.companions, states.shape[-1]), np.nan)
         for row, given in enumerate(states):
             self.states[row] = _companions(system, given[np.isfinite(given).all(axis=-1)], settings)
         # an entry for each question: a `Reason` where it is known why nothing is to be looked for,
@@ -550,7 +556,7 @@ class _Judgement:
         options = {"max_period": longest, "kept": 2 * longest + 2}
         ends = self._ends(rows, self.states[rows, :1], self.settings.patience, silent, **options)
         rows, ends = rows[ends.periodic], ends.only(ends.periodic)
-        units = natural_units(self.system).state
+        units = units_with_sides(self.system)
         fewest = return_period(ends.states, longest, RECURRENCE.long_agreement, units)
         self.period[rows] = fewest
         self.settled = self.settled.joined(SettledLater(rows, ends.last, fewest))
@@ -577,7 +583,7 @@ class _Judgement:
                 self.zero_one[row] = found.zero_one.K
             if found.orbit is not None:
                 period = found.orbit.period
-                state = found.orbit.section_state
+                state = section_of(found.orbit)
                 self.period[row] = period
                 self.settled = self.settled.joined(
                     SettledLater(np.array([row]), state[None], np.array([period]))

@@ -192,7 +192,15 @@ def excludes_tori(system: System) -> str | None:
     >>> saltus.excludes_tori(system) is not None  # the damping shrinks areas
     True
     """
-    check_system(system, "excludes_tori", several_contacts=True)
+    check_system(
+        system,
+        "excludes_tori",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        resets=True,
+        relays=True,
+    )
     check_periodic(system)
     if not system.model.has_state_plane:
         return None

@@ -11,13 +11,20 @@ import numpy as np
 
 from saltus.errors import MotionError, ParameterError
 from saltus.flow import EventKind, Stop, motions_from, nearest_return, simulate, stroboscopic
-from saltus.orbits import PeriodicOrbit, Signature, equations_of, find_orbit, orbit_from
+from saltus.orbits import (
+    PeriodicOrbit,
+    Signature,
+    equations_of,
+    find_orbit,
+    orbit_from,
+    relays_at,
+)
 from saltus.systems import (
     Load,
     System,
     arguments_of,
     check_system,
-    natural_units,
+    units_with_sides,
 )
 
 
@@ -33,7 +40,13 @@ def with_clock(system: System) -> System:
         Something that is no system, or a load of records or pulses, which never repeats.
     """
     check_system(
-        system, "the search of attractors", several_contacts=True, multipliers=True, switches=True
+        system,
+        "the search of attractors",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        resets=True,
+        relays=True,
     )
     check_periodic(system)
     if system.load.frequency is not None:
@@ -106,7 +119,17 @@ def cycle_states(orbit: PeriodicOrbit) -> np.ndarray:
     position, velocity = motion.at(times)
     states = np.concatenate([np.atleast_2d(position), np.atleast_2d(velocity)]).T
     states[:, states.shape[1] - len(orbit.system.model.first_order) :] = 0.0
-    return np.asarray(states)
+    return np.concatenate([states, relays_at(motion, times)], axis=1)
+
+
+def section_of(orbit: PeriodicOrbit) -> np.ndarray:
+    """The state of an orbit at phase 0, and behind it the sides of relays."""
+    return np.append(orbit.section_state, state_sides(orbit))
+
+
+def state_sides(orbit: PeriodicOrbit) -> list[float]:
+    """The sides of relays of an orbit at phase 0, +1 or -1."""
+    return [1.0 if on else -1.0 for on in orbit.remembered.get("relays", {}).values()]
 
 
 def certify_cycle(system: System, state: np.ndarray) -> Certificate:
@@ -174,11 +197,9 @@ class Certificate:
                 "it creeps to where it sticks for good: the largest multiplier there, "
                 f"{abs(orbit.multipliers[0]):.9g}, is 1 within its own accuracy"
             )
-        if not orbit.stable or abs(orbit.multipliers[0]) > 1.0 - SETTINGS.neutral:
-            return (
-                "the orbit there does not attract: its largest multiplier is "
-                f"{abs(orbit.multipliers[0]):.9g}"
-            )
+        largest = orbit.largest_multiplier
+        if not orbit.stable or largest > 1.0 - SETTINGS.neutral:
+            return f"the orbit there does not attract: its largest multiplier is {largest:.9g}"
         if not orbit.defect < SETTINGS.defect:
             return f"in direct simulation the orbit there misses itself by {orbit.defect:.1g}"
         if not self.distance < self.within:
@@ -195,7 +216,7 @@ class Certificate:
         """The numbers, by name."""
         if self.orbit is None:
             return {}
-        multiplier = float(abs(self.orbit.multipliers[0]))
+        multiplier = self.orbit.largest_multiplier
         return {
             "residual": self.orbit.residual,
             "largest_multiplier": multiplier,
@@ -220,13 +241,13 @@ def certify(
     """
     later = section_states(system, state[None], period or max_period, tol=1e-12)[0]
     states = np.concatenate([[state], later])
-    units = natural_units(system).state
+    units = units_with_sides(system)
     q = period or nearest_return(states[::-1], max_period, units)
     orbit = solved_orbit(system, state, q, admissible=False)
     within = SETTINGS.defect if period else SETTINGS.slow
     if orbit is None:
         return Certificate(None, np.inf, within)
-    apart = np.abs((states[:q] - orbit.section_state) / units).max(axis=1)
+    apart = np.abs((states[:q] - section_of(orbit)) / units).max(axis=1)
     return Certificate(orbit, float(apart.min()), within)
 
 
@@ -251,12 +272,12 @@ def approached_orbit(
     """
     later = section_states(system, state[None], SETTINGS.approach, tol=1e-12)[0]
     states = np.concatenate([[state], later])
-    units = natural_units(system).state
+    units = units_with_sides(system)
     orbit = solved_orbit(system, state, nearest_return(states[::-1], max_period, units))
     if orbit is None or not orbit.stable or orbit.period > max_period:
         return None
     q = orbit.period
-    apart = np.abs((states - orbit.section_state) / units).max(axis=1)
+    apart = np.abs((states - section_of(orbit)) / units).max(axis=1)
     apart = apart[int(np.argmin(apart[:q])) :: q]  # at the phase of the orbit's own state
     quarter = max(1, len(apart) // 4)
     is_near = apart[0] <= within * orbit.size / orbit.equations.natural.length
@@ -269,7 +290,7 @@ def creeping_orbit(system: System, states: np.ndarray) -> PeriodicOrbit | None:
     """
     if not system.model.frictions or len(states) < 2:
         return None
-    last = np.abs((states[-1] - states[-2]) / natural_units(system).state).max()
+    last = np.abs((states[-1] - states[-2]) / units_with_sides(system)).max()
     if not last < SETTINGS.step:  # also for nan
         return None
     orbit = solved_orbit(system, states[-1], 1)

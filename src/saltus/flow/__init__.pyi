@@ -13,10 +13,12 @@ from .lanes.capture_speeds import captured_between as captured_between
 from .lanes.ensemble import TangentEnsemble as TangentEnsemble
 from .lanes.ensemble import simulate_many as simulate_many
 from .lanes.ensemble_dataset import extrema_names as extrema_names
+from .lanes.ensemble_dataset import side_name as side_name
 from .lanes.ensemble_dataset import stop_names as stop_names
 from .lanes.ensemble_dataset import stroboscopic as stroboscopic
 from .lanes.inputs import Inputs as Inputs
 from .lanes.inputs import read_inputs as read_inputs
+from .lanes.one_by_one import goes_alone as goes_alone
 from .long_time.load_release import Release as Release
 from .long_time.load_release import contact_pull as contact_pull
 from .long_time.load_release import load_releases as load_releases
@@ -57,8 +59,12 @@ from .motion.sensitivities import derivatives_of as derivatives_of
 from .motion.sensitivities import sensitivities as sensitivities
 from .motion.sensitivities import state_rates as state_rates
 from .motion.simulate import MotionRequest as MotionRequest
+from .motion.simulate import check_relays as check_relays
+from .motion.simulate import end_of as end_of
 from .motion.simulate import follow as follow
+from .motion.simulate import relays_in_turns as relays_in_turns
 from .motion.simulate import simulate as simulate
+from .motion.simulate import start_with_sides as start_with_sides
 from .motion.step_through import Pause as Pause
 from .motion.step_through import step_through as step_through
 from .motion.validity import Validity as Validity

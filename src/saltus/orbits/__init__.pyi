@@ -11,6 +11,7 @@ from .branches.branch_continuation import continue_orbit as continue_orbit
 from .branches.branch_continuation import follow_stable as follow_stable
 from .branches.branch_continuation import switch_branch as switch_branch
 from .branches.special_curve_continuation import continue_special as continue_special
+from .contract.event_sequence import relays_at as relays_at
 from .equations.kinds import equations_of as equations_of
 from .finding.from_motion import find_orbit as find_orbit
 from .finding.from_motion import orbit_from as orbit_from

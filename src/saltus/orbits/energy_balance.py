@@ -20,7 +20,16 @@ from saltus.flow import EventKind, Motion, RowValues, modes_of
 from saltus.orbits.free_orbits import FreeOrbit
 from saltus.orbits.orbit import PeriodicOrbit
 from saltus.result import result_dataset
-from saltus.systems import ContactModel, Load, System, check_system, mass_and_force
+from saltus.systems import (
+    ContactModel,
+    Load,
+    LoadOnSides,
+    Sides,
+    System,
+    check_system,
+    mass_and_force,
+    sides_for,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -60,6 +69,10 @@ class SampledPart:
     velocity: np.ndarray
     side: np.ndarray
     weight: np.ndarray
+    # whether all relays count as off, in the forces, whatever their sides are
+    relays_off: bool = False
+    # the relay that is none the less on where it is
+    but_for: str = ""
 
     @property
     def system(self) -> System:
@@ -206,14 +219,15 @@ def course_of(of: Followed, periods: int | None) -> SampledPart:
 
 
 def _round(orbit: PeriodicOrbit | FreeOrbit) -> tuple[Motion, float, float]:
-    """A motion on an orbit, and one period of it that neither begins nor ends at an impact."""
+    """A motion on an orbit, and one period of it that neither begins nor ends at an impact or where
+    the state is reset.
+    """
     if isinstance(orbit, FreeOrbit):
         motion = orbit.motion()
         return motion, motion.start, motion.time
     motion = orbit.motion(2 * orbit.signature.period)
-    edges = [
-        time for time in motion.impacts.time.tolist() if time > motion.start + 1e-9 * orbit.duration
-    ]
+    jumps = sorted([*motion.impacts.time.tolist(), *_resets(motion)])
+    edges = [time for time in jumps if time > motion.start + 1e-9 * orbit.duration]
     begin = 0.5 * (edges[0] + motion.start) if edges else motion.start
     return motion, begin, begin + orbit.duration
 
@@ -246,6 +260,10 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     forces where it is 0, which the potential energy has then. Over a period of an orbit that is the
     electric energy which a harvester delivers.
 
+    What a relay does is int v (f_0 - f_0'') dt, with f_0'' the forces where it is off. Where a
+    surface resets the state, [v- M- v- - v+ M+ v+] / 2 is taken. That a reset moves a coordinate
+    does no work, and the potential energy is that of the way between resets.
+
     Parameters
     ----------
     of
@@ -261,8 +279,9 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
         (`load.force`, `load.together` of channels that act on one another, `ground.belt`; of what
         multipliers hold `wall.table` of a contact that moves by itself, and in impacts
         `ground.impacts`; of forces that are not determined those of least squares),
+        `relay.motor` of a relay is supplied too. Others are
         dissipated (`damping`, `friction.belt`, `impact.left`, `impact` of a single contact,
-        `first_order.voltage`) or stored (`kinetic`, `potential`). A contact that is not struck has
+        `first_order.voltage`, `reset.strike` of a surface with an `after_event`) or stored (`kinetic`, `potential`). A contact that is not struck has
         no part: what all take together is the sum where `part.str.startswith("impact")`, of no
         parts 0. The attribute `defect` is what is missing in the sum by rounding, `duration` is D.
         Of loads on a metainterface the unit is that of K2.
@@ -282,7 +301,15 @@ def energies(of: Followed, *, periods: int | None = None) -> xarray.Dataset:
     True
     """
     course = course_of(of, periods)
-    check_system(course.system, "energies", several_contacts=True, multipliers=True, switches=True)
+    check_system(
+        course.system,
+        "energies",
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        resets=True,
+        relays=True,
+    )
     _refuse_moving_walls(course.system)
     parts = _parts(course)
     roles, names = zip(*parts, strict=True)
@@ -368,14 +395,86 @@ def _parts(course: SampledPart) -> Parts:
     ):
         parts[SUPPLIED, "load.together"] = course.integral(v * left)
     parts |= _friction_parts(course, mass, forth)
+    without_relays = course
+    if course.system.model.relays:
+        without_relays = replace(course, relays_off=True)
+        done, own = _relay_parts(without_relays, own, mass)
+        parts |= done
     if course.system.model.first_order:
-        taken, own = _first_order_parts(course, own, mass)
+        taken, own = _first_order_parts(without_relays, own, mass)
         parts |= taken
     parts[DISSIPATED, "damping"] = -course.integral(v * (forth - back) / 2)
     parts |= _impact_parts(course)
+    parts |= _reset_parts(course)
     parts[STORED, "kinetic"] = _kinetic(course, -1) - _kinetic(course, 0)
     growing = np.einsum("in,ijn,jn->n", v, course.rate(mass), v) / 2
     parts[STORED, "potential"] = -course.integral(np.sum(v * own, axis=0) + growing)
+    return parts
+
+
+def _relay_parts(
+    course: SampledPart, own: np.ndarray, mass: np.ndarray
+) -> tuple[Parts, np.ndarray]:
+    """What each relay supplies by the forces that it changes while it is on, and the forces where
+    all of them are off, as they are in `course`.
+    """
+    relays = course.system.model.relays
+    load = Load(frequency=course.system.load.frequency)
+    v = _moving(course, course.velocity)
+    without = _even_force(course, load, mass)
+    parts = Parts()
+    left = own - without
+    for relay in relays:
+        alone = _even_force(replace(course, but_for=relay.name), load, mass) - without
+        parts[SUPPLIED, f"relay.{relay.name}"] = course.integral(v * alone)
+        left = left - alone
+    if len(relays) > 1 and np.abs(v * left).max(initial=0.0) > 1e-12 * np.abs(v * own).max(
+        initial=0.0
+    ):
+        parts[SUPPLIED, "relay.together"] = course.integral(v * left)
+    return parts, without
+
+
+def _resets(motion: Motion) -> dict[float, list[str]]:
+    """The surfaces that reset the state of a motion, by the instants at which they do."""
+    found: dict[float, list[str]] = {}
+    resetting = motion.system.model.resets
+    for event in motion.events if resetting else ():
+        if event.kind is EventKind.CROSSING:
+            names = [
+                name for name in resetting if name in str(getattr(event, "contact", "")).split("+")
+            ]
+            if names:
+                found.setdefault(event.time, []).extend(names)
+    return found
+
+
+def _reset_parts(course: SampledPart) -> Parts:
+    """What resets take of the kinetic energy, by the names of their surfaces; at the instant of an
+    impact beside what this takes.
+    """
+    parts = Parts()
+    within = {
+        time: names
+        for time, names in _resets(course.motion).items()
+        if course.begin < time <= course.end
+    }
+    if not within:
+        return parts
+    impacts = course.motion.events.impacts(EventKind.HELD).time
+    taken = dict.fromkeys(within, 0.0)
+    if np.isin(impacts, list(within)).any():
+        late = impacts[(impacts > course.begin) & (impacts <= course.end)]
+        for time, (_, lost, supplied) in zip(late.tolist(), _impact_losses(course), strict=True):
+            if time in taken:
+                taken[time] += lost - supplied
+    for time, names in within.items():
+        before, after = (
+            _kinetic_at(course, instant) for instant in (np.nextafter(time, -math.inf), time)
+        )
+        name = f"reset.{'+'.join(sorted(set(names)))}"
+        lost = before - after - taken[time]
+        parts[DISSIPATED, name] = parts.get((DISSIPATED, name), 0.0) + lost
     return parts
 
 
@@ -556,7 +655,12 @@ def _impact_losses(course: SampledPart) -> Iterator[tuple[str, float, float]]:
 
 def _kinetic(course: SampledPart, place: int) -> float:
     """The kinetic energy at the beginning (0) or at the end (-1) of the course."""
-    time = np.array([(course.begin, course.end)[place]])
+    return _kinetic_at(course, (course.begin, course.end)[place])
+
+
+def _kinetic_at(course: SampledPart, instant: float) -> float:
+    """The kinetic energy at an instant; where the state jumps, after it."""
+    time = np.array([instant])
     q, v, side = course.motion._states(time)
     v = _moving(course, v)
     return (
@@ -582,6 +686,8 @@ def _force(course: SampledPart, load: Load, mass: np.ndarray, velocity: np.ndarr
     model = course.system.model
     state = _state(course.position, velocity)
     if isinstance(model, ContactModel):
+        if model.relays:
+            load = _with_relays(course, load, state)
         return _rows(mass_and_force(model, course.time, *state, load)[1], course.time)
     answer = model.acceleration(
         course.time, *state, np.where(course.side == 0, 1.0, course.side), load
@@ -593,6 +699,20 @@ def _force(course: SampledPart, load: Load, mass: np.ndarray, velocity: np.ndarr
             _rows(answer if isinstance(answer, tuple) else [answer], course.time),
         )
     )
+
+
+def _with_relays(course: SampledPart, load: Any, state: tuple[Any, Any]) -> Any:
+    """A load together with the sides of surfaces: of relays those that the motion remembers, of
+    others those of the state.
+    """
+    model: Any = course.system.model
+    found = dict(sides_for(model, course.time, *state, load)[0])
+    remembered = modes_of(model, course.side)[2]
+    for surface, side in zip(model.surfaces, remembered, strict=True):
+        if surface in model.relays:
+            off = course.relays_off and surface.name != course.but_for
+            found[surface.name] = np.full(course.time.shape, -1.0) if off else 1.0 * side
+    return LoadOnSides(load, Sides(found))
 
 
 def _state(position: np.ndarray, velocity: np.ndarray) -> tuple[Any, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from saltus.flow import Ending, Recurrence
+from saltus.flow import Ending, Recurrence, end_of
 from saltus.orbits import SettledKind, Settlement, settled_on
 from saltus.systems import System
 
@@ -60,7 +60,7 @@ def recurrence_without_load(
     for i, each in enumerate(found):
         if each.motion is None:
             continue
-        last[i] = each.motion.final_state
+        last[i] = end_of(each.motion)
         extrema[i, 0] = each.motion.extrema.max(), each.motion.extrema.min()
         impacts[i, 0] = len(each.motion.impacts)
     return Recurrence(

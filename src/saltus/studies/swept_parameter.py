@@ -31,6 +31,7 @@ from saltus.flow import (
     find_recurrence,
     own_quantities,
     simulate,
+    start_with_sides,
     state_names,
     unit_of,
 )
@@ -45,7 +46,6 @@ from saltus.systems import (
     check_system,
     driven_displacements,
     natural_units,
-    read_start,
 )
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ class SweepRequest:
     tol: float
     functions: Any
     velocity: Any
+    relays: Any
     coordinates: Any
     own: tuple[Quantity, ...] = field(init=False)  # the functions
     grid: np.ndarray = field(init=False)
@@ -121,7 +122,13 @@ class SweepRequest:
 
     def __post_init__(self) -> None:
         check_system(
-            self.system, "frequency_sweep", several_contacts=True, multipliers=True, switches=True
+            self.system,
+            "frequency_sweep",
+            several_contacts=True,
+            multipliers=True,
+            switches=True,
+            resets=True,
+            relays=True,
         )
         if self.is_free:
             self._check_without_load()
@@ -153,7 +160,13 @@ class SweepRequest:
         object.__setattr__(
             self,
             "start",
-            read_start(self.system, self.velocity, self.coordinates, self.__dataclass_fields__),
+            start_with_sides(
+                self.system,
+                self.velocity,
+                self.relays,
+                self.coordinates,
+                self.__dataclass_fields__,
+            ),
         )
 
     @property
@@ -305,6 +318,7 @@ def frequency_sweep(
     stop_early: bool = True,
     max_period: int = 16,
     velocity: float = 0.0,
+    relays: Mapping[str, bool] | None = None,
     tol: float = 1e-11,
     functions: Functions | None = None,
     progress: Progress = silent,
@@ -346,6 +360,8 @@ def frequency_sweep(
         The longest period looked for.
     velocity, coordinates
         The state at the first value, at phase 0.
+    relays
+        Whether each `Relay` of the model is on there, as `simulate` takes it.
     tol
         The error that one step of the integration may make.
     functions
@@ -380,7 +396,7 @@ def frequency_sweep(
     """
     asked = SweepRequest(
         system=system, path=path, values=values, periods=periods, stop_early=stop_early, max_period=max_period, tol=tol,
-        functions=functions, velocity=velocity, coordinates=coordinates,
+        functions=functions, velocity=velocity, relays=relays, coordinates=coordinates,
     )  # fmt: skip
     there, back = DIRECTIONS[:: -1 if asked.falling else 1]
     order = asked.grid[:: -1 if asked.falling else 1]

@@ -19,6 +19,7 @@ from .contracts.contact_model import mass_rows as mass_rows
 from .contracts.contact_model import normal_forces as normal_forces
 from .contracts.contact_model import on_sides as on_sides
 from .contracts.contact_model import reactions as reactions
+from .contracts.contact_model import sides_for as sides_for
 from .contracts.contact_model import solved_motion as solved_motion
 from .contracts.contact_model import stick_margins as stick_margins
 from .contracts.model import MarginKind as MarginKind
@@ -37,6 +38,7 @@ from .impact_laws import friction_margins as friction_margins
 from .loads.load import Channel as Channel
 from .loads.load import DeclaredLoad as DeclaredLoad
 from .loads.load import Load as Load
+from .loads.load import LoadOnSides as LoadOnSides
 from .loads.load import Sides as Sides
 from .loads.load import corners_between as corners_between
 from .loads.repeating import SAME_CORNER as SAME_CORNER
@@ -86,9 +88,12 @@ from .states import on_this_side as on_this_side
 from .states import read_start as read_start
 from .states import read_starts as read_starts
 from .states import rest_state as rest_state
+from .states import size_with_sides as size_with_sides
 from .states import state_of as state_of
+from .states import state_with_sides as state_with_sides
 from .states import states_beside as states_beside
 from .states import unit_of_time as unit_of_time
+from .states import units_with_sides as units_with_sides
 from .states import within_window as within_window
 from .structures.structure import mode_sums as mode_sums
 from .system import OWN_TIME as OWN_TIME

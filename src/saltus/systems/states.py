@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -204,15 +204,24 @@ def _plain(value: Any) -> Any:
 
 
 def arguments_of(system: System, state: Any) -> dict[str, Any]:
-    """A state (coordinates, velocities) as `simulate` takes it."""
+    """A state (coordinates, velocities) as `simulate` takes it; behind these it may have the sides
+    of the model's relays.
+    """
     names = system.model.coordinates
     moving = len(system.model.moving)
     numbers = [float(x) for x in state]
     velocity = tuple(numbers[len(names) : len(names) + moving])
-    return {
+    found: dict[str, Any] = {
         **dict(zip(names, numbers, strict=False)),
         "velocity": velocity[0] if moving == 1 else velocity,
     }
+    sides = numbers[2 * len(names) :]
+    if sides:
+        relays = system.model.relays
+        found["relays"] = {
+            relay.name: side > 0.0 for relay, side in zip(relays, sides, strict=True)
+        }
+    return found
 
 
 def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
@@ -221,14 +230,47 @@ def state_of(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
     return np.append([arguments[name] for name in system.model.coordinates], velocity)
 
 
+def state_with_sides(system: System, arguments: Mapping[str, Any]) -> np.ndarray:
+    """`state_of`, and behind it the side of each relay, +1 or -1, where the arguments have them."""
+    sides = [1.0 if on in (True, 1) else -1.0 for on in arguments.get("relays", {}).values()]
+    return np.append(state_of(system, arguments), sides)
+
+
+def units_with_sides(system: System) -> np.ndarray:
+    """The natural units of a state; two sides of a relay are two units apart, far more than what
+    returns."""
+    return np.append(natural_units(system).state, np.ones(len(system.model.relays)))
+
+
+def size_with_sides(system: System) -> int:
+    """The number of a state's variables, with the sides of relays behind them."""
+    return system.dimension + len(system.model.relays)
+
+
 def in_gaps(system: System, states: np.ndarray) -> np.ndarray:
     """States (..., d) at phase 0 as those of `system.in_gap_coordinates`."""
-    return states if system.in_gap_coordinates is system else led(system.to_gaps, states)
+    if system.in_gap_coordinates is system:
+        return states
+    return _beside_sides(system, states, lambda own: led(system.to_gaps, own))
 
 
 def from_gaps(system: System, states: np.ndarray) -> np.ndarray:
     """The inverse of `in_gaps`."""
-    return states if system.in_gap_coordinates is system else led(system.from_gaps, states)
+    if system.in_gap_coordinates is system:
+        return states
+    own = 2 * len(system.in_gap_coordinates.model.coordinates)
+    moved = led(system.from_gaps, states[..., :own])
+    return np.concatenate([moved, states[..., own:]], axis=-1)
+
+
+def _beside_sides(
+    system: System, states: np.ndarray, move: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """States (..., d) that are moved; the sides of relays behind them stay."""
+    own = system.dimension
+    if states.shape[-1] == own:
+        return move(states)
+    return np.concatenate([move(states[..., :own]), states[..., own:]], axis=-1)
 
 
 # the half width of the default window, in natural units: about the size of the motions in the paper
@@ -553,6 +595,9 @@ def states_beside(system: System, states: np.ndarray, shifts: np.ndarray) -> np.
 
     Contacts that are then open by no more than rounding are closed.
     """
+    if states.shape[-1] > system.dimension:  # the sides of relays stay
+        by = shifts[..., : system.dimension]
+        return _beside_sides(system, states, lambda own: states_beside(system, own, by))
     if (inner := system.in_gap_coordinates) is not system:
         begin = in_gaps(system, states)
         return from_gaps(
@@ -585,6 +630,8 @@ def before_impacts(system: System, states: np.ndarray) -> np.ndarray:
     at once. Sums of coordinates are moved back by more than the rounding within which they count as
     closed.
     """
+    if states.shape[-1] > system.dimension:
+        return _beside_sides(system, states, lambda own: before_impacts(system, own))
     if system.model.has_multipliers:
         return states.copy()
     inner = system.in_gap_coordinates

@@ -519,13 +519,13 @@ def _check_modes(system: System, asking: str, resets: bool) -> None:
     if known:
         raise ParameterError(
             f"{asking} does not follow relays so far, and {kind} has {known[0]!r}; simulate,"
-            " sensitivities and find_orbit do",
+            " simulate_many, find_orbit and find_attractors do",
             "system",
         )
     if resetting and not resets:
         raise ParameterError(
             f"{asking} does not follow surfaces with an after_event so far, and {kind} has"
-            f" {resetting[0]!r}; simulate, sensitivities and find_orbit do",
+            f" {resetting[0]!r}; simulate, simulate_many, find_orbit and find_attractors do",
             "system",
         )
 

@@ -18,7 +18,7 @@ from saltus.errors import ParameterError
 from saltus.flow import Ending, Recurrence, find_recurrence
 from saltus.progress import Progress, silent
 from saltus.result import check_provenance, identity, provenance
-from saltus.systems import System, before_impacts, natural_units
+from saltus.systems import System, before_impacts, units_with_sides
 
 if TYPE_CHECKING:
     from saltus.sweep import Plan
@@ -213,7 +213,7 @@ def cells(arguments: Mapping[str, Any], block: Mapping[str, Any]) -> dict[str, n
     """
     system = System.from_dict(arguments["system"])
     check_provenance(arguments, system, "this part of the basins")
-    units = natural_units(with_clock(system)).state
+    units = units_with_sides(with_clock(system))
     targets = tuple(Target.from_dict(item, units) for item in arguments["attractors"])
     x, y = arguments["plane"]
     grid = Grid(
@@ -231,7 +231,8 @@ def _label_grid(
     labelling: Labelling, grid: Grid, progress: Progress = silent
 ) -> tuple[np.ndarray, np.ndarray]:
     """Labels and times over the grid, (rows, columns) each."""
-    label, time = labelling.of(grid.states.reshape(-1, labelling.system.dimension), progress)
+    states = grid.states
+    label, time = labelling.of(states.reshape(-1, states.shape[-1]), progress)
     return label.reshape(grid.shape), time.reshape(grid.shape)
 
 

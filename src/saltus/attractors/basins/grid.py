@@ -49,7 +49,7 @@ from saltus.checks import (
     checked_by,
 )
 from saltus.errors import ParameterError, near
-from saltus.flow import check_device, on_device, state_names
+from saltus.flow import check_device, check_relays, on_device, side_name, state_names
 from saltus.orbits import PeriodicOrbit, is_symmetric, same_orbit
 from saltus.progress import Progress, part_of, silent
 from saltus.systems import (
@@ -234,7 +234,18 @@ class BasinSettings:
 SETTINGS = BasinSettings()
 # A misspelt one of these arrives among the coordinates.
 ARGUMENTS: tuple[str, ...]
-ARGUMENTS = ("window", "points", "velocity", "found", "periods", "within", "curves", "tol", "rows")
+ARGUMENTS = (
+    "window",
+    "points",
+    "velocity",
+    "relays",
+    "found",
+    "periods",
+    "within",
+    "curves",
+    "tol",
+    "rows",
+)
 ARGUMENTS += ("store", "workers", "scheduler", "device", "progress")
 
 
@@ -243,6 +254,7 @@ def _check(
     window: Any,
     points: int,
     velocity: Any,
+    relays: Any,
     found: Attractors | None,
     periods: int,
     within: float,
@@ -258,7 +270,7 @@ def _check(
 ) -> None:
     check_device(device, system, workers, scheduler)
     check_count("points", points, 2)
-    grid = _grid(with_clock(system), velocity, coordinates, found, window, points)
+    grid = _grid(with_clock(system), velocity, relays, coordinates, found, window, points)
     axes = dict(zip(grid.plane, (grid.horizontal, grid.vertical), strict=True))
     for name in system.model.coordinates:
         check_reached(system.model, name, axes.get(name, grid.fixed[name]), name)
@@ -293,6 +305,7 @@ def basins_of_attraction(
     window: Box | None = None,
     points: int = SETTINGS.cells,
     velocity: Iterable[float] | None = None,
+    relays: Mapping[str, bool] | None = None,
     found: Attractors | None = None,
     periods: int = SETTINGS.periods,
     within: float = SETTINGS.within,
@@ -329,6 +342,9 @@ def basins_of_attraction(
         The number of values along each of the two.
     velocity
         The velocities of the grid themselves, increasing, in place of those of the window.
+    relays
+        Whether each `Relay` of the model is on in the states of the grid between its thresholds,
+        such as {"heater": True}.
     found
         The attractors and their labels; by default those that `find_attractors` finds, over the
         grid.
@@ -377,7 +393,7 @@ def basins_of_attraction(
     array([1], dtype=int16)
     """
     clock = with_clock(system)
-    grid = _grid(clock, velocity, coordinates, found, window, points)
+    grid = _grid(clock, velocity, relays, coordinates, found, window, points)
     progress(0.0, "attractors")
     if found is None:
         found = find_attractors(
@@ -499,6 +515,31 @@ def _around(system: System, grid: Grid) -> Window:
 
 
 def _grid(
+    system: System,
+    velocity: Any,
+    relays: Any,
+    coordinates: Mapping[str, Any],
+    found: Attractors | None,
+    window: Any,
+    points: int,
+) -> Grid:
+    """The plane of the initial states, with the sides of relays behind them."""
+    grid = _plane(system, velocity, coordinates, found, window, points)
+    known = [relay.name for relay in system.model.relays]
+    if relays is not None:
+        check_relays(system, relays)
+    for name in known:
+        if (relays or {}).get(name) not in (True, False):
+            raise ParameterError(
+                f"a picture of basins has the relay {name!r} on one side between its thresholds:"
+                f" give relays={{{name!r}: True}}, or False",
+                "relays",
+            )
+    sides = {side_name(name): 1.0 if relays[name] else -1.0 for name in known}
+    return replace(grid, fixed=grid.fixed | sides)
+
+
+def _plane(
     system: System,
     velocity: Any,
     coordinates: Mapping[str, Any],

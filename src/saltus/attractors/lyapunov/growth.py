@@ -22,8 +22,9 @@ from scipy.special import stdtrit
 
 from saltus.attractors.stroboscopic_section import check_periodic
 from saltus.checks import check_count, check_number
-from saltus.flow import Stop, ensemble_from
-from saltus.systems import System, check_system, natural_units, states_beside
+from saltus.errors import MotionError
+from saltus.flow import Stop, end_of, ensemble_from, goes_alone, sensitivities
+from saltus.systems import System, arguments_of, check_system, natural_units, states_beside
 
 
 @dataclass(frozen=True)
@@ -176,7 +177,15 @@ def check_run(function: str, system: Any, periods: Any, transient: Any, tol: flo
     ParameterError
         The error has the name of the argument.
     """
-    check_system(system, function, several_contacts=True, multipliers=True, switches=True)
+    check_system(
+        system,
+        function,
+        several_contacts=True,
+        multipliers=True,
+        switches=True,
+        resets=True,
+        relays=True,
+    )
     check_periodic(system)
     check_count("periods", periods, 2 * LYAPUNOV.batches)
     check_count("transient", transient, 0)
@@ -240,7 +249,9 @@ class Perturbations(ABC):
         self.columns = {path: np.repeat(values, self.size) for path, values in parameters.items()}
         self.here = states.reshape(-1, d).copy()  # (n, d): nan once a motion is lost
         self.units = natural_units(system).perturbation  # in which perturbations are measured
-        self.direction = np.full_like(self.here, math.sqrt(1.0 / d))
+        # the sides of relays, which are behind the states, are not perturbed
+        self.own = system.dimension
+        self.direction = np.full((len(self.here), self.own), math.sqrt(1.0 / self.own))
         # ln of the factor by which each has grown; nan once its motion is lost
         self.growth = np.zeros(groups * self.size)
         self.periods = np.zeros(groups, dtype=int)
@@ -312,29 +323,68 @@ def stretched(
     """
     here = np.isfinite(states).all(axis=1)
     later = np.full_like(states, np.nan)
-    turned = np.full_like(states, np.nan)
+    turned = np.full_like(direction, np.nan)
     growth = np.full(len(states), np.nan)
     if not here.any():
         return later, turned, growth
     chosen = {path: values[here] for path, values in columns.items()}
     units = natural_units(system).perturbation
-    ends = ensemble_from(
-        system, states[here], periods, parameters=chosen, tol=tol, until=("rest",), derivatives=True
-    )
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        grown = np.einsum("nij,nj->ni", ends.derivatives, direction[here] * units) / units
-        # squares of perturbations that have grown by 1e200 would overflow
-        size = np.abs(grown).max(axis=1, keepdims=True)
-        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
+    if goes_alone(system.model):
+        last, derivatives, moving = _followed_alone(system, states[here], chosen, periods, tol)
+    else:
+        ends = ensemble_from(
+            system,
+            states[here],
+            periods,
+            parameters=chosen,
+            tol=tol,
+            until=("rest",),
+            derivatives=True,
+        )
+        last, derivatives = ends.last, ends.derivatives
         # Motions that are captured at rest are given up, as following their impacts to the rest
         # would take millions of these.
         moving = (ends.side != 0) & ~ends.stopped(Stop.CAPTURED)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        grown = np.einsum("nij,nj->ni", derivatives, direction[here] * units) / units
+        # squares of perturbations that have grown by 1e200 would overflow
+        size = np.abs(grown).max(axis=1, keepdims=True)
+        length = size[:, 0] * np.linalg.norm(grown / np.where(size > 0.0, size, 1.0), axis=1)
         gone = length == 0.0  # after a rest all that was beside the motion is in the same state
         going = moving & np.isfinite(length) & ((length > 0.0) | gone)
         growth[here] = np.where(going, np.log(np.maximum(length, np.finfo(float).tiny)), np.nan)
         turned[here] = np.where(gone[:, None], direction[here], grown / length[:, None])
-    later[here] = np.where(going[:, None], ends.last, np.nan)
+    later[here] = np.where(going[:, None], last, np.nan)
     return later, turned, growth
+
+
+def _followed_alone(
+    system: System,
+    states: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    periods: int,
+    tol: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The ends of motions that are followed one by one, (n, d), their derivatives, and which of them
+    go on moving.
+    """
+    own = system.dimension
+    last = np.full_like(states, np.nan)
+    derivatives = np.full((len(states), own, own), np.nan)
+    moving = np.zeros(len(states), dtype=bool)
+    for row, state in enumerate(states):
+        numbers = {path: float(values[row]) for path, values in columns.items()}
+        one = system.with_(numbers) if numbers else system
+        try:
+            found = sensitivities(
+                one, **arguments_of(one, state), periods=periods, tol=tol, dense=False
+            )
+        except MotionError:
+            continue
+        last[row] = end_of(found.motion)
+        derivatives[row] = found.state
+        moving[row] = found.motion.stop is Stop.HORIZON
+    return last, derivatives, moving
 
 
 class Neighbours(Perturbations):
@@ -367,9 +417,10 @@ class Neighbours(Perturbations):
         first, second = ends.last.reshape(2, *here.shape)
         going = moving.reshape(2, -1).all(axis=0) & np.isfinite(first).all(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            apart = (second - first) / self.units
+            apart = (second - first)[:, : self.own] / self.units
             length = np.linalg.norm(apart, axis=1)
-            factor = length / np.linalg.norm((beside - here) / self.units, axis=1)
+            begun = (beside - here)[:, : self.own] / self.units
+            factor = length / np.linalg.norm(begun, axis=1)
             turned = apart / length[:, None]
             growth = np.log(factor)
         weak = np.flatnonzero(going & ~(factor > LYAPUNOV.least_of_pair))

@@ -38,7 +38,7 @@ from saltus.flow import (
 )
 from saltus.progress import LOOK_INTERVAL, Progress, part_of, silent
 from saltus.result import provenance
-from saltus.systems import NaturalUnits, System, natural_units
+from saltus.systems import NaturalUnits, System, check_system, natural_units
 
 if TYPE_CHECKING:
     import xarray
@@ -248,6 +248,7 @@ def lyapunov_many(
     'positive', 'resolution']
     """
     check_run("lyapunov_many", system, periods, transient, tol)
+    check_system(system, "lyapunov_many", several_contacts=True, multipliers=True, switches=True)
     if len(system.in_gap_coordinates.model.coordinates) > 1:
         raise ParameterError(
             "lyapunov_many works on models with one coordinate; lyapunov_spectrum takes any, one "

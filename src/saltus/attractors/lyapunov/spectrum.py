@@ -24,10 +24,18 @@ from saltus.attractors.lyapunov.growth import (
 )
 from saltus.bounds import Interval, Leaves, enclose, reads
 from saltus.checks import Speeds, check_number
-from saltus.flow import EventKind, Motion, Stop, sensitivities, simulate
+from saltus.flow import (
+    EventKind,
+    Motion,
+    Stop,
+    end_of,
+    sensitivities,
+    simulate,
+    start_with_sides,
+)
 from saltus.progress import Progress, part_of, silent
 from saltus.result import Result, result_dataset
-from saltus.systems import System, arguments_of, natural_units, read_start, states_beside
+from saltus.systems import System, arguments_of, natural_units, states_beside
 from saltus.taylor import Expr, differentiate, substitute, trace
 
 if TYPE_CHECKING:
@@ -153,13 +161,14 @@ def separation_growth(
     """
     here = state
     units = natural_units(system).perturbation
-    away = units * (LYAPUNOV.distance / np.sqrt(here.size))
+    own = len(units)  # behind it are the sides of relays
+    away = units * (LYAPUNOV.distance / np.sqrt(own))
     growth = np.full(periods, -np.inf)
     for p in range(periods):
         beside = states_beside(system, here, away)
         following = _mapped(system, here, length)
-        before = float(np.linalg.norm((beside - here) / units))
-        apart = _mapped(system, beside, length) - following
+        before = float(np.linalg.norm((beside - here)[:own] / units))
+        apart = (_mapped(system, beside, length) - following)[:own]
         distance = float(np.linalg.norm(apart / units))
         if distance == 0.0 or before == 0.0:
             break
@@ -173,9 +182,7 @@ def separation_growth(
 def _mapped(system: System, state: np.ndarray, length: float) -> np.ndarray:
     """The state a period later."""
     start = arguments_of(system, state)
-    return simulate(
-        system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False
-    ).final_state
+    return end_of(simulate(system, **start, duration=length, tol=LYAPUNOV.tolerance, dense=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,13 +357,14 @@ class Exponents(Result):
 
 
 # arguments of `lyapunov_spectrum` beside the state
-NAMES = ("periods", "transient", "tol", "two_trajectories", "progress")
+NAMES = ("relays", "periods", "transient", "tol", "two_trajectories", "progress")
 
 
 def lyapunov_spectrum(
     system: System,
     *,
     velocity: Speeds = 0.0,
+    relays: Mapping[str, bool] | None = None,
     periods: int = 1000,
     transient: int = 200,
     tol: float = 1e-12,
@@ -387,6 +395,8 @@ def lyapunov_spectrum(
         as the period.
     velocity, coordinates
         The state at the start, at phase 0.
+    relays
+        Whether each `Relay` of the model is on at the start, as `simulate` takes it.
     periods
         The number of forcing periods over which to average, at least 32.
     transient
@@ -415,17 +425,17 @@ def lyapunov_spectrum(
     run = _Run(system, periods)
     begin = coordinates.pop("time", 0.0)  # as `PeriodicOrbit.start` gives it
     check_number("time", begin)
-    start = arguments_of(system, read_start(system, velocity, coordinates, NAMES))
+    start = arguments_of(system, start_with_sides(system, velocity, relays, coordinates, NAMES))
     span = transient * run.length + (-begin) % run.length  # up to phase 0
     motion = simulate(system, **start, time=begin, duration=span, tol=tol, dense=False)
-    run.state = arguments_of(system, motion.final_state)
+    run.state = arguments_of(system, end_of(motion))
     run.note = _lost(motion)
     share = 0.6 if two_trajectories else 1.0
     run.stretch_frames(tol, part_of(progress, 0.0, share))
     growth = np.full(LYAPUNOV.batches, np.nan)
     if two_trajectories and run.note is None:
         growth = separation_growth(
-            system, motion.final_state, periods, run.length, part_of(progress, share, 1.0)
+            system, end_of(motion), periods, run.length, part_of(progress, share, 1.0)
         )
     progress(1.0, "exponents")
     return run.exponents(growth)
@@ -490,7 +500,7 @@ class _Run:
             self.stretch[p] += np.log(lengths)
         self.areas[p] += contraction.along(found.motion)
         self.condition = max(self.condition, float(np.linalg.cond(derivatives)))
-        self.state = arguments_of(self.system, found.motion.final_state)
+        self.state = arguments_of(self.system, end_of(found.motion))
         return np.asarray(frame)
 
     def exponents(self, growth: np.ndarray) -> Exponents:

@@ -17,14 +17,14 @@ import numpy as np
 from saltus.enumerations import NumberedSentence
 from saltus.flow.lanes.ensemble import run_ensemble, simulate_many
 from saltus.flow.lanes.ensemble_result import EnsembleResult
-from saltus.flow.lanes.inputs import read_inputs
+from saltus.flow.lanes.inputs import Inputs, read_inputs
 from saltus.flow.lanes.options import EnsembleOptions, Sample, Until, read_threads
 from saltus.flow.long_time.load_release import load_releases
 from saltus.flow.motion.events import Stop
 from saltus.flow.motion.motion import state_names
 from saltus.flow.programs.compiled import limits_of
 from saltus.progress import Progress, silent
-from saltus.systems import System, natural_units
+from saltus.systems import System, units_with_sides
 
 if TYPE_CHECKING:
     import xarray
@@ -344,7 +344,8 @@ def find_recurrence(
     system
         What moves, under a load with a frequency.
     states
-        The states at the start, (n, d): coordinates, then velocities.
+        The states at the start, (n, d): coordinates, then velocities, then the sides of relays;
+        states of the result are such too.
     periods
         The largest number of forcing periods for which a motion is followed.
     parameters
@@ -391,15 +392,14 @@ def find_recurrence(
         from_start=from_start or bool(limits),
     )
     last = max(1, min(max(size, max_period if extrema or impact_count or speed else 1), periods))
-    coordinates, velocity = _as_arguments(system, states)
-    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    inputs = _inputs(system, states, parameters)
     result = run_ensemble(
         system, inputs, options, read_threads(threads), progress, last=last, captured=captured
     )
     found = replace(_read(result), outcome=_outcome(result, parameters is not None))
     if found.extrema is not None and not options.from_start:
         found.extrema[~result.stopped(Stop.HORIZON, Stop.REST, Stop.SETTLED)] = np.nan
-    units = natural_units(system).state
+    units = units_with_sides(system)
     found = _with_periods(
         found, result.recurrence_period if stop_early else None, max_period, settings, units
     )
@@ -416,8 +416,8 @@ def find_recurrence(
 
 def motions_from(system: System, states: np.ndarray, **options: Any) -> xarray.Dataset:
     """`simulate_many` from states (n, d) at phase 0; `ensemble_from` is faster."""
-    coordinates, velocity = _as_arguments(system, states)
-    return simulate_many(system, **coordinates, velocity=velocity, **options)
+    coordinates, velocity, relays = _as_arguments(system, states)
+    return simulate_many(system, **coordinates, velocity=velocity, relays=relays, **options)
 
 
 def ensemble_from(
@@ -439,19 +439,31 @@ def ensemble_from(
     options = EnsembleOptions(
         tol=tol, periods=periods, limits=limits_of(system, ()), until=until, paths=paths
     )
-    coordinates, velocity = _as_arguments(system, states)
-    inputs = read_inputs(system, velocity, 0.0, parameters, coordinates)
+    inputs = _inputs(system, states, parameters)
     return run_ensemble(system, inputs, options, read_threads(None), silent)
 
 
-def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any]:
-    """States (n, d) as `simulate_many` takes them: coordinates by name, and the velocity."""
+def _inputs(
+    system: System, states: np.ndarray, parameters: Mapping[str, np.ndarray] | None
+) -> Inputs:
+    """Motions from states (n, d) at phase 0, with parameters of their own."""
+    coordinates, velocity, relays = _as_arguments(system, states)
+    return read_inputs(system, velocity, 0.0, parameters, coordinates, relays)
+
+
+def _as_arguments(system: System, states: np.ndarray) -> tuple[dict[str, Any], Any, Any]:
+    """States (n, d) as `simulate_many` takes them: coordinates by name, the velocity, and the sides
+    of relays if they are behind them.
+    """
     names = system.model.coordinates
     moving = system.model.moving
     velocities = tuple(states[:, len(names) + i] for i in range(len(moving)))
-    return {name: states[:, i] for i, name in enumerate(names)}, velocities[0] if len(
-        moving
-    ) == 1 else velocities
+    coordinates = {name: states[:, i] for i, name in enumerate(names)}
+    relays = None
+    if states.shape[1] > 2 * len(names):
+        sides = states[:, 2 * len(names) :].T
+        relays = {each.name: s for each, s in zip(system.model.relays, sides, strict=True)}
+    return coordinates, velocities[0] if len(moving) == 1 else velocities, relays
 
 
 def last_states(system: System, result: xarray.Dataset) -> np.ndarray:

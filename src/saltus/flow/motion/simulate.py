@@ -267,6 +267,43 @@ def relays_at(
     return found
 
 
+def start_with_sides(
+    system: System,
+    velocity: Any,
+    relays: Mapping[str, Any] | None,
+    coordinates: Mapping[str, Any],
+    arguments: Iterable[str],
+) -> np.ndarray:
+    """`read_start`, and behind it the sides of the model's relays, `relays_at`."""
+    start = read_start(system, velocity, coordinates, arguments)
+    if relays is None and not system.model.relays:
+        return start
+    return np.append(start, [*map(float, relays_at(system, relays, 0.0, start).values())])
+
+
+def relays_in_turns(system: System, states: np.ndarray) -> np.ndarray:
+    """States (n, d) at time 0, and behind them the sides of the model's relays, +1 or -1: as their
+    functions set them and, where these do not, by turns.
+    """
+    relays = system.model.relays
+    if not relays:
+        return states
+    sides = np.empty((len(states), len(relays)))
+    for row, state in enumerate(states):
+        turn = {relay.name: bool(row >> i & 1) for i, relay in enumerate(relays)}
+        sides[row] = list(relays_at(system, turn, 0.0, state).values())
+    return np.concatenate([states, sides], axis=1)
+
+
+def end_of(motion: Motion) -> np.ndarray:
+    """The state at the end of a motion, and behind it the sides of its model's relays."""
+    relays = motion.system.model.relays
+    if not relays:
+        return motion.final_state
+    sides = motion.sides
+    return np.append(motion.final_state, [float(sides[relay.name]) for relay in relays])
+
+
 def check_relays(system: System, given: Any) -> None:
     """Refuse anything but a dictionary from relays of a system's model."""
     known = [relay.name for relay in system.model.relays]

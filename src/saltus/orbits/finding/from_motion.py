@@ -50,8 +50,9 @@ from saltus.systems import (
     natural_units,
     on_this_side,
     read_start,
-    state_of,
+    state_with_sides,
     states_beside,
+    units_with_sides,
 )
 
 
@@ -305,22 +306,11 @@ def _refuse_rest(system: System, motion: Motion, state: dict[str, Any]) -> None:
 
 def _stroboscopic_states(system: System, state: dict[str, Any], count: int) -> np.ndarray:
     """The states after 0, 1, ..., count forcing periods, each with the sides of its relays."""
-    states = [_with_sides(system, state)]
+    states = [state_with_sides(system, state)]
     for _ in range(count):
         state = _after(system, state, 1)
-        states.append(_with_sides(system, state))
+        states.append(state_with_sides(system, state))
     return np.array(states)
-
-
-def _with_sides(system: System, state: dict[str, Any]) -> np.ndarray:
-    """A state, and 1 for each relay that is on."""
-    return np.append(state_of(system, state), [*map(float, state.get("relays", {}).values())])
-
-
-def _units_with_sides(system: System) -> np.ndarray:
-    """The natural units of the state; two sides of a relay are one unit apart, far more than what
-    returns."""
-    return np.append(natural_units(system).state, np.ones(len(system.model.relays)))
 
 
 def _returning(
@@ -328,7 +318,7 @@ def _returning(
 ) -> int | None:
     """The fewest forcing periods after which a settled motion returns, or None."""
     states = _stroboscopic_states(system, state, period or max_period)[::-1]
-    units = _units_with_sides(system)
+    units = units_with_sides(system)
     if period is None:
         return int(return_period(states, max_period, units=units)) or None
     near = return_distances(states, period, units)[-1] < RECURRENCE.near_return
@@ -342,7 +332,7 @@ def _period_of(system: System, state: dict[str, Any], period: int | None, max_pe
     if period is not None:
         return period
     states = _stroboscopic_states(system, state, max_period)[::-1]
-    return nearest_return(states, max_period, _units_with_sides(system))
+    return nearest_return(states, max_period, units_with_sides(system))
 
 
 def _polish(

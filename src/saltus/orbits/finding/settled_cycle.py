@@ -9,7 +9,7 @@ from enum import Enum, auto
 import numpy as np
 
 from saltus.errors import MotionError
-from saltus.flow import Motion, Stop, sensitivities, simulate
+from saltus.flow import Motion, Stop, end_of, sensitivities, simulate
 from saltus.orbits.contract.equations import OrbitEquations
 from saltus.orbits.equations.kinds import equations_of
 from saltus.orbits.finding.cycles import (
@@ -80,7 +80,7 @@ def settled_on(system: System, state: np.ndarray, longest: float, tol: float) ->
             )
             if before.limit is not None:
                 return Settlement(SettledKind.ENDED, 0.0, passed, None)
-            state = before.final_state
+            state = end_of(before)
             motion = simulate(
                 system, **arguments_of(system, state), duration=SETTINGS.window * unit, tol=tol
             )
@@ -95,7 +95,7 @@ def settled_on(system: System, state: np.ndarray, longest: float, tol: float) ->
             away = _way_off(base, state, unit)
             if away is None:
                 return Settlement(SettledKind.EQUILIBRIUM, 0.0, passed, motion)
-            state = state + away
+            state = state + np.append(away, np.zeros(len(state) - len(away)))
             wait *= 2.0
             continue
         orbit = _cycle_from(base, state)
