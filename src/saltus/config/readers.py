@@ -313,11 +313,22 @@ def read_anything(value: Any) -> Any:
     return value
 
 
+def read_switches(value: Any) -> dict[str, bool]:
+    """A table of names with true or false, such as { heater = true }."""
+    if not isinstance(value, Mapping) or not all(isinstance(on, bool) for on in value.values()):
+        raise ValueError(
+            f"must be a table of names with true or false, such as {{ heater = true }}, got"
+            f" {show(value)}"
+        )
+    return {read_text(name): bool(on) for name, on in value.items()}
+
+
 READERS: dict[Any, Reader] = {
     float: read_number,
     int: read_whole,
     str: read_text,
     bool: read_switch,
+    Mapping[str, bool]: read_switches,
     Pair: read_pair,
     tuple[Pair, ...]: read_pairs,
     tuple[str, str]: read_paths,

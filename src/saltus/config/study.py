@@ -20,6 +20,7 @@ from saltus.config.readers import (
     read_angle,
     read_number,
     read_source,
+    read_switches,
     read_table,
     read_text,
     read_values,
@@ -107,6 +108,7 @@ def _readers(model: Model, margins: tuple[str, ...]) -> dict[str, Reader]:
         "tol": read_within(read_number, at_least=1e-15, at_most=1e-6),
         "time": read_number,
         "side": _read_side,
+        "relays": read_switches,
         "stop_at": read_margins,
         "samples": read_within(read_whole, at_least=2, at_most=10_000_000),
     }
