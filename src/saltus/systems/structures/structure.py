@@ -30,7 +30,13 @@ import numpy as np
 
 from saltus.checks import LIMITS, answered, check_count, check_number
 from saltus.errors import ParameterError, near, shown
-from saltus.systems.contracts.contact_model import Contact, ContactModel, Friction, Surface
+from saltus.systems.contracts.contact_model import (
+    Contact,
+    ContactModel,
+    Friction,
+    Relay,
+    Surface,
+)
 from saltus.systems.contracts.model import Count, first_of_largest, is_zero
 from saltus.systems.files.matrix_files import matrices_in
 from saltus.systems.files.record_files import (
@@ -904,6 +910,12 @@ def _part(
                 field,
             )
         part = kind(**part)
+    if isinstance(part, Relay) or getattr(part, "after_event", None) is not None:
+        raise ParameterError(
+            f"{field}.{part.name}: a Structure has no methods of its own, which a Relay and an"
+            " after_event name; take a ContactModel with the same matrices in its force",
+            field,
+        )
     if not isinstance(part, kind):
         raise ParameterError(f"{field} must be of class {kind.__name__}, got {shown(part)}", field)
     where = f"{field}.{part.name}"
