@@ -307,6 +307,13 @@ class Reference:
     def drive(self, t):
         return math.sin(self.w * t)
 
+    def next_corner(self, t):
+        """The next instant after t at which the load has a corner or jumps."""
+        return math.inf
+
+    def enter(self, t):
+        """Go on with what the load is from a corner on."""
+
     def field(self, t, s, motor, valve):
         m, drive = self.m, self.drive(t)
         x, y, w, vx, vy = s
@@ -338,7 +345,9 @@ class Reference:
         t, s = 0.0, np.array(start, dtype=float)
         sides = [1 if guard(0.0, s) >= 0.0 else -1 for guard, _ in self.guards(motor, valve)]
         events = []
+        self.enter(t)
         while t < end:
+            until = min(end, self.next_corner(t))
             guards = []
             for number, (guard, once) in enumerate(self.guards(motor, valve)):
                 event = lambda t, s, guard=guard: guard(t, s)  # noqa: E731
@@ -347,7 +356,7 @@ class Reference:
                 guards.append(event)
             run = solve_ivp(
                 lambda t, s, motor=motor, valve=valve: self.field(t, s, motor, valve),
-                (t, end),
+                (t, until),
                 s,
                 "DOP853",
                 events=guards,
@@ -356,12 +365,19 @@ class Reference:
                 max_step=0.05,
             )
             t, s = run.t[-1], run.y[:, -1].copy()
+            number = None
             if run.status != 1:
-                break
-            number = next(i for i, hits in enumerate(run.t_events) if len(hits))
-            events.append((number, t))
+                if until == end:
+                    break
+                t = until
+                self.enter(t)
+            else:
+                number = next(i for i, hits in enumerate(run.t_events) if len(hits))
+                events.append((number, t))
             x, y, w, vx, vy = s
-            if number == 0:
+            if number is None:
+                pass
+            elif number == 0:
                 motor = -motor
             elif number == 1:
                 sides[1] = -sides[1]
@@ -378,12 +394,12 @@ class Reference:
                 s[1], s[4] = m.floor, -self.e * vy
             # jumps may set relays too, and take the state across the other surface
             (on, off), (full, empty) = self.set_by(t, s)
-            if number in (1, 3, 4, 2):
+            if number in (1, 3, 4, 2, None):
                 before = motor, valve
                 motor = 1 if on > 0.0 else -1 if off > 0.0 else motor
                 valve = 1 if full > 0.0 else -1 if empty > 0.0 else valve
                 events += [(k, t) for k in (0, 2) if (motor, valve)[k // 2] != before[k // 2]]
-            if number != 1 or sides[1] > 0:
+            if number is not None and (number != 1 or sides[1] > 0):
                 value = s[2] + 0.3 * s[1] - m.fires_at
                 sides[1] = 1 if value > 0.0 else -1
         return s, events
@@ -410,37 +426,47 @@ def random_machine(seed):
 NAMES = ["motor", "fire", "valve", "wall", "floor"]
 
 
+def compared(seed, reference_of, load_of, end=15.0):
+    """The names of the events of a random machine and of its reference, the largest difference of
+    their instants, and that of the states at the end, relative to their size above 1."""
+    model, draw = random_machine(seed)
+    frequency, restitution = draw(0.6, 2.0), draw(0.3, 0.9)
+    start = draw(-0.4, 0.4, 5)
+    sides = {"motor": -1, "valve": -1}
+    reference = reference_of(model, frequency, restitution)
+    reference.enter(0.0)
+    for name, (on, _) in zip(sides, reference.set_by(0.0, start), strict=True):
+        sides[name] = 1 if on > 0.0 else -1
+    state, events = reference.run(start, *sides.values(), end)
+    system = System(
+        model=model,
+        load=Load(frequency=frequency, force=load_of(reference)),
+        impact=NewtonImpact(restitution),
+    )
+    motion = simulate(
+        system,
+        x=start[0],
+        y=start[1],
+        w=start[2],
+        velocity=(start[3], start[4]),
+        duration=end,
+        relays=sides,
+    )
+    found = np.array([*motion.position, *motion.velocity[:2]])
+    names = [str(event.contact) for event in motion.events], [NAMES[k] for k, _ in events]
+    apart = math.inf
+    if names[0] == names[1]:
+        apart = np.abs(times_of(motion) - [t for _, t in events]).max(initial=0.0)
+    # of some machines kicks make speeds grow for ever
+    return *names, apart, np.abs(found - state).max() / max(1.0, np.abs(state).max())
+
+
 @pytest.mark.parametrize("first", range(0, 60, 10))
 def test_random_machines_beside_dop853(first):
     for seed in range(first, first + 10):
-        model, draw = random_machine(seed)
-        frequency, restitution = draw(0.6, 2.0), draw(0.3, 0.9)
-        start = draw(-0.4, 0.4, 5)
-        sides = {"motor": -1, "valve": -1}
-        reference = Reference(model, frequency, restitution)
-        for name, (on, _) in zip(sides, reference.set_by(0.0, start), strict=True):
-            sides[name] = 1 if on > 0.0 else -1
-        end = 15.0
-        state, events = reference.run(start, *sides.values(), end)
-        system = System(
-            model=model,
-            load=Load(frequency=frequency, force=Harmonic(1.0)),
-            impact=NewtonImpact(restitution),
-        )
-        motion = simulate(
-            system,
-            x=start[0],
-            y=start[1],
-            w=start[2],
-            velocity=(start[3], start[4]),
-            duration=end,
-            relays=sides,
-        )
-        found = np.array([*motion.position, *motion.velocity[:2]])
-        named = [(str(event.contact), event.time) for event in motion.events]
-        assert [name for name, _ in named] == [NAMES[k] for k, _ in events], seed
-        assert np.allclose([t for _, t in named], [t for _, t in events], rtol=0.0, atol=1e-9), seed
-        assert np.allclose(found, state, rtol=0.0, atol=1e-9), (seed, found - state)
+        named, expected, late, apart = compared(seed, Reference, lambda _: Harmonic(1.0))
+        assert named == expected, seed
+        assert max(late, apart) < 1e-9, (seed, late, apart)
 
 
 def ends(system, start, sides, end):
