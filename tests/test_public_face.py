@@ -59,7 +59,17 @@ FORMULAS = (
     saltus.Contact,
     saltus.systems.ImpactLaw,
 )
-MADE_INSIDE = ("PeriodicOrbit.known", "PeriodicOrbit.near", "ParameterError.inside")
+MADE_INSIDE = (
+    "PeriodicOrbit.known",
+    "PeriodicOrbit.near",
+    "ParameterError.inside",
+    # what tracing and starts ask a part of a model (`flow/contacts/parts.py`)
+    "Surface.guard",
+    "Surface.marks",
+    "Relay.guard",
+    "Relay.marks",
+    "Relay.start_side",
+)
 
 # What is tried, by what stands in the annotation: numbers, or as many numbers as a list has.
 # Of processor time: what hangs. A film, the longest of these answers, takes ten on a slow machine.

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from test_relays_and_resets import Machine, Neuron, Thermostat
+from machines_with_memory import Neuron, Thermostat
+from test_relays_and_resets import Machine
 
 import saltus
 from saltus import Harmonic, Load, NewtonImpact, ParameterError, System, simulate, simulate_many

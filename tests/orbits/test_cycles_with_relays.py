@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from machines_with_memory import PushedServo, ThermostatInWeather
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
@@ -13,49 +14,6 @@ import saltus
 from saltus import Relay
 from saltus.errors import MotionError, ParameterError
 from saltus.systems import ContactModel, Harmonic, Load, System
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thermostat(ContactModel):
-    """A room that cools to 10 degrees in the time 10, and is heated below 19 and not above 21."""
-
-    below: float = 19.0
-    above: float = 21.0
-
-    coordinates: ClassVar[tuple[str, ...]] = ("T",)
-    first_order: ClassVar[tuple[str, ...]] = ("T",)
-    channels: ClassVar[tuple[str, ...]] = ("weather",)
-    surfaces: ClassVar[tuple[Relay, ...]] = (Relay(name="heater", on="too_cold", off="too_warm"),)
-
-    def too_cold(self, t, temperature, velocity, load):
-        return self.below - temperature
-
-    def too_warm(self, t, temperature, velocity, load):
-        return temperature - self.above
-
-    def force(self, t, temperature, velocity, load, sides):
-        heat = 3.0 * (1.0 + sides.heater) / 2.0
-        return -0.1 * (temperature - 10.0) + heat + load.weather(t)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Servo(ContactModel):
-    """A motor with friction that a relay with hysteresis drives back: y'' + y' = -u + a load."""
-
-    width: float = 0.2
-
-    coordinates: ClassVar[tuple[str, ...]] = ("y",)
-    channels: ClassVar[tuple[str, ...]] = ("push",)
-    surfaces: ClassVar[tuple[Relay, ...]] = (Relay(name="drive", on="above", off="below"),)
-
-    def above(self, t, y, velocity, load):
-        return y - self.width
-
-    def below(self, t, y, velocity, load):
-        return -self.width - y
-
-    def force(self, t, y, velocity, load, sides):
-        return load.push(t) - velocity - sides.drive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +53,7 @@ def half_of_servo(width):
 
 
 def test_a_thermostat_has_its_cycle_and_its_branch_over_a_threshold():
-    room = System(model=Thermostat(), load=Load())
+    room = System(model=ThermostatInWeather(), load=Load())
     orbit = saltus.find_orbit(room, T=20.0, relays={"heater": True})
     assert orbit.period == pytest.approx(FREE, abs=1e-12)
     assert orbit.multipliers.size == 0
@@ -115,7 +73,7 @@ def test_a_thermostat_has_its_cycle_and_its_branch_over_a_threshold():
 
 
 def test_a_servo_has_its_limit_cycle_over_the_width_of_its_hysteresis():
-    orbit = saltus.find_orbit(System(model=Servo(), load=Load()), y=0.5)
+    orbit = saltus.find_orbit(System(model=PushedServo(), load=Load()), y=0.5)
     assert orbit.period == pytest.approx(2.0 * half_of_servo(0.2), abs=1e-12)
     # each half multiplies deviations by exp(-tau)
     assert orbit.multipliers == pytest.approx([math.exp(-orbit.period)], abs=1e-12)
@@ -131,8 +89,8 @@ def test_a_servo_has_its_limit_cycle_over_the_width_of_its_hysteresis():
 
 
 def test_a_branch_with_relays_is_read_from_its_dataset():
-    saltus.register(Servo)
-    orbit = saltus.find_orbit(System(model=Servo(), load=Load()), y=0.5)
+    saltus.register(PushedServo)
+    orbit = saltus.find_orbit(System(model=PushedServo(), load=Load()), y=0.5)
     branch = saltus.continue_orbit(orbit, "model.width", (0.1, 0.3))
     read = saltus.orbits.orbits_of(branch.to_xarray())
     assert [at.signature for at in read] == [at.signature for at in branch.orbits]
@@ -143,7 +101,9 @@ def test_a_branch_with_relays_is_read_from_its_dataset():
 def test_a_room_that_is_locked_to_the_weather_has_the_multiplier_of_its_saltation():
     """exp(-t / 10) times T' behind by T' before each switching."""
     frequency = 1.02 * 2.0 * math.pi / FREE
-    room = System(model=Thermostat(), load=Load(frequency=frequency, weather=Harmonic(0.3)))
+    room = System(
+        model=ThermostatInWeather(), load=Load(frequency=frequency, weather=Harmonic(0.3))
+    )
     orbit = saltus.find_orbit(room, T=18.0)
     assert orbit.period == 1
     expected = math.exp(-0.1 * orbit.duration)
@@ -160,7 +120,9 @@ def test_a_relay_that_turns_ends_a_branch():
     """Of two periods of the weather the room is heated in one; with more weather it comes to 19 in
     the other one too, where T' = 0."""
     frequency = 2.04 * 2.0 * math.pi / FREE
-    room = System(model=Thermostat(), load=Load(frequency=frequency, weather=Harmonic(0.3)))
+    room = System(
+        model=ThermostatInWeather(), load=Load(frequency=frequency, weather=Harmonic(0.3))
+    )
     orbit = saltus.find_orbit(room, T=18.0)
     assert orbit.period == 2
     assert orbit.signature.relays == (-1,)
@@ -182,7 +144,9 @@ def test_a_relay_that_turns_ends_a_branch():
 
 def test_a_start_that_ends_its_round_on_the_other_side_is_refused():
     frequency = 2.0 * 2.0 * math.pi / FREE
-    room = System(model=Thermostat(), load=Load(frequency=frequency, weather=Harmonic(0.01)))
+    room = System(
+        model=ThermostatInWeather(), load=Load(frequency=frequency, weather=Harmonic(0.01))
+    )
     sentence = "the relay 'heater' is off at the start of a round .* and on at its end"
     with pytest.raises(MotionError, match=sentence):
         saltus.find_orbit(room, T=21.0, relays={"heater": False}, settle=0, period=1)
@@ -232,7 +196,9 @@ def test_a_driven_servo_is_that_of_dop853():
     """The fixed point of the map over a period, and the eigenvalues of its differences."""
     width, size = 0.2, 0.4
     frequency = 1.05 * math.pi / half_of_servo(width)
-    driven = System(model=Servo(width=width), load=Load(frequency=frequency, push=Harmonic(size)))
+    driven = System(
+        model=PushedServo(width=width), load=Load(frequency=frequency, push=Harmonic(size))
+    )
     orbit = saltus.find_orbit(driven, y=0.5)
     assert orbit.period == 1
     assert len(orbit.motion().events) == 2

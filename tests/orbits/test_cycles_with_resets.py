@@ -1,60 +1,14 @@
 """Orbits of models that reset their state at events, beside closed forms and differences."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
-import numpy as np
 import pytest
+from machines_with_memory import DrivenNeuron, RimlessWheel
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import saltus
-from saltus import Surface
-from saltus.errors import ParameterError
-from saltus.systems import ContactModel, Harmonic, Load, System
-
-
-@dataclass(frozen=True, kw_only=True)
-class RimlessWheel(ContactModel):
-    """A wheel of spokes that rolls down a slope: the angle of the spoke on the ground."""
-
-    half_angle: float = 0.4
-    slope: float = 0.1
-
-    coordinates: ClassVar[tuple[str, ...]] = ("angle",)
-    surfaces: ClassVar[tuple[Surface, ...]] = (
-        Surface(name="strike", function="strike", after_event="next_spoke"),
-    )
-
-    def strike(self, t, angle, velocity, load):
-        return angle - self.slope - self.half_angle
-
-    def next_spoke(self, t, angle, velocity, load):
-        return angle - 2.0 * self.half_angle, np.cos(2.0 * self.half_angle) * velocity
-
-    def force(self, t, angle, velocity, load, sides):
-        return np.sin(angle)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Neuron(ContactModel):
-    """u' = I - u under a periodic input, and u = 1 is reset to 0."""
-
-    drive: float = 1.3
-
-    coordinates: ClassVar[tuple[str, ...]] = ("u",)
-    first_order: ClassVar[tuple[str, ...]] = ("u",)
-    channels: ClassVar[tuple[str, ...]] = ("input",)
-    surfaces: ClassVar[tuple[Surface, ...]] = (
-        Surface(name="threshold", coordinate="u", position=1.0, after_event="fired"),
-    )
-
-    def fired(self, t, u, velocity, load):
-        return 0.0, velocity
-
-    def force(self, t, u, velocity, load, sides):
-        return self.drive + load.input(t) - u
+from saltus.systems import Harmonic, Load, System
 
 
 def settled_speed(a, g):
@@ -98,7 +52,7 @@ def test_a_rimless_wheel_has_its_cycle_and_stands_still_where_the_slope_ends():
 
 
 def test_a_neuron_without_input_has_a_cycle_and_no_multiplier():
-    neuron = System(model=Neuron(), load=Load())
+    neuron = System(model=DrivenNeuron(), load=Load())
     orbit = saltus.find_orbit(neuron, u=0.0)
     assert orbit.period == pytest.approx(math.log(1.3 / 0.3), abs=1e-12)
     assert orbit.multipliers.size == 0
@@ -109,7 +63,9 @@ def test_a_neuron_without_input_has_a_cycle_and_no_multiplier():
 def test_a_locked_neuron_has_the_multiplier_of_its_saltation():
     """exp(-T) times u' behind by u' before each spike."""
     frequency, size, drive = 4.3, 0.4, 1.3
-    locked = System(model=Neuron(drive=drive), load=Load(frequency=frequency, input=Harmonic(size)))
+    locked = System(
+        model=DrivenNeuron(drive=drive), load=Load(frequency=frequency, input=Harmonic(size))
+    )
     orbit = saltus.find_orbit(locked, u=0.2)
     times = [event.time for event in orbit.motion().events]
     expected = math.exp(-orbit.duration)
@@ -120,13 +76,3 @@ def test_a_locked_neuron_has_the_multiplier_of_its_saltation():
     branch = saltus.continue_orbit(orbit, "model.drive", (1.2, 1.4))
     folds = [point for point in branch.special if str(point.kind) == "LP"]
     assert all(abs(point.orbit.multipliers[0] - 1.0) < 1e-6 for point in folds)
-
-
-def test_questions_that_are_left_refuse_resets_by_name():
-    wheel = System(model=RimlessWheel())
-    with pytest.raises(ParameterError, match="'strike'; simulate, sensitivities and find_orbit"):
-        saltus.simulate_many(wheel, angle=[0.0, 0.1], duration=1.0)
-    with pytest.raises(ParameterError, match="does not follow surfaces with an after_event"):
-        saltus.classify(wheel, angle=0.0, velocity=0.5)
-    with pytest.raises(ParameterError, match="does not follow surfaces with an after_event"):
-        saltus.find_attractors(wheel)

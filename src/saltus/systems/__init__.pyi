@@ -11,7 +11,6 @@ from .catalogue.scenarios import other_impulse as other_impulse
 from .catalogue.scenarios import table_1 as table_1
 from .contracts.contact_model import CONTINUOUS as CONTINUOUS
 from .contracts.contact_model import ContactModel as ContactModel
-from .contracts.contact_model import Relay as Relay
 from .contracts.contact_model import called_part as called_part
 from .contracts.contact_model import eliminated as eliminated
 from .contracts.contact_model import mass_and_force as mass_and_force

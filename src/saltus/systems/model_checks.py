@@ -400,12 +400,9 @@ def check_contact_model(model: ContactModel) -> bool:
         if isinstance(contact, Contact) and contact.distance is not None:
             _check_method(model, contact, contact.distance, DISTANCE)
             continue
-        if isinstance(contact, Relay):
-            _check_method(model, contact, contact.on, RATE)
-            _check_method(model, contact, contact.off, RATE)
-            continue
-        if isinstance(contact, Surface) and contact.function is not None:
-            _check_method(model, contact, contact.function, RATE)
+        if not isinstance(contact, Contact) and contact.function is not None:
+            for name in contact.methods:
+                _check_method(model, contact, name, RATE)
             continue
         if isinstance(contact.coordinate, str) and contact.coordinate not in model.coordinates:
             known = ", ".join(model.coordinates)

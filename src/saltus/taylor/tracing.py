@@ -14,7 +14,6 @@ from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
     DeclaredLoad,
     Harmonic,
-    Relay,
     System,
     Transient,
     ask,
@@ -699,7 +698,7 @@ def _trace_contacts(result: Trace, twin: Any, t: LoadTime, q: Any, v: Any) -> li
     first_order = getattr(model, "own_class", model).first_order
     first = len(frictions)
     functions = [
-        combine("add", _function_of(model, part, first + number, (t, q, v, load)), 0.0)
+        combine("add", part.guard(model, Expr("slide", (), first + number), t, q, v, load), 0.0)
         if part.function is not None
         else combine("sub", q[names.index(part.coordinate)] if len(names) > 1 else q, part.position)
         if part.coordinate in first_order
@@ -795,18 +794,13 @@ def _sided_parts(model: Any, functions: list[Any]) -> tuple[SidedPart, ...]:
         )
         for part in model.frictions
     ]
-    resets = 0
     for part, function in zip(model.surfaces, functions, strict=True):
-        marks: tuple[tuple[str, int], ...] = ()
-        if part.after_event is not None:
-            resets += 1
-            marks = (("RESETS", part.sign * resets),)
+        marks = tuple(part.marks(model).items())
         if function is None:
             rows.append(SidedPart("surface", names.index(part.coordinate), marks=marks))
         else:
-            relay = isinstance(part, Relay)
-            kind = "relay" if relay else "function"
-            rows.append(SidedPart(kind, len(names), marks=marks, remembered=relay))
+            kind = part.kind
+            rows.append(SidedPart(kind, len(names), marks=marks, remembered=part.remembered))
     return tuple(rows)
 
 
@@ -828,17 +822,6 @@ def _after_event(model: Any, name: str, at: tuple[Any, ...]) -> list[Any]:
         )
     moving = size - len(getattr(model, "own_class", model).first_order)
     return [*both[0], *both[1][:moving], *[0.0] * (size - moving)]
-
-
-def _function_of(model: Any, part: Any, row: int, at: tuple[Any, ...]) -> Any:
-    """The function whose sign is the side of a surface. That of a relay reads its own side s: while
-    it is off it is `on`, and while it is on it is minus `off`.
-    """
-    if not isinstance(part, Relay):
-        return model.value_of_function(part, *at)
-    side = Expr("slide", (), row)
-    on, off = (model.value_of_function(part, *at, name) for name in (part.on, part.off))
-    return 0.5 * (1.0 - side) * on - 0.5 * (1.0 + side) * off
 
 
 def _trace_multipliers(

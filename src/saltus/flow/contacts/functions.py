@@ -15,7 +15,7 @@ and RELAY, and their answers to the questions of `parts.py`.
    Where a power of h has no series, `beside_powers.py` takes the motion from there.
 9. CROSSING, SLIP and STICK.
 10. The instant moves by dt = -h_c / h' (`reach_guard`).
-11. The kernel reads its side; that of a relay is told (`relays_at` in `motion/simulate.py`).
+11. The kernel reads its side; that of a relay is told (`Relay.start_side`).
 
 Its compiled part goes into one module with that of `kernel.py`; the words of `motion` are those of
 `flow/kernel/memory.py`.

@@ -25,6 +25,11 @@ of a surface (`resets.py`).
 11. **Start**: which state has it at the start (`ContactState` in `flow/motion/kernel_state.py`;
     lanes `lane_step.py`; pages `web/page/run.js`)? One that the state does not tell is *remembered*.
 
+The class of a surface in a model answers some of them in Python (`Surface` and `Relay` in
+`systems/contracts/contact_model.py`): `kind` and `marks` for 1, `guard` and `methods` for 2, with
+the `sign` of its side for 3, `remembered` and `start_side` for 11. Tracing, checks, orbits and
+starts ask these and no class.
+
 Outside the kernel the mode of a step has two bits for each part with sides (`side_bits`), which
 `modes_of` in `flow/motion/events.py` reads.
 

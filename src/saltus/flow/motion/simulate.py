@@ -246,24 +246,8 @@ def relays_at(
                 f"the relay {relay.name!r} must be given as True or False, got {shown(side)}",
                 "relays",
             )
-        on, off = (
-            float(model.value_of_function(relay, time, *state, load, name))
-            for name in (relay.on, relay.off)
-        )
-        if on > 0.0 and off > 0.0:
-            raise ParameterError(
-                f"{relay.on} and {relay.off}, by which the relay {relay.name!r} goes on and off,"
-                f" are both positive at the start ({on:g} and {off:g}): one state can set it to one"
-                " side only",
-                "relays",
-            )
-        if side is None and on <= 0.0 and off <= 0.0:
-            raise ParameterError(
-                f"the start does not say whether the relay {relay.name!r} is on: give"
-                f" relays={{{relay.name!r}: True}}, or False",
-                "relays",
-            )
-        found[relay.name] = 1 if on > 0.0 or (off <= 0.0 and side in (True, 1)) else -1
+        given_side = None if side is None else side in (True, 1)
+        found[relay.name] = relay.start_side(model, given_side, time, *state, load)
     return found
 
 

@@ -22,7 +22,7 @@ from saltus.flow import (
     contact_pull,
     modes_of,
 )
-from saltus.systems import NaturalUnits, Relay, System, natural_units, reactions, stick_margins
+from saltus.systems import NaturalUnits, System, natural_units, reactions, stick_margins
 
 # in each step; minima of parabolas through them have errors of the fourth power of their distance
 SAMPLES = 33
@@ -336,8 +336,7 @@ class ContactModes(SideModes):
         surfaces = zip(known.surfaces, modes_of(known, side)[2], strict=True)
         for number, (surface, beside) in enumerate(surfaces):
             if surface.function is not None and number not in smooth:
-                values = _of_relay if isinstance(surface, Relay) else _of_function
-                found.append(([beside > 0, beside < 0], partial(values, surface)))
+                found.append(([beside > 0, beside < 0], partial(_of_function, surface)))
         return found
 
     def holding(self, side: np.ndarray) -> list[tuple[list[np.ndarray], Callable[..., list[Any]]]]:
@@ -359,21 +358,12 @@ class ContactModes(SideModes):
 def _of_function(
     surface: Any, model: Any, t: Any, q: Any, v: Any, a: Any, load: Any, *_: Any
 ) -> list[Any]:
-    """The value of a surface's function along a motion, and minus it."""
-    value = np.asarray(model.value_of_function(surface, t, q, v, load), dtype=float)
-    return [value, -value]
-
-
-def _of_relay(
-    relay: Relay, model: Any, t: Any, q: Any, v: Any, a: Any, load: Any, *_: Any
-) -> list[Any]:
-    """What is positive while a relay is on, and what is while it is off: minus the function that
-    ends its side."""
-    off, on = (
-        np.asarray(model.value_of_function(relay, t, q, v, load, name), dtype=float)
-        for name in (relay.off, relay.on)
-    )
-    return [-off, -on]
+    """What is positive along a motion while a surface that is a function has the side +1, and what
+    is while it has -1."""
+    return [
+        side * np.asarray(surface.guard(model, side, t, q, v, load), dtype=float)
+        for side in (1.0, -1.0)
+    ]
 
 
 def excursions(

@@ -530,9 +530,8 @@ def hysteresis_of(motion: Motion) -> float | None:
             continue
         sides = relays_at(motion, times)[:, number]
         values = [
-            float(model.value_of_function(relay, time, *motion.at(time), system.load, other))
+            -side * float(relay.guard(model, side, time, *motion.at(time), system.load))
             for time, side in zip(times.tolist(), sides, strict=True)
-            for other in [relay.off if side > 0 else relay.on]
         ]
         found.append(-float(np.mean(values)))
     return min(found, default=None)

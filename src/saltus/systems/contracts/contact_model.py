@@ -279,6 +279,10 @@ class Surface:
     function: str | None = None
     after_event: str | None = None
 
+    # answers to the questions of parts (`flow/contacts/parts.py`)
+    kind: ClassVar[str] = "function"  # of one that is a function
+    remembered: ClassVar[bool] = False
+
     def __post_init__(self) -> None:
         _check_texts(self, "name", *(() if self.after_event is None else ("after_event",)))
         _check_function(self, "function", position=0.0, sign=1, stiffness=0.0, damping=0.0)
@@ -298,6 +302,35 @@ class Surface:
         value = np.asarray(position.value if isinstance(position, Jet) else position)
         above = value > self.position if below else value >= self.position
         return self.sign * np.where(above, 1.0, -1.0)[()]
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The names of the model's methods that its guard calls."""
+        return () if self.function is None else (self.function,)
+
+    def guard(self, owner: Any, own_side: Any, *at: Any) -> Any:
+        """The value of its function, whose sign is its side.
+
+        Parameters
+        ----------
+        owner
+            The model that has it.
+        own_side
+            Its side, which says nothing.
+        at
+            The time, the coordinates, their velocities and the load.
+        """
+        return owner.value_of_function(self, *at)
+
+    def marks(self, owner: Any) -> dict[str, int]:
+        """Columns of its row in the table of parts, with their numbers.
+
+        Parameters
+        ----------
+        owner
+            The model that has it.
+        """
+        return _mark_of_reset(self, owner)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -341,6 +374,10 @@ class Relay:
     stiffness: ClassVar[float] = 0.0
     damping: ClassVar[float] = 0.0
 
+    # answers to the questions of parts (`flow/contacts/parts.py`)
+    kind: ClassVar[str] = "relay"
+    remembered: ClassVar[bool] = True
+
     def __post_init__(self) -> None:
         own = () if self.after_event is None else ("after_event",)
         _check_texts(self, "name", "on", "off", *own)
@@ -349,6 +386,78 @@ class Relay:
     def function(self) -> str:
         """The function at which it goes on."""
         return self.on
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The names of the model's methods that its guard calls."""
+        return (self.on, self.off)
+
+    def guard(self, owner: Any, own_side: Any, *at: Any) -> Any:
+        """What changes its sign at its event on a side: while it is off `on`, and while it is on
+        minus `off`.
+
+        Parameters
+        ----------
+        owner
+            The model that has it.
+        own_side
+            Its side, +1 or -1, or the symbol of it.
+        at
+            The time, the coordinates, their velocities and the load.
+        """
+        on, off = (owner.value_of_function(self, *at, name) for name in (self.on, self.off))
+        return 0.5 * (1.0 - own_side) * on - 0.5 * (1.0 + own_side) * off
+
+    def start_side(self, owner: Any, given: bool | None, *at: Any) -> int:
+        """Its side at the start, as its functions set it or, between these, as it is given.
+
+        Parameters
+        ----------
+        owner
+            The model that has it.
+        given
+            Whether it is on, or None.
+        at
+            The time, the coordinates, their velocities and the load.
+
+        Raises
+        ------
+        ParameterError
+            Both functions are positive, or neither is and it is not given.
+        """
+        on, off = (float(owner.value_of_function(self, *at, name)) for name in (self.on, self.off))
+        if on > 0.0 and off > 0.0:
+            raise ParameterError(
+                f"{self.on} and {self.off}, by which the relay {self.name!r} goes on and off,"
+                f" are both positive at the start ({on:g} and {off:g}): one state can set it to one"
+                " side only",
+                "relays",
+            )
+        if given is None and on <= 0.0 and off <= 0.0:
+            raise ParameterError(
+                f"the start does not say whether the relay {self.name!r} is on: give"
+                f" relays={{{self.name!r}: True}}, or False",
+                "relays",
+            )
+        return 1 if on > 0.0 or (off <= 0.0 and given) else -1
+
+    def marks(self, owner: Any) -> dict[str, int]:
+        """Columns of its row in the table of parts, with their numbers.
+
+        Parameters
+        ----------
+        owner
+            The model that has it.
+        """
+        return _mark_of_reset(self, owner)
+
+
+def _mark_of_reset(part: Surface | Relay, model: Any) -> dict[str, int]:
+    """The number of the reset in the row of a surface that resets the state where its side becomes
+    +1."""
+    if part.after_event is None:
+        return {}
+    return {"RESETS": part.sign * (1 + model.resets.index(part.name))}
 
 
 # the largest imaginary part by which derivatives to a number of a model are taken
@@ -573,9 +682,9 @@ class ContactModel(Model):
 
     @property
     def relays(self) -> tuple[Relay, ...]:
-        """Those of its surfaces that are relays."""
+        """Those of its surfaces whose side is remembered."""
         parts: tuple[Any, ...] = self.surfaces
-        return tuple(part for part in parts if isinstance(part, Relay))
+        return tuple(part for part in parts if part.remembered)
 
     @property
     def resets(self) -> tuple[str, ...]:
@@ -1004,10 +1113,10 @@ def sides_for(
             return known[surface.coordinate]
         return sum(factor * value_of(name) for name, factor in surface.coordinate.items())
 
-    def side_of(surface: Surface | Relay) -> Any:
+    def side_of(surface: Any) -> Any:
         """The side of a surface; a relay, whose side no state tells, is on where `on` sets it."""
-        if isinstance(surface, Relay):
-            value = model.value_of_function(surface, t, q, v, load)
+        if surface.remembered:
+            value = surface.guard(model, -1.0, t, q, v, load)
             return np.where(np.asarray(getattr(value, "value", value)) >= 0.0, 1.0, -1.0)[()]
         return surface.side(kept(surface), below)
 
