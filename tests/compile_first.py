@@ -5,6 +5,7 @@ compile it for themselves.
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
+from saltus.continuation import arithmetic
 from saltus.flow.programs.compiled import load_contacts_kernel, load_kernel
 from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
 from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
@@ -20,6 +21,7 @@ PARTS = {
     "segments for contacts": load_contact_segments,
     "segments": load_segments,
     "page's kernel": partial(kernel_code, False),
+    "arithmetic of curves": arithmetic,
     "helpers": load_helpers,
     "helpers for contacts": partial(load_helpers, several=True),
 }

@@ -34,14 +34,15 @@ SHARED = {
     "_front_door",
 }  # what every room may import
 # The rooms whose front doors a room may use besides its own; `plots` knows datasets, and from
-# `systems` the drawings of mechanisms; `continuation` knows functions and arrays.
+# `systems` the drawings of mechanisms; `continuation` knows functions and arrays, and from `taylor`
+# how its arithmetic is compiled.
 MAY_IMPORT = {
     "systems": set(),
     "theory": {"systems"},
     "taylor": {"systems"},
     "bounds": {"systems", "taylor"},
     "flow": {"systems", "taylor", "bounds"},
-    "continuation": set(),
+    "continuation": {"taylor"},
     "orbits": {"systems", "taylor", "bounds", "flow", "continuation"},
     "attractors": {"systems", "taylor", "bounds", "flow", "continuation", "orbits", "sweep"},
     "sweep": set(),

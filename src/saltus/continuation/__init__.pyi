@@ -21,6 +21,7 @@ from .pseudo_arclength import Units as Units
 from .pseudo_arclength import between as between
 from .pseudo_arclength import bordered as bordered
 from .pseudo_arclength import newton as newton
+from .step_arithmetic import arithmetic as arithmetic
 from .test_functions import Cut as Cut
 from .test_functions import Events as Events
 from .test_functions import TestFunction as TestFunction

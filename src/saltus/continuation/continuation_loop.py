@@ -4,6 +4,7 @@ which it gives the reason.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -137,11 +138,12 @@ class Continuation:
         """Whether each crossing of curves that a step shows is located. If one is not, the step may
         have jumped onto another curve that passes nearby, between two of its sharp corners.
         """
-        signs = self.trail.values_at(ahead) * self.trail.values_at(point)
+        before = self.trail.values_at(point)
+        after = self.trail.values_at(ahead)
         return all(
-            located(test, point, ahead, singular=True) is not None
-            for test, sign in zip(self.trail.tests, signs, strict=True)
-            if test.singular and sign < 0.0
+            located(self.trail.tests[i], point, ahead, singular=True) is not None
+            for i in self.trail.singular
+            if before[i] * after[i] < 0.0
         )
 
     def _accept(self, point: Any, ahead: Any, born: bool) -> bool:
@@ -211,7 +213,7 @@ class Continuation:
             found += zeros
             # a test function with two zeros in the interval shows them at the zero of another one
             # between them, as an NS just before an LP
-            inner = self.trail.with_zeros(a, b, zeros)
+            inner = self.trail.with_zeros(a, b, zeros) if zeros else []
             for first, last in pairwise(inner if len(inner) > 2 else []):
                 found += self._zeros(first, last, self.trail.unchanged(a, b))
             if not self.trail.explained(a, b):
@@ -250,6 +252,8 @@ class Continuation:
         points.
         """
         changes = np.sign(a.values) * np.sign(b.values) < 0.0
+        if not any(changes.tolist()):
+            return []
         signs = zip(self.trail.tests, changes & chosen, strict=True)
         changed = [test for test, sign in signs if sign and test is not self.trail.barrier]
         singular = any(test.singular for test in changed)
@@ -265,9 +269,9 @@ class Continuation:
 
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
-        tangent = point.tangent[-len(self.bounds) :]
+        tangent = point.tangent[-len(self.bounds) :].tolist()
         for (name, (low, high)), value, rate in zip(
-            self.bounds.items(), point.parameters, tangent, strict=True
+            self.bounds.items(), point.parameters.tolist(), tangent, strict=True
         ):
             if (value <= low and rate < 0.0) or (value >= high and rate > 0.0):
                 return self._bound(name, value)
@@ -298,9 +302,9 @@ class Continuation:
         found: list[tuple[int, float, Any]] = []
         index = i - len(self.bounds)
         (low, high) = list(self.bounds.values())[i]
-        room = min(
-            a.place[index] - low, b.place[index] - low, high - a.place[index], high - b.place[index]
-        )
+        first = float(a.place[index])
+        last = float(b.place[index])
+        room = min(first - low, last - low, high - first, high - last)
         if room * a.curve.weights[index] > a.curve.norm(b.place - a.place):
             return found  # not even a step that turns round reaches a bound
         turn = turning_point(a, b, index)
@@ -319,9 +323,12 @@ class Continuation:
             return False
         first = self.points[0]
         across = b.place - a.place
-        k = len(self.bounds)
         length = b.curve.norm(across)
-        if np.linalg.norm(b.curve.weights[-k:] * (first.parameters - a.parameters)) > 1.1 * length:
+        # how far the parameters lie off those of the step: `nearest` may take long
+        ends = np.sort([a.parameters, b.parameters], axis=0)
+        off = first.parameters - np.clip(first.parameters, *ends)
+        off *= b.curve.weights[-len(self.bounds) :]
+        if math.hypot(*off.tolist()) > STEPS.closing * length:
             return False
         place = self.events.nearest(first, first.place, b)
         if place is None or length == 0.0:

@@ -16,6 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from saltus.continuation.curve import Curve, P, Point
+from saltus.continuation.step_arithmetic import arithmetic, as_floats
 
 
 @dataclass(frozen=True)
@@ -69,28 +70,26 @@ class Units:
         """The largest of residuals (m,) in their units."""
         return float(np.abs(values / self.residuals).max(initial=0.0))
 
-    def residual_of_terms(self, values: np.ndarray) -> float:
-        """The largest of residuals (m,) as a share of their terms, which rounding is, too."""
-        return float(np.abs(values / (self.residuals * self.terms)).max(initial=0.0))
-
     def vanish(self, values: np.ndarray, tolerance: float) -> bool:
         """Whether residuals (m,) are below a tolerance in their units, or rounding of their
         terms."""
         bounds = np.maximum(tolerance, NEWTON.converged * np.asarray(self.terms))
         return bool((np.abs(values / self.residuals) < bounds).all())
 
-    def length(self, step: np.ndarray, place: np.ndarray) -> float:
-        """The largest component of a step from a place, in units of what it may be."""
-        moved = np.abs(step / self.unknowns)
-        if self._unbounded.size:
-            size = np.abs(place / self.unknowns)[self._unbounded].max()
-            moved[self._unbounded] /= max(1.0, size)
-        return float(moved.max())
+    def of_unknowns(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The units of so many unknowns, and which of them are bounded."""
+        return _full(self.unknowns, count), _full(self.bounded, count, bool)
 
-    @cached_property
-    def _unbounded(self) -> np.ndarray:
-        """The places of the unknowns that are not `bounded`."""
-        return np.flatnonzero(~np.atleast_1d(self.bounded))
+    def of_residuals(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The units of so many residuals, and how many of these their terms are."""
+        return _full(self.residuals, count), _full(self.terms, count)
+
+
+def _full(value: Any, count: int, kind: type = float) -> np.ndarray:
+    """An array of so many equal numbers, or the array that is given already."""
+    if isinstance(value, np.ndarray) and value.dtype == kind and value.shape == (count,):
+        return value
+    return np.full(count, value, kind)
 
 
 ONES = Units()
@@ -141,26 +140,27 @@ def newton(
     units
         The natural units in which unknowns and residuals are measured.
     """
-    place = guess.copy()
+    place = np.array(guess, dtype=float)
+    sizes_of = arithmetic().sizes_of
+    sizes, _ = units.of_unknowns(len(place))
+    of_residuals: tuple[np.ndarray, ...] = ()
     for iteration in range(iterations + 1):
         thorough = before <= NEWTON.last or (near and iteration == 0)
         found = evaluate(place, thorough)
         if found is None:
             return None
-        error = units.residual(found.residual)
-        scale = max(1.0, np.abs(place / units.unknowns).max())
+        (residual,) = as_floats(found.residual)
+        of_residuals = of_residuals or units.of_residuals(len(residual))
+        error, share, scale = sizes_of(residual, place, sizes, *of_residuals)
         slow = error > NEWTON.slowdown * before
-        rounded = slow and (
-            error <= NEWTON.stalled * scale
-            or units.residual_of_terms(found.residual) <= NEWTON.converged * scale
-        )
+        rounded = slow and (error <= NEWTON.stalled * scale or share <= NEWTON.converged * scale)
         if error <= NEWTON.converged * scale or rounded:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
-        step = _step(*linear(found, place), units, place) if error < NEWTON.diverged else None
-        if step is None:
+        taken = _step(*linear(found, place), units, place) if error < NEWTON.diverged else None
+        if taken is None:
             return None
-        moved = np.abs(step / units.unknowns).max()
+        step, moved = taken
         if slow and error <= residual_floor and moved <= NEWTON.converged * scale:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
@@ -170,20 +170,19 @@ def newton(
 
 def _step(
     matrix: np.ndarray, right: np.ndarray, units: Units, place: np.ndarray
-) -> np.ndarray | None:
-    """Newton's step, shortened where it is too long; None where there is none."""
-    try:
-        step = (
-            solved_in_units(matrix, right, units.unknowns)
-            if units.scaled
-            else np.linalg.solve(matrix, right)
-        )
-    except np.linalg.LinAlgError:
-        return None
-    longest = units.length(step, place)
-    if not np.isfinite(longest):
-        return None
-    return np.asarray(step * (NEWTON.longest / longest) if longest > NEWTON.longest else step)
+) -> tuple[np.ndarray, float] | None:
+    """Newton's step, shortened where it is too long, and its largest component in units; None where
+    there is none.
+    """
+    step = np.empty(len(right))
+    moved = arithmetic().newton_step(
+        *as_floats(matrix, right, place),
+        *units.of_unknowns(len(place)),
+        units.scaled,
+        NEWTON.longest,
+        step,
+    )
+    return None if math.isnan(moved) else (step, moved)
 
 
 WIDE = math.log(1e3)  # Units that differ by more than this factor differ much.
@@ -213,12 +212,23 @@ class EquationCurve(Curve[P]):
         """The units of all components of a place: of a parameter the larger of its size and of the
         range that its weight stands for.
         """
+        least = self._least_units
+        sizes = [abs(value) for value in place[-self.count :].tolist()]
+        units = least.unknowns[-self.count :].tolist()
+        if all(size <= unit for size, unit in zip(sizes, units, strict=True)):
+            return least
+        unknowns = least.unknowns.copy()
+        unknowns[-self.count :] = np.maximum(sizes, units)
+        return replace(least, unknowns=unknowns)
+
+    @cached_property
+    def _least_units(self) -> Units:
+        """These units where the parameters are smaller than their ranges."""
         own = self.units
-        inner = len(place) - self.count
-        units = np.empty(len(place))
-        units[:inner] = own.unknowns
-        units[inner:] = np.maximum(np.abs(place[inner:]), 3.0 / self.weights[inner:])
-        return Units(units, own.residuals, self._bounded, self._scaled, own.terms)
+        unknowns = np.asarray(3.0 / self.weights, dtype=float)
+        unknowns[: len(unknowns) - self.count] = own.unknowns
+        residuals, terms = own.of_residuals(len(unknowns) - 1)
+        return Units(unknowns, residuals, self._bounded, self._scaled, terms)
 
     @cached_property
     def _scaled(self) -> bool:
@@ -272,9 +282,10 @@ class EquationCurve(Curve[P]):
         error = units.residual(found)
         for _ in range(self.iterations_at):
             near = not NEWTON.converged < error < NEWTON.diverged
-            step = None if near else _step(matrix, -right, units, place)
-            if step is None or self.norm(place + step - guess) > reach:
+            taken = None if near else _step(matrix, -right, units, place)
+            if taken is None or self.norm(place + taken[0] - guess) > reach:
                 break
+            step = taken[0]
             found = self.residual(place + step)
             if found is None or not (left := units.residual(found)) < NEWTON.circling * error:
                 break
@@ -311,6 +322,7 @@ class EquationCurve(Curve[P]):
         """`solve`, but None if Newton's method leads farther than `reach` from the guess or, for a
         finite `reach`, in circles. `near` and `before` are those of `newton`."""
         normal = direction * self.weights**2
+        border = arithmetic().border
         errors = list[float]()
         units = self.units_at(guess)
 
@@ -323,9 +335,11 @@ class EquationCurve(Curve[P]):
             return found
 
         def linear(found: Evaluation, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return bordered(found.derivatives(), normal), -bordered(
-                found.residual, normal @ (place - guess)
-            )
+            matrix = np.empty((len(place), len(place)))
+            right = np.empty(len(place))
+            numbers = as_floats(found.derivatives(), found.residual, normal, place, guess)
+            border(*numbers, matrix, right)
+            return matrix, right
 
         evaluate = self.evaluate if reach == math.inf else within_reach
         floor = self.residual_floor
@@ -373,19 +387,10 @@ class EquationCurve(Curve[P]):
         """A solution as a point, with the tangent that goes along a direction; None where the
         tangent is not unique.
         """
-        matrix = bordered(found.evaluation.derivatives(), direction * self.weights**2)
-        right = np.zeros(len(matrix))
-        right[-1] = 1.0
-        try:
-            tangent = (
-                solved_in_units(matrix, right, 1.0 / self.weights)
-                if self._scaled
-                else np.linalg.solve(matrix, right)
-            )
-        except np.linalg.LinAlgError:
-            return None
-        length = self.norm(tangent)
-        return self.point_at(found, tangent / length) if 0.0 < length < np.inf else None
+        tangent = np.empty(len(direction))
+        numbers = as_floats(found.evaluation.derivatives(), direction, self.weights)
+        length = arithmetic().tangent_along(*numbers, self._scaled, tangent)
+        return self.point_at(found, tangent) if 0.0 < length < math.inf else None
 
     def along_kernel(self, found: Corrected[Any]) -> P:
         """A solution as a point, with its tangent from the kernel of the derivatives, where no
@@ -413,25 +418,6 @@ class EquationCurve(Curve[P]):
         """The angle between the tangents, rad."""
         cosine = float(b.tangent @ (self.weights**2 * a.tangent))
         return math.acos(min(1.0, max(-1.0, cosine)))
-
-
-def solved_in_units(matrix: np.ndarray, right: np.ndarray, units: Any) -> np.ndarray:
-    """The solution of linear equations whose unknowns have units. It is found in these, with rows
-    of one size: else the pivots, and how rounding grows, would depend on the units of the user.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The matrix is singular.
-    """
-    scaled = matrix * units
-    sizes = np.maximum.reduce(np.abs(scaled), axis=1)
-    if not np.minimum.reduce(sizes) > 0.0:
-        raise np.linalg.LinAlgError("a row is 0")
-    scaled /= sizes[:, None]
-    solved: np.ndarray = np.linalg.solve(scaled, right / sizes)
-    solved *= units
-    return solved
 
 
 def bordered(rows: np.ndarray, last: Any) -> np.ndarray:
@@ -504,18 +490,15 @@ def predicted(before: Point | None, point: Point, step: float) -> np.ndarray:
     Its error is of fourth order in the step. If there is no point before, or the equations have
     changed since, the place is on the tangent, with an error of second order.
     """
-    straight = point.place + step * point.tangent
     if before is None or not before.curve.joins(point.curve):
-        return straight
-    chord = point.place - before.place
+        return np.asarray(point.place + step * point.tangent)
     length = arc(before, point)
     if not 0.0 < step <= STEPS.most_stretched * length:
-        return straight
-    u = step / length
-    # the deviation of the cubic from the tangent has terms of second and of third order
-    bend = point.tangent * length - chord
-    twist = before.tangent * length - chord
-    return np.asarray(straight + u**2 * (2.0 * bend + twist) + u**3 * (bend + twist))
+        return np.asarray(point.place + step * point.tangent)
+    ahead = np.empty(len(point.place))
+    numbers = as_floats(before.place, before.tangent, point.place, point.tangent)
+    arithmetic().place_ahead(*numbers, length, step, ahead)
+    return ahead
 
 
 def between(a: Point, b: Point, share: float) -> np.ndarray:
@@ -541,5 +524,5 @@ def cubic(a: Point, b: Point, index: Any = slice(None)) -> Callable[[Any], Any]:
 
 def arc(a: Point, b: Point) -> float:
     """The length of the curve between two points, to the order that the cubic needs."""
-    turn = float(a.curve.norm(b.tangent - a.tangent))
-    return float(a.curve.norm(b.place - a.place) * (1.0 + turn**2 / 24.0))
+    numbers = as_floats(a.curve.weights, a.place, a.tangent, b.place, b.tangent)
+    return arithmetic().arc_length(*numbers)

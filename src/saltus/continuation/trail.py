@@ -4,6 +4,7 @@ of their zeros.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from saltus.continuation.curve import Zero
 from saltus.continuation.pseudo_arclength import arc, between
+from saltus.continuation.step_arithmetic import arithmetic
 from saltus.continuation.test_functions import Events
 
 
@@ -43,7 +45,6 @@ class TrailSettings:
 
 
 SETTINGS = TrailSettings()
-GRID = np.linspace(0.0, 1.0, SETTINGS.grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class Trail:
         self.tests = [*([] if self.barrier is None else [self.barrier]), *self.events.tests(point)]
         self.guides = np.array([test.guides for test in self.tests], dtype=bool)
         self.decisive = np.array([test.decisive for test in self.tests], dtype=bool)
+        self.singular = [i for i, test in enumerate(self.tests) if test.singular]
         self.seen: list[TrailPoint] = []
         self.latest = self._at(point, 0.0)
         self.last = [self.latest]
@@ -85,18 +87,15 @@ class Trail:
         """
         if len(self.last) < 3 or not self.guides.any():
             return True
-        (a, b, c) = self.last
         point = self._sample(ahead)
-        x = point.arc
-        values = np.array([sample.values[self.guides] for sample in self.last])
-        expected = (
-            (x - b.arc) * (x - c.arc) / ((a.arc - b.arc) * (a.arc - c.arc)) * values[0]
-            + (x - a.arc) * (x - c.arc) / ((b.arc - a.arc) * (b.arc - c.arc)) * values[1]
-            + (x - a.arc) * (x - b.arc) / ((c.arc - a.arc) * (c.arc - b.arc)) * values[2]
+        return arithmetic().is_expected(
+            np.array([sample.values for sample in self.last]),
+            np.array([sample.arc for sample in self.last]),
+            point.values,
+            point.arc,
+            self.guides,
+            SETTINGS.unexpected,
         )
-        found = point.values[self.guides]
-        size = np.maximum(np.abs(values).max(axis=0), np.abs(found))
-        return bool((np.abs(found - expected) <= SETTINGS.unexpected * size).all())
 
     def values_at(self, point: Any) -> np.ndarray:
         """The values of all test functions at the last point or at one ahead of it."""
@@ -222,7 +221,7 @@ class Trail:
         return TrailPoint(
             point,
             length,
-            np.array([test.value(point) for test in self.tests]),
+            np.array([test.value(point) for test in self.tests], dtype=float),
             self.events.outside(point),
         )
 
@@ -230,53 +229,9 @@ class Trail:
 def _where_to_look(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> float | None:
     """The share of the way from a to b at which a test function may have zeros that its values at
     both ends do not show; None if there is no such place."""
-    begin = a.values
-    end = b.values
-    with np.errstate(all="ignore"):
-        rise = end - begin
-        bend, twist, unsure, lever = _higher(a, b, near)
-        signs = np.sign(begin) * np.sign(end)
-        room = np.where(signs > 0, 4.0 * np.minimum(np.abs(begin), np.abs(end)), np.abs(rise))
-        swing = np.abs(bend) + 1.25 * np.abs(lever).max() * (np.abs(twist) + unsure)
-        doubtful = (room <= swing) & (signs != 0) & np.isfinite(swing)
-    worst = 0.0
-    place = None
-    parabola = GRID * (1.0 - GRID)
-    for row in np.flatnonzero(doubtful):
-        cubic = begin[row] + rise[row] * GRID - parabola * (bend[row] + twist[row] * lever)
-        margin = SETTINGS.doubt * parabola * unsure[row] * np.abs(lever)
-        if signs[row] > 0:
-            least = np.sign(begin[row]) * cubic - margin
-            k = int(np.argmin(least))
-            depth = -least[k] / max(abs(begin[row]), abs(end[row]))
-            if depth > worst:
-                worst = depth
-                place = float(np.clip(GRID[k], SETTINGS.inner, 1.0 - SETTINGS.inner))
-        elif any(
-            np.count_nonzero(np.diff(np.sign(side))) > 1
-            for side in (cubic - margin, cubic + margin)
-        ):
-            worst, place = max(worst, 1.0), place or 0.5
-    return place
-
-
-def _higher(a: TrailPoint, b: TrailPoint, near: Sequence[TrailPoint]) -> tuple[np.ndarray, ...]:
-    """The coefficients of second and third order, the uncertainty, and the factor of the last two
-    at the places of the grid.
-
-    With fewer than two further points the last known term is the uncertain one; for a straight line
-    this is half of its rise.
-    """
-    begin = a.values
-    end = b.values
-    length = b.arc - a.arc
-    slope = (end - begin) / length
-    nothing = np.zeros(len(begin))
-    everywhere = np.ones(GRID.size)
-    seconds = [((end - c.values) / (b.arc - c.arc) - slope) / (c.arc - a.arc) for c in near]
-    if len(near) < 2:
-        bend = length**2 * seconds[0] if near else nothing
-        return bend, nothing, np.abs(bend if near else end - begin), everywhere
-    third = (seconds[1] - seconds[0]) / (near[1].arc - near[0].arc)
-    twist = length**2 * third
-    return length**2 * seconds[0], twist, np.abs(twist), a.arc + length * GRID - near[0].arc
+    values = np.array([sample.values for sample in near]).reshape(len(near), len(a.values))
+    arcs = np.array([a.arc, b.arc, *(sample.arc for sample in near)])
+    found = arithmetic().where_to_look(
+        a.values, b.values, values, arcs, SETTINGS.doubt, SETTINGS.inner, SETTINGS.grid
+    )
+    return None if math.isnan(found) else found

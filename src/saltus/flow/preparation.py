@@ -12,7 +12,7 @@ from saltus.flow.programs.compiled import load_contacts_kernel, load_fillers, lo
 from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
 from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
 
-# All kernels but that of proofs; what takes longest comes first.
+# All kernels but those of proofs and of the steps along branches; what takes longest comes first.
 KERNELS: dict[str, Callable[[], object]] = {
     "motions of several contacts": load_contacts_kernel,
     "lanes of several contacts": lambda: load_driver(True),

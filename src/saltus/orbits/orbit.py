@@ -33,7 +33,6 @@ from saltus.systems import (
     System,
     arguments_of,
     driven_displacements,
-    middle_of,
     natural_units,
     state_of,
 )
@@ -288,7 +287,10 @@ class PeriodicOrbit(Result):
     def _middle(self) -> float | None:
         """The centre of a symmetric orbit, 0 for others; None if the centres of its coordinates
         differ."""
-        return middle_of(self.equations.system) if self.symmetric else 0.0
+        if not self.symmetric:
+            return 0.0
+        mirror = self.equations.mirror
+        return None if mirror is None else mirror.middle
 
     @cached_property
     def reach(self) -> tuple[float, float]:
@@ -297,8 +299,8 @@ class PeriodicOrbit(Result):
         """
         if self._in_others or self._middle is None:
             return float(self._own_extrema[:, 0].min()), float(self._own_extrema[:, 1].max())
-        top = float(self._extremes[:, SegmentColumn.HIGHEST].max())
-        bottom = float(self._extremes[:, SegmentColumn.LOWEST].min())
+        top = max(self._extremes[:, SegmentColumn.HIGHEST].tolist())
+        bottom = min(self._extremes[:, SegmentColumn.LOWEST].tolist())
         if not self.symmetric:
             return bottom, top
         high = max(top, 2.0 * self._middle - bottom)
@@ -378,7 +380,7 @@ class PeriodicOrbit(Result):
         """The gap at its lowest minimum between impacts, inf without a minimum; if it is negative
         this is no real motion.
         """
-        return float(self._extremes[:, SegmentColumn.LOWEST_GAP].min())
+        return float(min(self._extremes[:, SegmentColumn.LOWEST_GAP].tolist()))
 
     @property
     def crossings(self) -> int:
@@ -400,7 +402,7 @@ class PeriodicOrbit(Result):
         motion.
         """
         speeds = self.equations.impacts(self.solution)[1]
-        return float(speeds.min(initial=math.inf))
+        return float(min(speeds.tolist(), default=math.inf))
 
     @cached_property
     def pressing(self) -> float:
@@ -453,6 +455,9 @@ class PeriodicOrbit(Result):
         chain = self.equations.return_map(self.solution.evaluation)
         if self._has_touch or not np.isfinite(chain).all():
             return np.full(count, complex(np.inf))
+        if count == len(chain) == 2:
+            a, b = _eigenvalues_of_two(chain)
+            return _two_by_falling_modulus(*((a * a, b * b) if self.symmetric else (a, b)))
         values = np.zeros(count, dtype=complex)  # 0 for what contacts hold where the state is given
         values[: len(chain)] = np.linalg.eigvals(chain)
         return by_falling_modulus(values**2 if self.symmetric else values)
@@ -487,7 +492,7 @@ class PeriodicOrbit(Result):
         Beside a symmetric orbit there may be others that are not symmetric: two multipliers are 1
         then, as where a mass flies freely, while it is one at a loss of the symmetry.
         """
-        near = np.count_nonzero(np.abs(self.multipliers - 1.0) < TOLERANCES.isolated)
+        near = sum(abs(value - 1.0) < TOLERANCES.isolated for value in self.multipliers.tolist())
         evaluation = self.solution.evaluation
         if not near:
             return True
@@ -717,6 +722,23 @@ class PeriodicOrbit(Result):
             f" amplitude={self.amplitude:.9g}, {'stable' if self.stable else 'unstable'},"
             f" {(largest or ['no multipliers'])[0]}, residual={self.residual:.1g})"
         )
+
+
+def _eigenvalues_of_two(matrix: np.ndarray) -> tuple[complex, complex]:
+    """The eigenvalues of a matrix (2, 2), to rounding of its size; NumPy's function for any matrix
+    takes ten times as long.
+    """
+    (a, b), (c, d) = matrix.tolist()
+    half = 0.5 * (a - d)
+    scale = max(abs(half), abs(b), abs(c))
+    square = half / scale * half + b / scale * c if scale else 0.0
+    root = math.sqrt(scale) * math.sqrt(abs(square))
+    if square < 0.0:
+        mean = d + half
+        return complex(mean, root), complex(mean, -root)
+    larger = half + math.copysign(root, half)
+    # the differences of both from d have the product -b c
+    return complex(d + larger), complex(d - (b / larger * c if larger else 0.0))
 
 
 def by_falling_modulus(values: np.ndarray) -> np.ndarray:

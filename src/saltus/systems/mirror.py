@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,8 +98,13 @@ class Mirror:
         directions
             The differences.
         """
+        return np.asarray(-np.take(directions, self._of_state, axis=-1))
+
+    @cached_property
+    def _of_state(self) -> np.ndarray:
+        """For each number of an image's state, the place of the original one."""
         n = len(self.places)
-        return np.asarray(-directions[..., [*self.places, *(n + place for place in self.places)]])
+        return np.array([*self.places, *(n + place for place in self.places)])
 
 
 def mirror_of(system: System) -> Mirror | None:

@@ -237,7 +237,7 @@ def curve_tests(kind: str, symmetric: bool) -> list[TestFunction]:
         curve_test(
             SpecialKind[f"LP_{flip}_GR"],
             lambda point: scaled_determinant(
-                point.curve.equations.in_units(point.evaluation.jacobian(1.0))
+                point.evaluation.jacobian(1.0), point.curve.equations.units.unknowns
             ),
         ),
     ]
@@ -288,4 +288,4 @@ def without(point: SpecialCurvePoint, closing: float) -> float:
     evaluation = equations.evaluate(unknowns, point.solution.values)
     if evaluation is None:
         return 1.0
-    return scaled_determinant(equations.in_units(evaluation.jacobian(closing)))
+    return scaled_determinant(evaluation.jacobian(closing), equations.units.unknowns)

@@ -23,6 +23,7 @@ from saltus.continuation import (
     TestFunction,
     Units,
     Zero,
+    arithmetic,
     bordered,
 )
 from saltus.flow import SegmentColumn, SegmentValue
@@ -202,8 +203,8 @@ def flip(point: OrbitPoint) -> float:
     """The determinant of the equations for perturbations that change their sign each (half)
     period.
     """
-    equations = point.curve.equations
-    return scaled_determinant(equations.in_units(point.evaluation.jacobian(-1.0)))
+    units = point.curve.equations.units.unknowns
+    return scaled_determinant(point.evaluation.jacobian(-1.0), units)
 
 
 @lru_cache(maxsize=4)
@@ -213,15 +214,14 @@ def crossing(point: OrbitPoint) -> float:
     """
     weights = point.curve.weights
     matrix = bordered(point.evaluation.derivatives(), point.tangent * weights**2)
-    return scaled_determinant(matrix / weights)
+    return scaled_determinant(matrix, 1.0 / weights)
 
 
-def scaled_determinant(matrix: np.ndarray) -> float:
-    """The determinant of the matrix with its rows scaled to length 1: the same sign, with rounding
-    errors of one size.
+def scaled_determinant(matrix: np.ndarray, units: np.ndarray) -> float:
+    """The determinant of the matrix with its columns in units of the unknowns, and with its rows
+    scaled to length 1: the same sign, with rounding errors of one size.
     """
-    lengths = np.sqrt(np.add.reduce(matrix * matrix, axis=1))
-    return float(np.linalg.det(matrix / lengths[:, None])) if lengths.min() > 0.0 else 0.0
+    return arithmetic().scaled_determinant(matrix, units)
 
 
 def torus(point: OrbitPoint) -> float:
@@ -234,19 +234,13 @@ def torus(point: OrbitPoint) -> float:
     there. For two multipliers a b comes from the determinants of the segments' maps: their product
     keeps its digits where one multiplier is large.
     """
-    values = point.orbit.multipliers
-    evaluation = point.evaluation
     if point.orbit.grazes:
         return math.nan
-    with np.errstate(all="ignore"):
-        half = None if point.orbit.equations.following.size else evaluation.area_factor()
-        if half is not None:
-            product = (half**2 if point.orbit.symmetric else half) - 1.0
-        else:
-            largest = np.abs(values).max(initial=0.0)  # some cycles have none
-            values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * largest, values, 0.0)
-            first, second = _pairs(len(values))
-            product = float(np.prod(values[first] * values[second] - 1.0).real)
+    half = None if point.orbit.equations.following.size else point.evaluation.area_factor()
+    if half is not None:
+        product = (half**2 if point.orbit.symmetric else half) - 1.0
+    else:
+        product = _over_pairs(point.orbit.multipliers)
     return (
         0.0
         if abs(product) <= MULTIPLIER_ROUNDING
@@ -254,6 +248,19 @@ def torus(point: OrbitPoint) -> float:
         if math.isfinite(product)
         else math.nan
     )
+
+
+def _over_pairs(values: np.ndarray) -> float:
+    """The product of (a b - 1) over all pairs (a, b) of multipliers."""
+    if len(values) == 2:  # the larger one first
+        first, second = values.tolist()
+        negligible = not abs(second) > MULTIPLIER_ROUNDING * abs(first)
+        return float((first * (0.0 if negligible else second) - 1.0).real)
+    largest = np.abs(values).max(initial=0.0)  # some cycles have none
+    with np.errstate(all="ignore"):
+        values = np.where(np.abs(values) > MULTIPLIER_ROUNDING * largest, values, 0.0)
+        one, other = _pairs(len(values))
+        return float(np.prod(values[one] * values[other] - 1.0).real)
 
 
 @cache

@@ -134,6 +134,8 @@ def keeps_symmetry(system: System, path: str) -> bool:
         except ParameterError:  # on one side of a limit of the parameter
             continue
         other = mirror_of(beside.in_gap_coordinates) if has_symmetry(beside) else None
+        if other is not None and other.centre == inner.centre:
+            return True
         if other is not None:
             lengths = natural_units(system.in_gap_coordinates).lengths
             # the parameter moves by a thousandth, and rounding moves the centre by far less

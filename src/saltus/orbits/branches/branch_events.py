@@ -242,11 +242,10 @@ class BranchEvents(OrbitEvents):
 
     def outside(self, point: OrbitPoint) -> int | None:
         """The number of multipliers outside the unit circle; None at a grazing."""
-        return (
-            None
-            if point.orbit.grazes
-            else int(np.count_nonzero(np.abs(point.orbit.multipliers) > 1.0 + TOLERANCES.on_circle))
-        )
+        if point.orbit.grazes:
+            return None
+        moduli = [abs(value) for value in point.orbit.multipliers.tolist()]
+        return len([modulus for modulus in moduli if modulus > 1.0 + TOLERANCES.on_circle])
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
         """The special points, without crossings of branches that are only folds. Zeros of `torus`

@@ -13,7 +13,16 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from saltus.continuation import ONES, Bounds, Cut, End, TestFunction, Units, Zero
+from saltus.continuation import (
+    ONES,
+    Bounds,
+    Cut,
+    End,
+    TestFunction,
+    Units,
+    Zero,
+    arithmetic,
+)
 from saltus.errors import ParameterError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.segments.segments import CannotProve, OrbitSegments
@@ -38,7 +47,7 @@ HALVES_ALIKE = 1e-5
 ORBIT_TOLERANCE = 1e-14  # of the segments' steps: the orbits are then exact to rounding
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)  # setting frozen fields would take as long as filling them
 class OrbitEvaluation:
     """The equations at one point: the residual and its derivatives, one block for each segment, and
     extremes along the segments.
@@ -64,25 +73,8 @@ class OrbitEvaluation:
         return matrix
 
     def _fill(self, matrix: np.ndarray, closing: float) -> None:
-        """Write the derivatives to the unknowns into the first columns of a matrix of zeros: block
-        by block or, of many segments, entry by entry of all blocks.
-        """
-        n, d, _ = self.here.shape
-        if n <= d * d:
-            for i in range(n):
-                matrix[d * i : d * i + d, d * i : d * i + d] = self.here[i]
-            for i in range(n - 1):
-                matrix[d * i : d * i + d, d * i + d : d * i + 2 * d] = self.there[i]
-            matrix[-d:, :d] += closing * self.there[-1]
-            return
-        width = matrix.shape[1]
-        flat = matrix.reshape(-1)
-        step = d * (width + 1)
-        for i in range(d):
-            for j in range(d):
-                flat[i * width + j :: step][:n] = self.here[:, i, j]
-                flat[i * width + j + d :: step][: n - 1] = self.there[:-1, i, j]
-        matrix[-d:, :d] += closing * self.there[-1]
+        """Write the derivatives to the unknowns into the first columns of a matrix of zeros."""
+        arithmetic().fill_blocks(self.here, self.there, closing, matrix)
 
     @cached_property
     def _all(self) -> np.ndarray:
@@ -100,14 +92,10 @@ class OrbitEvaluation:
         """The product of the segments' maps: from the first unknowns to those a (half) period
         later; inf at a grazing.
         """
-        with np.errstate(all="ignore"):
-            try:
-                chain, *later = -np.linalg.solve(self.there, self.here)
-            except np.linalg.LinAlgError:
-                return np.full(self.here.shape[1:], np.inf)
-            for segment in later:
-                chain = segment @ chain
-        return np.asarray(chain)
+        chain = np.empty(self.here.shape[1:])
+        if not arithmetic().product_of_maps(self.here, self.there, chain):
+            chain[:] = np.inf
+        return chain
 
     def area_factor(self) -> float | None:
         """The determinant of the monodromy matrix, as the product of those of the segments' maps,
@@ -115,13 +103,7 @@ class OrbitEvaluation:
         """
         if self.here.shape[-1] != 2:
             return None
-        with np.errstate(all="ignore"):
-            return float(np.multiply.reduce(_areas(self.here) / _areas(self.there)))
-
-
-def _areas(maps: np.ndarray) -> np.ndarray:
-    """The determinants of maps (..., 2, 2)."""
-    return np.asarray(maps[..., 0, 0] * maps[..., 1, 1] - maps[..., 0, 1] * maps[..., 1, 0])
+        return arithmetic().product_of_areas(self.here, self.there)
 
 
 @dataclass(frozen=True)
@@ -366,7 +348,7 @@ class OrbitEquations(ABC):
     def touching_speed(self, solution: Solution) -> float:
         """The least speed of the impacts at which the map loses its derivative if the speed
         vanishes; inf without such impacts."""
-        return float(self.impacts(solution)[1].min(initial=math.inf))
+        return float(min(self.impacts(solution)[1].tolist(), default=math.inf))
 
     def pressing(self, solution: Solution) -> float:
         """A quantity, in natural units. It is negative if a contact that the equations take for
@@ -660,11 +642,13 @@ class OrbitEquations(ABC):
 
     def frequency(self, values: np.ndarray) -> float:
         """The forcing frequency at the given parameters."""
-        return float(
-            values[self.paths.index(FREQUENCY)]
-            if FREQUENCY in self.paths
-            else self._values[self._frequency]
-        )
+        place = self._place_of_frequency
+        return float(self._values[self._frequency] if place < 0 else values[place])
+
+    @cached_property
+    def _place_of_frequency(self) -> int:
+        """The place of the forcing frequency among the parameters; -1 if it is none of them."""
+        return self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
 
     def frequency_of(self, solution: Solution) -> float:
         """The frequency of an orbit's rounds, of which its signature counts the period: that of the

@@ -59,7 +59,6 @@ from saltus.orbits.segments.contact_segments import contact_segments
 from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, ModeChange, Signature
 from saltus.systems import System, arguments_of, held_values, mass_rows
-from saltus.taylor import FREQUENCY
 
 # power of the time with which the gap grows after an impact with e = 0; after a release it is
 # `AFTER_RELEASE`
@@ -68,12 +67,22 @@ AFTER_IMPACT = 2
 # opens.
 GAP_AT_REST = 1e-13
 JUST_OPENED = 1e-4  # the share of the period within which such a gap may have minima by rounding
+# the reactions of contacts, and the gaps beside impacts
+PRESSING = [
+    int(column)
+    for column in (
+        SegmentExtremes.FORCE,
+        SegmentExtremes.PULL,
+        SegmentExtremes.TAIL,
+        SegmentExtremes.BESIDE,
+    )
+]
 # where in a segment a motion is started; not in its middle, where symmetric orbits may touch a
 # contact
 START_SHARE = 0.4
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class ContactsEvaluation(OrbitEvaluation):
     """The equations at one point; their derivatives are `here`, to the unknowns, and `there`, to
     the unknowns a period later.
@@ -99,25 +108,22 @@ class ContactsEvaluation(OrbitEvaluation):
         """
         count = self.state_count
         phases = self.here.shape[0] - count
-        state = [*range(count)]
         # the first rows are the guards of the later events, and of the first one a period later
-        rows = [*range(max(phases - 1, 0), self.here.shape[0])]
-        columns = [*state, count] if phases else state
+        rows = max(phases - 1, 0)
+        columns = count + 1 if phases else count
         with np.errstate(all="ignore"):
             try:
-                chain = self.here[np.ix_(rows, state)]
+                chain = self.here[rows:, :count]
                 if phases > 1:
-                    later = [*range(count + 1, self.here.shape[0])]
-                    inner = self.here[: phases - 1]
-                    chain = chain - self.here[np.ix_(rows, later)] @ np.linalg.solve(
-                        inner[:, later], inner[:, state]
-                    )
-                following = -np.linalg.solve(self.there[np.ix_(rows, columns)], chain)
+                    later = self.here[:, count + 1 :]
+                    inner = self.here[:rows, :count]
+                    chain = chain - later[rows:] @ np.linalg.solve(later[:rows], inner)
+                following = -np.linalg.solve(self.there[rows:, :columns], chain)
             except np.linalg.LinAlgError:
                 return np.full((count, count), np.inf)
             if not phases:
                 return np.asarray(following)
-            return np.asarray(following[:count] - np.outer(self.rates, following[count]))
+            return np.asarray(following[:count] - self.rates[:, None] * following[count])
 
     def area_factor(self) -> float | None:
         return None
@@ -313,9 +319,15 @@ class ContactsEquations(OrbitEquations):
         return np.append(direction, -direction[len(self._free) :])
 
     def impacts(self, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-        chosen = np.array([event.is_impact for event in self.signature.events], dtype=bool)
-        speeds = -np.roll(solution.evaluation.ends[:, SegmentEnd.RATE], 1)[: len(chosen)]
-        return self.split(solution.unknowns)[1][chosen], speeds[chosen]
+        chosen = self._impacts
+        phases = solution.unknowns[len(self._free) :]
+        # each ends the segment before
+        return phases[chosen], -solution.evaluation.ends[chosen - 1, SegmentEnd.RATE]
+
+    @cached_property
+    def _impacts(self) -> np.ndarray:
+        """The places of the impacts among the events."""
+        return np.flatnonzero([event.is_impact for event in self.signature.events])
 
     def rests(self, solution: Solution) -> np.ndarray:
         resting = [event.closed != 0 for event in self.signature.events]
@@ -328,10 +340,14 @@ class ContactsEquations(OrbitEquations):
         return np.array(excursions(times.tolist(), resting, period)).reshape(-1, 2)
 
     def touching_speed(self, solution: Solution) -> float:
-        rows = (self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT) & (
-            self.plan[:, SegmentPlan.POWER] == 0
-        )
-        return float((-solution.evaluation.ends[rows, SegmentEnd.RATE]).min(initial=math.inf))
+        rates = solution.evaluation.ends[self._with_speed, SegmentEnd.RATE]
+        return -max(rates.tolist(), default=-math.inf)
+
+    @cached_property
+    def _with_speed(self) -> np.ndarray:
+        """The segments that end with an impact that has a speed."""
+        impacts = self.plan[:, SegmentPlan.KIND] == EventCode.IMPACT
+        return np.flatnonzero(impacts & (self.plan[:, SegmentPlan.POWER] == 0))
 
     def pressing(self, solution: Solution) -> float:
         """The least of the reactions of closed contacts, the times between events, and the gaps of
@@ -344,12 +360,8 @@ class ContactsEquations(OrbitEquations):
         apart = np.diff(np.append(phases, phases[:1] + self.closing))
         alike = self._independent & (np.abs(apart) <= ONE_INSTANT * self.closing)
         apart = apart[~alike]
-        columns = [SegmentExtremes.FORCE, SegmentExtremes.PULL, SegmentExtremes.TAIL]
         evaluation: Any = solution.evaluation
-        seen = evaluation.seen
-        reactions = seen[:, columns].min()
-        gaps = seen[:, SegmentExtremes.BESIDE].min()
-        return float(min(reactions, gaps, apart.min(initial=math.inf)))
+        return float(min(evaluation.seen[:, PRESSING].min(), apart.min(initial=math.inf)))
 
     def covered(self, solution: Solution) -> int | None:
         signature = self.signature
@@ -604,18 +616,17 @@ class ContactsEquations(OrbitEquations):
         later: np.ndarray | None = None,
     ) -> ContactsEvaluation | None:
         frequency, later = self.frequency(values), unknowns if later is None else later
+        given = (unknowns, values) if later is unknowns else (unknowns, later, values)
         if not (
-            frequency > 0.0
-            and all(np.isfinite(numbers).all() for numbers in (unknowns, later, values))
+            frequency > 0.0 and all(map(math.isfinite, (x for one in given for x in one.tolist())))
         ):
             return None
         state, phases = self.split(unknowns)
-        end, last = self.split(later)
-        times = (
-            np.append(phases, last[0] + self.closing)
-            if phases.size
-            else np.array([0.0, self.closing])
-        ) / frequency
+        end, last = (state, phases) if later is unknowns else self.split(later)
+        times = np.array([0.0, self.closing])
+        if phases.size:
+            times = np.concatenate([phases, last[:1] + self.closing])
+        times /= frequency
         followed = self._followed(self.plan, times, state, values, with_extremes)
         if followed is not None and with_extremes:
             self._leave_out_alike(followed[3], phases, frequency)
@@ -707,35 +718,26 @@ class ContactsEquations(OrbitEquations):
         free = self._free
         events = len(self.signature.events)
         first = len(free)
-        count = len(self.paths)
         end_phase = first + events
         parameters = first + events + 1
-        slope = np.zeros((2 * own, parameters + count))
-        slope[free, np.arange(first)] = 1.0
-        guards = np.zeros(events)
+        slope = self._slope_at_start.copy()
+        guards = ends[:events, SegmentEnd.GUARD]
         rows = np.zeros((events, slope.shape[1]))
-        place = parameters + self.paths.index(FREQUENCY) if FREQUENCY in self.paths else None
-        moved = np.empty(2 * own + 1)
-        rates = np.empty(2 * own + 1)
+        by_start, by_end = self._by_phases(ends, columns, frequency)
+        if self._place_of_frequency >= 0:
+            by_frequency = by_start * times[:-1, None] + by_end * times[1:, None]
         for s in range(len(ends)):
-            before = columns[s, :, : 2 * own] @ slope
-            before[:, parameters:] += columns[s, :, 2 * own :]
-            numbers = ends[s, SegmentEnd.NUMBERS :]
-            moved[:-1] = -columns[s, :-1, : 2 * own] @ numbers[2 * own : 4 * own]
-            moved[-1] = ends[s, SegmentEnd.BY_START]
-            rates[:-1] = numbers[6 * own : 8 * own]
-            rates[-1] = ends[s, SegmentEnd.BY_END]
+            before = columns[s] @ slope
             if events:
-                before[:, first + s] += moved / frequency
-                before[:, first + s + 1] += rates / frequency
-            if place is not None:
-                before[:, place] -= moved * times[s] / frequency + rates * times[s + 1] / frequency
-            if not events:
-                slope = before[:-1]
-                break
-            guards[s], rows[s] = ends[s, SegmentEnd.GUARD], before[-1]
-            slope = maps[s, :, : 2 * own] @ before[:-1]
-            slope[:, parameters:] += maps[s, :, 2 * own :]
+                before[:, first + s] += by_start[s]
+                before[:, first + s + 1] += by_end[s]
+            if self._place_of_frequency >= 0:
+                before[:, parameters + self._place_of_frequency] -= by_frequency[s]
+            slope[: 2 * own] = before[:-1]
+            if events:
+                rows[s] = before[-1]
+                slope[: 2 * own] = maps[s] @ slope
+        slope = slope[: 2 * own]
         last = SegmentEnd.NUMBERS + (8 if events else 4) * own
         after = ends[-1, last : last + 2 * own]
         if self.signature.symmetric:
@@ -743,13 +745,12 @@ class ContactsEquations(OrbitEquations):
                 self.turned(slope.T).T,
                 self.image_of(after),
             )
-        total = np.vstack([rows, slope[free]])
+        total = np.concatenate([rows, slope[free]])
         here = total[:, :end_phase]
-        there = np.zeros((first + events, first + events))
-        there[events:, :first] = -np.eye(first)
+        there = self._state_asked_for.copy()
         if events:
             there[:, first] = total[:, end_phase]
-        residual = np.append(guards, (after - end)[free])
+        residual = np.concatenate([guards, (after - end)[free]])
         return ContactsEvaluation(
             residual,
             here,
@@ -762,6 +763,44 @@ class ContactsEquations(OrbitEquations):
             ends[0, SegmentEnd.NUMBERS + 2 * own : SegmentEnd.NUMBERS + 4 * own][free] / frequency,
         )
 
+    @cached_property
+    def _slope_at_start(self) -> np.ndarray:
+        """The derivatives of the state at the start and, below them, of the parameters, in the
+        columns of `_assembled`."""
+        free = self._free
+        count = len(self.paths)
+        parameters = self.size + 1
+        slope = np.zeros((2 * self.own + count, parameters + count))
+        slope[free, np.arange(len(free))] = 1.0
+        slope[2 * self.own :, parameters:] = np.eye(count)
+        return slope
+
+    @cached_property
+    def _state_asked_for(self) -> np.ndarray:
+        """The derivatives of the equations to the unknowns a period later, but for those to the
+        phase of the first event."""
+        events = len(self.signature.events)
+        there = np.zeros((self.size, self.size))
+        there[events:, : self.size - events] = -np.eye(self.size - events)
+        return there
+
+    def _by_phases(
+        self, ends: np.ndarray, columns: np.ndarray, frequency: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The derivatives of each segment's last state and guard to the phases of its start and of
+        its end, (n, 2 own + 1) each.
+        """
+        own = self.own
+        numbers = ends[:, SegmentEnd.NUMBERS :]
+        by_start = np.empty((len(ends), 2 * own + 1))
+        by_end = np.empty((len(ends), 2 * own + 1))
+        rates = numbers[:, 2 * own : 4 * own, None]
+        by_start[:, :-1] = -(columns[:, :-1, : 2 * own] @ rates)[:, :, 0]
+        by_start[:, -1] = ends[:, SegmentEnd.BY_START]
+        by_end[:, :-1] = numbers[:, 6 * own : 8 * own]
+        by_end[:, -1] = ends[:, SegmentEnd.BY_END]
+        return by_start / frequency, by_end / frequency
+
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
         """The extremes along the segments, in the columns that orbits with one contact use
         (`flow/one_contact/segments.py`).
@@ -769,12 +808,10 @@ class ContactsEquations(OrbitEquations):
         extremes = np.full(
             (len(seen), SegmentColumn.LEAST_MARGIN + max(1, len(self.margins))), np.inf
         )
-        extremes[:, [SegmentColumn.HIGHEST, SegmentColumn.LOWEST]] = seen[
-            :, [SegmentExtremes.TOP, SegmentExtremes.BOTTOM]
-        ]
-        extremes[:, [SegmentColumn.LOWEST_GAP, SegmentColumn.LOWEST_GAP_TIME]] = seen[
-            :, [SegmentExtremes.GAP, SegmentExtremes.GAP + 1]
-        ] * [self.natural.length, 1.0]
+        extremes[:, SegmentColumn.HIGHEST] = seen[:, SegmentExtremes.TOP]
+        extremes[:, SegmentColumn.LOWEST] = seen[:, SegmentExtremes.BOTTOM]
+        extremes[:, SegmentColumn.LOWEST_GAP] = seen[:, SegmentExtremes.GAP] * self.natural.length
+        extremes[:, SegmentColumn.LOWEST_GAP_TIME] = seen[:, SegmentExtremes.GAP + 1]
         extremes[:, SegmentColumn.CROSSINGS] = 0.0
         extremes[:, SegmentColumn.LEAST_MARGIN :] = seen[:, SegmentExtremes.MARGINS :]
         return extremes

@@ -328,7 +328,7 @@ class CycleEquations(WholeMotionEquations):
 PERIOD = "period"  # the path of a family's parameter
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class FamilyEvaluation(WholeMotionEvaluation):
     """The equations of a family at one point, with the flow through its section."""
 

@@ -48,7 +48,6 @@ from saltus.orbits.segments.one_contact_segments import one_contact_segments
 from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.systems import System, arguments_of, state_of
-from saltus.taylor import FREQUENCY
 
 
 class Segments(NamedTuple):
@@ -402,7 +401,8 @@ class OneContactEquations(OrbitEquations):
         cannot be followed.
         """
         parameters = self._values.copy()
-        parameters[self._places] = values
+        for place, value in zip(self._places, values.tolist(), strict=True):
+            parameters[place] = value
         env, functions = self._run.structure.prepare(parameters, self._records)
         followed = self._follower.follow_segments((env, functions), segments, with_extremes)
         return (
@@ -425,7 +425,12 @@ class OneContactEquations(OrbitEquations):
         spans[-1, 1] = later[0] + self.closing
         spans[:, :2] /= frequency
         spans[:, 2] = unknowns[1::2]
-        return Segments(spans, self._sides, np.zeros((n, 2)))
+        return Segments(spans, self._sides, self._no_states)
+
+    @cached_property
+    def _no_states(self) -> np.ndarray:
+        """First states of segments that begin with an impact: they are not read."""
+        return np.zeros((len(self.signature.sides), 2))
 
     @cached_property
     def _sides(self) -> np.ndarray:
@@ -452,8 +457,9 @@ class OneContactEquations(OrbitEquations):
         state = ends[0, SegmentValue.FIRST_STATE : SegmentValue.FIRST_STATE + 2 * own]
         rates = ends[0, SegmentValue.FIRST_STATE + own : SegmentValue.FIRST_STATE + 3 * own]
         parameters = sign * columns[0, : 2 * own, 2 * own :]
-        if FREQUENCY in self.paths:
-            parameters[:, self.paths.index(FREQUENCY)] -= sign * rates * self.closing / frequency**2
+        place = self._place_of_frequency
+        if place >= 0:
+            parameters[:, place] -= sign * rates * self.closing / frequency**2
         here = sign * columns[:, : 2 * own, : 2 * own]
         there = -np.eye(2 * own)[None]
         end = self.image_of(state) if self.signature.symmetric else state.copy()
@@ -479,8 +485,7 @@ class OneContactEquations(OrbitEquations):
         here = np.empty((n, 2, 2))
         there = np.empty((n, 2, 2))
         parameters = np.empty((n, 2, count))
-        place = self.paths.index(FREQUENCY) if FREQUENCY in self.paths else -1
-        request = (spans, sign, following, float(frequency), place)
+        request = (spans, sign, following, float(frequency), self._place_of_frequency)
         load_segments()[1](request, (ends, columns, extremes), (residual, here, there, parameters))
         return OrbitEvaluation(
             residual.ravel(), here, there, parameters.reshape(2 * n, count), ends, extremes

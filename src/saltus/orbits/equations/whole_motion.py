@@ -81,7 +81,7 @@ CLOSED = 1e-9
 NEAR_RELAY = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class WholeMotionEvaluation(OrbitEvaluation):
     """The equations at one point, with the events along the motion."""
 
