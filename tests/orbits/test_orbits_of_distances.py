@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from flow.test_held_rows import Ball, Block, compared, rotor
+from flow.test_held_rows import Ball, Block, Rotor, compared, rotor
+from scipy.integrate import solve_ivp
 
 import saltus
 from saltus import Contact, Friction, Harmonic, Load, NewtonImpact, System
@@ -360,3 +361,85 @@ def test_coordinates_and_distances_have_the_same_energies():
 def test_symmetries_of_distances_are_refused():
     with pytest.raises(ParameterError, match="is_symmetric does not follow contacts of a distance"):
         saltus.orbits.is_symmetric(RUBBING)
+
+
+# --- a reaction that reaches 0 ---
+
+
+def least_reaction(system, time, state):
+    """The least reaction on a rotor that stays at its stator, over the last of eight forcing
+    periods from a state: by DOP853 in its angle, from reversal to reversal of what it rubs along.
+    """
+    model = system.model
+    load = system.load
+    period = 2.0 * math.pi / load.frequency
+
+    def reaction_and_bend(t, angle, rate, way):
+        outward = np.array([np.cos(angle), np.sin(angle)])
+        along = np.array([-np.sin(angle), np.cos(angle)])
+        force = np.array(model.force(t, outward, rate * along, load))
+        reaction = force @ outward + rate**2
+        return reaction, force @ along - model.mu * way * reaction
+
+    def rates(t, state, way):
+        return [state[1], reaction_and_bend(t, *state, way)[1]]
+
+    def reverses(t, state, way):
+        return state[1] + model.surface
+
+    reverses.terminal = True
+    x, y, u, v = state
+    state = np.array([math.atan2(y, x), x * v - y * u])
+    least = math.inf
+    for number in range(8):
+        end = time + period
+        while time < end:
+            way = np.sign(reverses(time, state, 0.0)) or 1.0
+            found = solve_ivp(
+                rates,
+                (time, end),
+                state,
+                "DOP853",
+                args=(way,),
+                events=reverses,
+                dense_output=True,
+                rtol=1e-12,
+                atol=1e-13,
+            )
+            if number == 7:
+                times = np.linspace(time, found.t[-1], 1001)
+                for _ in range(2):
+                    values = [reaction_and_bend(t, *found.sol(t), way)[0] for t in times.tolist()]
+                    least = min(least, *values)
+                    inner = np.clip(np.argmin(values), 1, len(times) - 2)
+                    times = np.linspace(times[inner - 1], times[inner + 1], 201)
+            time = found.t[-1]
+            # just beyond the reversal, whose speed is 0 to within rounding
+            turned = rates(time, found.y[:, -1], way)[1] if time < end else 0.0
+            state = found.y[:, -1] + np.array([0.0, 1e-13 * np.sign(turned)])
+    return least
+
+
+@pytest.mark.parametrize("frequency", [0.9428, pytest.param(0.9429, marks=pytest.mark.thorough)])
+def test_a_branch_goes_on_where_a_reaction_on_a_curved_wall_reaches_0(frequency):
+    """Beyond it the rotor leaves its stator for as short a time as one likes. Begun from either
+    side, the change is where the least reaction of the motion without it is 0.
+    """
+
+    def pulled(frequency):
+        load = Load(frequency=frequency, pull_x=Harmonic(0.7), pull_y=Harmonic(0.0))
+        return System(model=Rotor(), load=load, impact=NewtonImpact(e=0.5))
+
+    orbit = saltus.find_orbit(pulled(frequency), x=0.3, y=0.2, velocity=(0.5, -0.4))
+    branch = saltus.continue_orbit(orbit, "load.frequency", (0.9428, 0.9429))
+    assert [end.reason.name for end in branch.ends] == ["BOUND", "BOUND"]
+    (special,) = branch.special
+    assert special.kind == "RL"
+    start = special.orbit.motion()
+    state = np.concatenate(start.at(start.start))
+    before, after = (
+        least_reaction(pulled(special.parameter + apart), start.start, state)
+        for apart in (-1e-5, 1e-5)
+    )
+    assert before > 0.0 > after
+    assert before + after == pytest.approx(0.0, abs=1e-3 * before)

@@ -73,7 +73,13 @@ from saltus.flow.contacts.propagators import (
     input_step,
 )
 from saltus.flow.contacts.resets import keep_reached, lead_to_events, reset_state, resets_state
-from saltus.flow.contacts.rows import has_speed, largest_pull, limits_begin, row_series
+from saltus.flow.contacts.rows import (
+    has_speed,
+    is_nearly_rounding,
+    largest_pull,
+    limits_begin,
+    row_series,
+)
 from saltus.flow.contacts.rubbing import (
     free_pulls,
     frozen_limit,
@@ -92,6 +98,7 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.contact_layout import (
     EXCESS,
+    FADES,
     GAP_ROUNDING,
     MOST_TRIED,
     NEAR,
@@ -161,17 +168,24 @@ def end_accumulation_of(motion, t):
     if not fill_contact_matrices(motion):
         return t
     slow = slow_impacts(motion)
-    slowest = slow
+    slowest = np.inf
     last = -1
+    fades = False
     for i in range(count):
-        below = min(slowest, slow * lost_share(motion, i))
-        if 0.0 < motion.rates[i] <= below and motion.gaps[i] == 0.0:
+        if not (0.0 < motion.rates[i] <= slowest and motion.gaps[i] == 0.0):
+            continue
+        faded = is_nearly_rounding(motion, i)
+        if faded or motion.rates[i] <= slow * lost_share(motion, i):
             slowest = motion.rates[i]
             last = i
-    if last < 0 or motion.contacts[last, PartColumn.WAITS] > 0:
-        if last >= 0:
-            motion.contacts[last, PartColumn.WAITS] -= 1
+            fades = faded
+    if last >= 0 and motion.contacts[last, PartColumn.WAITS] > 0 and not fades:
+        motion.contacts[last, PartColumn.WAITS] -= 1
+        last = -1
+    if last < 0:
         return t
+    slow = max(slow, slowest)
+    share = FADES if fades else math.sqrt(10.0 * motion.tolerance)
     free_pulls(motion, t)
     near = near_contacts(motion, slow)
     turns = turns_with(motion, last)
@@ -179,7 +193,7 @@ def end_accumulation_of(motion, t):
         near = near & closed_bits(motion) | 1 << last
     if near == 0 or (turns and not slides_on(motion, near)):
         return t
-    limit = min(frozen_limit(motion, near), motion_end(motion) - t)
+    limit = min(frozen_limit(motion, near, share), motion_end(motion) - t)
     together = near
     left = (
         rubbed_accumulation(motion, t, near & ~(1 << last), last, limit)

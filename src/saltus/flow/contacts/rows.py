@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 
 from saltus.flow.kernel.contact_layout import (
+    NEARLY,
     ROW_ROUNDING,
     SPANNED,
     FrictionImpact,
@@ -76,6 +77,15 @@ def told_rate(motion, r):
     rate = rate_at(motion, r, motion.velocities)
     terms = max(size_of_terms(motion, r), motion.row_terms[r])
     return rate if abs(rate) > ROW_ROUNDING * terms else 0.0
+
+
+@lean_jit
+def is_nearly_rounding(motion, i):
+    """Whether the next impacts of a contact with a row would be rounding of the terms of its
+    rate."""
+    return motion.multipliers > 0 and motion.rates[i] <= NEARLY * ROW_ROUNDING * size_of_terms(
+        motion, i
+    )
 
 
 @lean_jit

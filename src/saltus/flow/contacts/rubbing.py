@@ -488,16 +488,17 @@ def free_row_pulls(motion, t):
 
 
 @lean_jit
-def frozen_limit(motion, near):
-    """The time for which the accelerations of the contacts in `near` may be taken as constant, from
-    what `free_pulls` has filled; at most up to the next breakpoint of the records.
+def frozen_limit(motion, near, share):
+    """The time for which the accelerations of the contacts in `near` may be taken as constant, as
+    they change by at most this share, from what `free_pulls` has filled; at most up to the next
+    breakpoint of the records.
     """
     change = 0.0
     for i in range(motion.contacts.shape[0]):
         if near >> i & 1:
             change = max(change, motion.falling_pulls[i])
     limit = piece_end(motion) - motion.time
-    return min(limit, np.sqrt(10.0 * motion.tolerance) / change) if change > 0.0 else limit
+    return min(limit, share / change) if change > 0.0 else limit
 
 
 @lean_jit

@@ -590,10 +590,10 @@ class SampledMotion:
         opened = [~mask for mask in closed]
         everywhere = [np.ones(len(steps), dtype=bool)] * (2 * len(slides) + 2)
         gaps, speeds = (
-            self._dip(steps, chosen, rows_of, at_begin=False)
-            for chosen in (
-                [*opened, *(np.zeros_like(mask) for mask in sliding)],
-                [*(np.zeros_like(mask) for mask in opened), *sliding],
+            self._dip(steps, chosen, rows_of, at_begin=False, lowest_hump=DYING**2 * unit)
+            for unit, chosen in (
+                (units.length, [*opened, *(np.zeros_like(mask) for mask in sliding)]),
+                (units.speed, [*(np.zeros_like(mask) for mask in opened), *sliding]),
             )
         )
         force = self._dip(steps, [*closed, *everywhere], forces_of)
@@ -639,13 +639,15 @@ class SampledMotion:
         chosen: list[np.ndarray],
         forces: Callable[..., list[Any]],
         at_begin: bool = True,
+        lowest_hump: float = 0.0,
     ) -> float:
         """The least inner minimum of any of several forces within stretches of successive chosen
         steps, or the force just after the event with which a stretch begins, if that is less.
         `steps` are the numbers of the steps in the whole motion.
 
         Not `at_begin`, of what is 0 there: then each stretch ends with an event, and minima just
-        after one, which are rounding, do not count either.
+        after one, which are rounding, do not count either. Nor do those of a stretch that stays
+        below `lowest_hump`, such as the last bounces of an accumulation.
         """
         least = np.inf
         lowest = np.inf
@@ -660,6 +662,8 @@ class SampledMotion:
             for each in range(1, int(stretch[-1]) + 1):
                 rows = np.flatnonzero(mask & (stretch == each))
                 course = np.append(values[rows, :-1].ravel(), values[rows[-1], -1])
+                if course.max() < lowest_hump:
+                    continue
                 begins = bool(self.begins[rows[0]])
                 least = min(least, float(course[0])) if begins and at_begin else least
                 inner = 1 + np.flatnonzero(
