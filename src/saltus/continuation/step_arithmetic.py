@@ -62,7 +62,7 @@ def as_floats(*arrays: np.ndarray) -> list[np.ndarray]:
 @jit
 def eliminate(matrix, right):
     """Solve linear equations with right-hand sides (n, m) in place, by elimination with the largest
-    pivots; the determinant, exactly 0 if a pivot is.
+    pivots; the determinant, and whether no pivot is 0: of many small ones the product may be.
     """
     n = matrix.shape[0]
     determinant = 1.0
@@ -72,7 +72,7 @@ def eliminate(matrix, right):
             if abs(matrix[i, k]) > abs(matrix[pivot, k]):
                 pivot = i
         if matrix[pivot, k] == 0.0:
-            return 0.0
+            return 0.0, False
         if pivot != k:
             determinant = -determinant
             for j in range(k, n):
@@ -93,7 +93,7 @@ def eliminate(matrix, right):
             for i in range(k + 1, n):
                 value -= matrix[k, i] * right[i, j]
             right[k, j] = value / matrix[k, k]
-    return determinant
+    return determinant, True
 
 
 @jit
@@ -114,7 +114,7 @@ def solve_scaled(matrix, right, units, scaled):
             for j in range(n):
                 matrix[i, j] /= size
             right[i, 0] /= size
-    if eliminate(matrix, right) == 0.0:
+    if not eliminate(matrix, right)[1]:
         return False
     if scaled:
         for i in range(n):
@@ -288,7 +288,7 @@ def product_of_maps(here, there, product):
             for j in range(d):
                 work[i, j] = there[s, i, j]
                 right[i, j] = -here[s, i, j]
-        if eliminate(work, right) == 0.0:
+        if not eliminate(work, right)[1]:
             return False
         for j in range(d):
             for i in range(d):
@@ -327,7 +327,7 @@ def scaled_determinant(matrix, units):
             return 0.0
         for j in range(n):
             work[i, j] /= math.sqrt(square)
-    return eliminate(work, np.empty((n, 0)))
+    return eliminate(work, np.empty((n, 0)))[0]
 
 
 # --- the values of test functions along a curve ------------------------------
