@@ -335,8 +335,8 @@ def scaled_determinant(matrix, units):
 
 @cached_jit("b1(f8[:, :], f8[:], f8[:], f8, b1[:], f8)")
 def is_expected(values, arcs, found, arc, guides, share):
-    """Whether the values found at a length of the curve differ from the parabolas through the last
-    three, (3, m), by no more than a share of them, for those that are guides.
+    """Whether the values found at a length of the curve are near the parabolas through the last
+    three, (3, m). Those that are guides may differ by a share of the largest value.
     """
     a, b, c = arcs
     first = (arc - b) * (arc - c) / ((a - b) * (a - c))
