@@ -104,3 +104,12 @@ def test_starts_that_do_not_say_the_side_are_refused():
     ]:
         with pytest.raises(ParameterError, match=words):
             simulate_many(room, duration=1.0, **given)
+
+
+def test_a_motion_without_a_duration_is_its_start():
+    room = System(model=Thermostat(), load=Load(frequency=1.0))
+    for lasting in ({"duration": 0.0}, {"periods": 0}):
+        found = simulate_many(room, T=[19.5, 20.5], relays={"heater": [True, False]}, **lasting)
+        assert found["T"].values.tolist() == [19.5, 20.5]
+        assert found.side_heater.values.tolist() == [1, -1]
+        assert found.time.values.tolist() == [0.0, 0.0]

@@ -319,7 +319,8 @@ def _sides_of_relays(motion: Motion, times: np.ndarray) -> np.ndarray:
     names = [relay.name for relay in model.relays]
     if not names:
         return np.zeros((len(times), 0), dtype=int)
-    assert motion.dense is not None
+    if motion.dense is None:  # it has no duration
+        return np.array([[motion.sides[name] for name in names]] * len(times), dtype=int)
     sides = modes_of(model, motion.dense.states(times)[2])[2]
     of_surfaces = dict(zip([part.name for part in model.surfaces], sides, strict=True))
     found = np.stack([of_surfaces[name] for name in names], axis=1).astype(int)
