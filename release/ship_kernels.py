@@ -22,7 +22,8 @@ def main(sources: Path) -> None:
     # this tree may be installed, and the sources be another one
     os.environ["PYTHONPATH"] = str(sources)
     sys.path.insert(0, str(sources))
-    from saltus.flow import available_cores, compile_kernels
+    from saltus.flow import available_cores
+    from saltus.preparation import compile_kernels
     from saltus.taylor import shipped
 
     for name in shipped.LEVELS:

@@ -54,6 +54,7 @@ MAY_IMPORT = {
         "systems",
         "theory",
         "flow",
+        "preparation",
         "taylor",
         "orbits",
         "attractors",

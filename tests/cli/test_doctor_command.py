@@ -58,11 +58,13 @@ def test_doctor_says_how_to_install_what_clusters_need(saltus, monkeypatch):
 
 
 def test_doctor_compiles_all_kernels_if_asked(saltus, monkeypatch):
-    from saltus import flow
+    from saltus import preparation
 
     waiting = ["motions", "lanes"]
     monkeypatch.setattr(
-        flow, "compile_kernels", lambda workers: ((waiting.pop(0), len(waiting)) for _ in range(2))
+        preparation,
+        "compile_kernels",
+        lambda workers: ((waiting.pop(0), len(waiting)) for _ in range(2)),
     )
     found = saltus("doctor", "--compile")
     assert found.exit_code == 0, found.output

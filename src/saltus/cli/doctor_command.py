@@ -52,7 +52,8 @@ def print_doctor(compile_all: bool = False) -> None:
 
 def _compile(console: Console) -> None:
     """Compile the kernels that are not compiled yet."""
-    from saltus.flow import available_cores, compile_kernels
+    from saltus.flow import available_cores
+    from saltus.preparation import compile_kernels
 
     with console.status("compiling all kernels") as status:
         for name, left in compile_kernels(available_cores()):

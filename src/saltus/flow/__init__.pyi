@@ -70,7 +70,6 @@ from .motion.step_through import step_through as step_through
 from .motion.validity import Validity as Validity
 from .one_contact.regularity import ContactRegularity as ContactRegularity
 from .one_contact.regularity import contact_regularity as contact_regularity
-from .preparation import compile_kernels as compile_kernels
 from .programs.compiled import program as program
 from .programs.lane_threads import available_cores as available_cores
 from .programs.lane_threads import share_cores as share_cores

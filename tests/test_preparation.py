@@ -2,8 +2,8 @@
 
 import pytest
 
+from saltus import preparation
 from saltus.errors import SaltusError
-from saltus.flow import preparation
 
 
 def test_a_kernel_is_compiled_by_a_process_of_its_own(monkeypatch, tmp_path):

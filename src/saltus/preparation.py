@@ -7,12 +7,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 
+from saltus.continuation import arithmetic
 from saltus.errors import SaltusError
 from saltus.flow.programs.compiled import load_contacts_kernel, load_fillers, load_kernel
 from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
 from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
 
-# All kernels but those of proofs and of the steps along branches; what takes longest comes first.
+# All kernels but those of proofs; what takes longest comes first.
 KERNELS: dict[str, Callable[[], object]] = {
     "motions of several contacts": load_contacts_kernel,
     "lanes of several contacts": lambda: load_driver(True),
@@ -21,6 +22,7 @@ KERNELS: dict[str, Callable[[], object]] = {
     "helpers of several contacts": lambda: load_helpers(True),
     "motions of one contact": load_kernel,
     "orbits of one contact": load_segments,
+    "steps along branches": arithmetic,
     "helpers of one contact": load_helpers,
     "tables": load_fillers,
 }
