@@ -87,16 +87,16 @@ def test_what_saltus_imports_it_also_requires():
 
 
 def test_the_changelog_can_be_read():
-    """Ten lines of highlights above, then a line an entry, and a date for each older version. The
-    newest one has no date while its release check cannot pass (docs/releasing.md).
+    """Ten lines of highlights above, then a line an entry, and a date for each older version. If the
+    newest one has a date, what was done for it is recorded (docs/releasing.md).
     """
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     newest, *older = re.split(r"^## ", text, flags=re.M)[1:]
-    (said,) = re.match(
-        r"\S+ \((20\d\d-\d\d-\d\d|not released)\)\n\nIn short:\n\n(?:\* .+\n){10}\n### ", newest
+    version, said = re.match(
+        r"(\S+) \((20\d\d-\d\d-\d\d|not released)\)\n\nIn short:\n\n(?:\* .+\n){10}\n### ", newest
     ).groups()
-    checked = subprocess.run([sys.executable, ROOT / "release" / "publication.py"], check=False)
-    assert said == "not released" or checked.returncode == 0
+    record = (ROOT / "docs" / "releasing.md").read_text(encoding="utf-8")
+    assert (f"### {version} ({said})" in record) == (said != "not released")
     assert all(re.match(r"\S+ \((20\d\d-\d\d-\d\d|\w{7})[),]", version) for version in older)
     entries = [line for line in text.splitlines() if line and not line.startswith("#")]
     assert all(line.startswith("* ") or not line.startswith(" ") for line in entries)

@@ -113,3 +113,9 @@ def test_a_motion_without_a_duration_is_its_start():
         assert found["T"].values.tolist() == [19.5, 20.5]
         assert found.side_heater.values.tolist() == [1, -1]
         assert found.time.values.tolist() == [0.0, 0.0]
+
+
+def test_a_card_follows_no_relays():
+    room = System(model=Thermostat())
+    with pytest.raises(ParameterError, match="one by one, not on a card: leave device out"):
+        simulate_many(room, T=[18.0], relays={"heater": True}, duration=1.0, device="cuda")

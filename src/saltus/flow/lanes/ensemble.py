@@ -227,6 +227,12 @@ def run_ensemble(
         f"samples of {kept} periods of {inputs.size} motions",
     )
     if alone:
+        if device == "cuda":
+            raise ParameterError(
+                "motions with relays, resets or contacts of a distance are followed one by one, not"
+                " on a card: leave device out",
+                "device",
+            )
         ends = followed_one_by_one(system, inputs, options, jobs, kept, side, progress, duration)
         return EnsembleResult(own, given, options, jobs, ends)
     lanes = compiled_lanes(system, run, options, kept, inputs.parameters)

@@ -77,7 +77,6 @@ KERNEL_HEADER = f"""import math
 import numpy as np
 
 from saltus.flow.kernel.memory import *
-from saltus.flow.kernel.memory import *
 from saltus.taylor.numba_types import by_reference
 from saltus.taylor.private_numba import cached_jit, inline_jit, jit, lean_jit
 # types of {digest(source_of(memory))}
