@@ -43,7 +43,7 @@ def test_a_pause_says_in_words_what_the_kernel_knows() -> None:
     assert f"time {pause.motion.time:.12g}: {pause.event.kind} of belt, after" in words
     assert "closed: nothing; belt sticks" in words
     assert f"x = {pause.motion.x:.12g}, x' = 0.1" in words
-    assert pause.memory.frictions.shape[0] == 1
+    assert pause.memory.sided.shape[0] == 1
     assert "solver_numbers" in dir(pause.memory)
 
 

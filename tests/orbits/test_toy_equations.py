@@ -45,7 +45,7 @@ def spring(frequency: float = 0.7) -> saltus.System:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class BalanceEvaluation(OrbitEvaluation):
     """Multipliers are those of the free oscillation, whatever the unknowns are."""
 

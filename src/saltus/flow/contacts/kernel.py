@@ -98,7 +98,7 @@ from saltus.flow.contacts.tangent import (
 )
 from saltus.flow.kernel.contact_layout import (
     EXCESS,
-    FADES,
+    FADING_CHANGE,
     GAP_ROUNDING,
     MOST_TRIED,
     NEAR,
@@ -185,7 +185,7 @@ def end_accumulation_of(motion, t):
     if last < 0:
         return t
     slow = max(slow, slowest)
-    share = FADES if fades else math.sqrt(10.0 * motion.tolerance)
+    share = FADING_CHANGE if fades else math.sqrt(10.0 * motion.tolerance)
     free_pulls(motion, t)
     near = near_contacts(motion, slow)
     turns = turns_with(motion, last)

@@ -58,7 +58,7 @@ from saltus.taylor.lane_vectors import (
 # The time of a step with the series of all coordinates, in units of that with the series of one.
 COST_OF_SEVERAL = 3
 # Gaps that close within this share of a step may close together, which the scalar kernel decides.
-TOGETHER = 1e-6
+CLOSE_TOGETHER = 1e-6
 # A gap smaller than this, in natural units, when another one closes, may close together with it.
 SMALL_GAP = 1e-9
 
@@ -191,7 +191,7 @@ def first_closing(lanes, h, alive):
         closes, unclear, _, when, _ = find_contact(
             lanes, gap, h, (fma(mean, h, start), v, a, bend), opened, 0
         )
-        doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < TOGETHER * h))
+        doubtful |= unclear | (hit & closes & bits(absolute(when - tau) < CLOSE_TOGETHER * h))
         first = closes & (~hit | bits(when < tau))
         tau = select(mask(first), when, tau)
         which = select(mask(first), splat(1.0 * i), which)

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 
 from saltus.flow.kernel.contact_layout import (
-    NEARLY,
+    LAST_BOUNCES,
     ROW_ROUNDING,
     SPANNED,
     FrictionImpact,
@@ -83,9 +83,9 @@ def told_rate(motion, r):
 def is_nearly_rounding(motion, i):
     """Whether the next impacts of a contact with a row would be rounding of the terms of its
     rate."""
-    return motion.multipliers > 0 and motion.rates[i] <= NEARLY * ROW_ROUNDING * size_of_terms(
-        motion, i
-    )
+    return motion.multipliers > 0 and motion.rates[
+        i
+    ] <= LAST_BOUNCES * ROW_ROUNDING * size_of_terms(motion, i)
 
 
 @lean_jit

@@ -212,10 +212,10 @@ TRIED_AGAIN = 32
 ROW_ROUNDING = 2.0**-44
 # A contact whose rate is less than this many times as large bounces no more than a few times before
 # its rate is rounding,
-NEARLY = 8.0
+LAST_BOUNCES = 8.0
 # so that its accumulation ends there, if the accelerations change by no more than this share until
 # then: what this leaves of its speed is rounding too.
-FADES = 0.1
+FADING_CHANGE = 0.1
 # A row follows from others if the square of the sine of its angle to them is at most this.
 SPANNED = 1e-13
 # Two choices move alike if the square of their difference, in the metric of M, is a smaller share.
