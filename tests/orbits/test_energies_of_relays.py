@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from machines_with_memory import Servo
 
 from saltus import (
     Contact,
@@ -20,25 +21,6 @@ from saltus import (
     find_orbit,
     simulate,
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Servo(ContactModel):
-    """A motor with friction that a relay with hysteresis drives back: y'' + y' = -u."""
-
-    width: float = 0.2
-
-    coordinates: ClassVar[tuple[str, ...]] = ("y",)
-    surfaces: ClassVar[tuple[Relay, ...]] = (Relay(name="drive", on="above", off="below"),)
-
-    def above(self, t, y, velocity, load):
-        return y - self.width
-
-    def below(self, t, y, velocity, load):
-        return -self.width - y
-
-    def force(self, t, y, velocity, load, sides):
-        return -velocity - sides.drive
 
 
 @dataclass(frozen=True, kw_only=True)

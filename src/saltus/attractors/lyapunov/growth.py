@@ -341,7 +341,8 @@ def stretched(
             until=("rest",),
             derivatives=True,
         )
-        last, derivatives = ends.last, ends.derivatives
+        last = ends.last
+        derivatives = ends.derivatives
         # Motions that are captured at rest are given up, as following their impacts to the rest
         # would take millions of these.
         moving = (ends.side != 0) & ~ends.stopped(Stop.CAPTURED)
