@@ -66,7 +66,7 @@ def test_singular_equations_have_no_step():
 
 
 def test_many_small_pivots_are_no_singular_matrix():
-    """Their product is 0: 80 impacts in millimetres have such equations."""
+    """Their product is 0, as of equations in small units, and the matrix is not singular."""
     count = 160
     step = np.empty(count)
     solution = np.linspace(1.0, 2.0, count)
