@@ -55,6 +55,7 @@ SEVERAL = {
     "start": "when a pulse begins, or the state with which a record begins",
     "starts": "how many initial states, or, of a phase portrait, which",
     "stiffness": "a coefficient, or the matrix of a structure",
+    "surfaces": "surfaces and relays, of a structure also as tables",
     "time": "when a motion begins, or the times of a record",
     "velocity": "of a start, or at which a friction slides",
     "values": "of a parameter, or what was measured, or the unknowns of a fit",

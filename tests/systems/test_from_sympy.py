@@ -122,7 +122,7 @@ def test_other_equations_are_another_model():
 
 def test_what_an_expression_may_not_have_is_refused():
     x, v, k, z = sympy.symbols("x v k z")
-    with pytest.raises(ParameterError, match="force has 'z', which is none of x, k"):
+    with pytest.raises(ParameterError, match="force has 'z', which is none of x, v, k"):
         saltus.from_sympy(coordinates=[x], velocities=[v], force=[-k * x + z], parameters={k: 1.0})
     with pytest.raises(
         ParameterError, match="velocities must have the rate of each coordinate, and x has none"

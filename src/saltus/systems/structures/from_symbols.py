@@ -1,5 +1,5 @@
-"""Models from expressions of SymPy: M(q) q'' = f(t, q, q') with contacts, as classes with a number
-for each parameter.
+"""Models from expressions of SymPy: M(q) q'' = f(t, q, q') with contacts, frictions, surfaces and
+relays, as classes with a number for each parameter.
 
 Nothing here imports SymPy before it is asked for a model. A class keeps its equations as Python's
 text, of which it is made anew in another process; SymPy is not needed there.
@@ -10,21 +10,46 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import MISSING, dataclass, field, fields, make_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from saltus.errors import ParameterError, shown
 from saltus.number_ranges import number_range, settle_numbers
-from saltus.systems.contracts.contact_model import Contact, ContactModel
+from saltus.systems.contracts.contact_model import (
+    Contact,
+    ContactModel,
+    Friction,
+    Relay,
+    Surface,
+    called_part,
+)
 from saltus.systems.serial import MODELS
 
 
 @dataclass(frozen=True)
+class _Part:
+    """A contact, friction, surface or relay, and the texts of those of its numbers that are
+    expressions of the parameters.
+    """
+
+    part: Any
+    texts: tuple[tuple[str, str], ...]  # by the names of its fields
+
+
+@dataclass(frozen=True)
+class _Method:
+    """A method of a class as text: what it takes, and what it returns."""
+
+    takes: tuple[str, ...]
+    returns: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class _Equations:
-    """The parts of a class as text, in which `q`, `v`, `p` and `c` are coordinates, velocities,
-    parameters and channels.
+    """The parts of a class as text, in which `q`, `v`, `p`, `c` and `s` are coordinates,
+    velocities, parameters, channels and sides of surfaces.
     """
 
     name: str
@@ -33,8 +58,19 @@ class _Equations:
     channels: tuple[str, ...]
     mass: tuple[str, ...]  # the rows, one after the other
     force: tuple[str, ...]
-    contacts: tuple[Contact, ...]
-    positions: tuple[str, ...]  # of the contacts
+    first_order: tuple[str, ...]
+    contacts: tuple[_Part, ...]
+    frictions: tuple[_Part, ...]
+    surfaces: tuple[_Part, ...]
+    normal_forces: tuple[str, ...] | None
+    methods: tuple[tuple[str, _Method], ...]  # by their names
+
+
+# What the methods take that parts name: a surface's function, a relay's two, the rate of a friction
+# and a reset; the distance of a contact; a function in a sum of coordinates.
+OF_STATE = ("t", "q", "v", "load")
+OF_PLACE_AND_TIME = ("t", "q", "load")
+OF_PLACE = ("q",)
 
 
 def from_sympy(
@@ -47,6 +83,13 @@ def from_sympy(
     parameters: Mapping[Any, float],
     channels: Mapping[str, Any] | None = None,
     contacts: Sequence[Contact] = (),
+    frictions: Sequence[Friction] = (),
+    normal_forces: Sequence[Any] | None = None,
+    surfaces: Sequence[Surface | Relay] = (),
+    sides: Mapping[str, Any] | None = None,
+    functions: Mapping[str, Any] | None = None,
+    resets: Mapping[str, Any] | None = None,
+    first_order: Sequence[Any] = (),
     name: str | None = None,
 ) -> ContactModel:
     """A model M(q) q'' = f(t, q, q') from expressions of SymPy, or from `LagrangesMethod` or
@@ -75,8 +118,23 @@ def from_sympy(
         The number of each other symbol.
     channels
         The symbols that are channels of the load, by the names of the channels: `{"force": F}`.
-    contacts
-        Contacts, with coordinates by name; a position may be an expression of the parameters.
+    contacts, frictions, surfaces
+        `Contact`, `Friction`, and `Surface` or `Relay`, with coordinates by name; their numbers may
+        be expressions of the parameters.
+    normal_forces
+        An expression for each friction; by default 1.
+    sides
+        The symbols that are the sides of surfaces and relays in the force, +1 or -1, by the names
+        of these: `{"heater": s}`.
+    functions
+        The expressions that parts name: the `function` of a surface, `on` and `off` of a relay, the
+        `rate` of a friction, the `distance` of a contact.
+    resets
+        What an `after_event` names: the expressions of all coordinates and of all velocities after
+        the event, `{"kicked": ([x], [v + 1])}`.
+    first_order
+        Those of the coordinates that have no velocities, the last ones: their `force` is their
+        rate.
     name
         The name of the model's class, which no model with other equations has; by default FromSympy
         with a digest of them.
@@ -85,8 +143,8 @@ def from_sympy(
     ------
     ParameterError
         SymPy is not installed; an argument is of another type; an expression has a symbol that is
-        none of these; a mass matrix is of another size or depends on velocities; a name that
-        another model has.
+        none of these; a mass matrix is of another size or depends on velocities; a part that names
+        a function or a reset that is not given; a name that another model has.
 
     Examples
     --------
@@ -103,10 +161,18 @@ def from_sympy(
                 f"parameters must be numbers by symbols of SymPy, got {shown(parameters)}",
                 "parameters",
             )
-    _check_types(sympy, coordinates, velocities, parameters, channels or {})
+    given_tables = {
+        "parameters": parameters,
+        "channels": channels or {},
+        "sides": sides or {},
+        "functions": functions or {},
+        "resets": resets or {},
+    }
+    _check_tables(given_tables)
+    _check_symbols(sympy, coordinates, velocities, first_order, channels or {}, sides or {})
     if equations is not None:
         coordinates, velocities, mass, force = _read_method(equations)
-    replaced, names = _replacements(sympy, coordinates, velocities, parameters, channels or {})
+    replaced, names = _replacements(sympy, coordinates, velocities, first_order, given_tables)
     kinds = dict(replaced)
 
     def text(what: str, expression: Any, allowed: str) -> str:
@@ -121,9 +187,14 @@ def from_sympy(
             raise ParameterError(f"{what} must be finite, got {shown(expression)}", what)
         for symbol in sorted(given.free_symbols, key=str):
             if symbol not in names.values() or str(symbol)[0] not in allowed:
-                known = ", ".join(map(str, [*coordinates, *parameters]))
+                known = ", ".join(
+                    _name_of(own) if own in coordinates else str(own)
+                    for own, made in names.items()
+                    if str(made)[0] in allowed
+                )
+                called = next((str(own) for own, made in names.items() if made == symbol), symbol)
                 raise ParameterError(
-                    f"{what} has {shown(str(symbol))}, which is none of {known}", what
+                    f"{what} has {shown(str(called))}, which is none of {known}", what
                 )
         try:
             return str(printer.doprint(given))
@@ -146,15 +217,44 @@ def from_sympy(
             f"{rows.shape} and {len(forces)}",
             "force",
         )
+    parts: dict[str, tuple[_Part, ...]] = {}
+    for what, kinds_of_parts, given_parts in (
+        ("contacts", (Contact,), contacts),
+        ("frictions", (Friction,), frictions),
+        ("surfaces", (Surface, Relay), surfaces),
+    ):
+        _check_parts(what, kinds_of_parts, given_parts)
+        parts[what] = tuple(_part(sympy, what, part, text) for part in given_parts)
+    of_parts = _Named(contacts, frictions, surfaces)
+    of_parts.check(functions or {}, resets or {}, sides or {})
+    own_names = {_name_of(each) for each in (*coordinates, *parameters)}
+    methods: list[tuple[str, _Method]] = []
+    for called, expression in (functions or {}).items():
+        _check_method_name(called, own_names, "functions")
+        takes = of_parts.taken_by(called)
+        allowed = {OF_STATE: "qvpc", OF_PLACE_AND_TIME: "qpc", OF_PLACE: "qp"}[takes]
+        found = text(f"functions.{called}", expression, allowed)
+        methods.append((called, _Method(takes, (found,))))
+    for called, state in (resets or {}).items():
+        _check_method_name(called, own_names, "resets")
+        methods.append(
+            (called, _Method(OF_STATE, _reset_of(f"resets.{called}", state, count, text)))
+        )
     made = _Equations(
         "FromSympy" if name is None else name,
         tuple(_name_of(each) for each in coordinates),
         tuple(_name_of(each) for each in parameters),
         tuple(channels or ()),
         tuple(text("mass", entry, "qp") for entry in rows),
-        tuple(text("force", each, "qvpc") for each in forces),
-        tuple(replace(contact, position=0.0) for contact in contacts),
-        tuple(text("contacts", contact.position, "p") for contact in contacts),
+        tuple(text("force", each, "qvpcs") for each in forces),
+        tuple(_name_of(each) for each in first_order),
+        **parts,
+        normal_forces=(
+            None
+            if normal_forces is None
+            else tuple(text("normal_forces", each, "qvpc") for each in normal_forces)
+        ),
+        methods=tuple(methods),
     )
     if name is None:
         made = replace(
@@ -232,19 +332,34 @@ def _sympy() -> Any:
     return sympy
 
 
-def _check_types(
-    sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any
-) -> None:
-    """Refuse what holds no symbols."""
-    for what, given in (("parameters", parameters), ("channels", channels)):
+EXAMPLES = {
+    "parameters": "{k: 4.0}",
+    "channels": '{"force": F}',
+    "sides": '{"heater": s}',
+    "functions": '{"too_cold": 19 - T}',
+    "resets": '{"kicked": ([x], [v + 1])}',
+}
+
+
+def _check_tables(tables: dict[str, Any]) -> None:
+    """Refuse what is no dictionary."""
+    for what, given in tables.items():
         if not isinstance(given, Mapping):
             raise ParameterError(
-                f"{what} must be a dictionary such as {{k: 4.0}}, got {shown(given)}", what
+                f"{what} must be a dictionary such as {EXAMPLES[what]}, got {shown(given)}", what
             )
+
+
+def _check_symbols(
+    sympy: Any, coordinates: Any, velocities: Any, first_order: Any, channels: Any, sides: Any
+) -> None:
+    """Refuse what holds no symbols, and coordinates of first order that are none of the model's."""
     for what, given in (
         ("coordinates", coordinates),
         ("velocities", velocities),
+        ("first_order", first_order),
         ("channels", list(channels.values())),
+        ("sides", list(sides.values())),
     ):
         if not isinstance(given, Sequence) or not all(
             isinstance(each, sympy.Basic) for each in given
@@ -252,6 +367,130 @@ def _check_types(
             raise ParameterError(
                 f"{what} must be symbols of SymPy, such as [x], got {shown(given)}", what
             )
+
+
+def _check_parts(what: str, kinds: tuple[type, ...], given: Any) -> None:
+    """Refuse parts of other classes."""
+    listed = isinstance(given, Sequence) and not isinstance(given, str)
+    wrong = next((each for each in given if not isinstance(each, kinds)), None) if listed else given
+    if wrong is not None:
+        names = " or ".join(kind.__name__ for kind in kinds)
+        raise ParameterError(f"{what} must be a list of {names}, got {shown(wrong)}", what)
+
+
+def _part(sympy: Any, what: str, part: Any, text: Any) -> _Part:
+    """A part without the numbers that are expressions, and their texts."""
+    texts = {
+        each.name: text(f"{what}.{part.name}.{each.name}", value, "p")
+        for each in fields(part)
+        if isinstance(value := getattr(part, each.name), sympy.Basic)
+    }
+    usual = {
+        each.name: 0.0 if each.default is MISSING else each.default
+        for each in fields(part)
+        if each.name in texts
+    }
+    return _Part(replace(part, **usual), tuple(texts.items()))
+
+
+class _Named:
+    """Which functions and resets the parts of a model name, and what these take."""
+
+    def __init__(self, contacts: Any, frictions: Any, surfaces: Any) -> None:
+        self.surfaces = [part.name for part in surfaces]
+        self.resets: dict[str, Any] = {}
+        self.takes: dict[str, dict[tuple[str, ...], Any]] = {}
+        for part in surfaces:
+            if part.after_event is not None:
+                self.resets[part.after_event] = part
+            for called in part.methods:
+                self._add(called, OF_STATE, part)
+        for part in contacts:
+            if part.distance is not None:
+                self._add(part.distance, OF_PLACE_AND_TIME, part)
+        for part in frictions:
+            if part.rate is not None:
+                self._add(part.rate, OF_STATE, part)
+        # a sum has names of coordinates and of channels, too
+        self.terms = {
+            term: part
+            for part in (*contacts, *frictions, *surfaces)
+            if isinstance(part.coordinate, Mapping)
+            for term in part.coordinate
+        }
+
+    def _add(self, called: str, takes: tuple[str, ...], part: Any) -> None:
+        self.takes.setdefault(called, {})[takes] = part
+
+    def taken_by(self, called: str) -> tuple[str, ...]:
+        """What a function takes, by the parts that name it."""
+        known = [*self.takes.get(called, {})] + [OF_PLACE] * (called in self.terms)
+        if not known:
+            raise ParameterError(
+                f"functions.{called} is named by no part: give it to a contact, a friction, a"
+                " surface or a relay, or leave it out",
+                "functions",
+            )
+        if len(known) > 1:
+            raise ParameterError(
+                f"functions.{called} is named by parts that take it of other arguments (a distance"
+                " takes no velocity): give each a function of its own",
+                "functions",
+            )
+        return known[0]
+
+    def check(self, functions: Any, resets: Any, sides: Any) -> None:
+        """Refuse parts that name what is not given, and what no part names."""
+        for called, by in self.takes.items():
+            if called not in functions:
+                part = next(iter(by.values()))
+                raise ParameterError(
+                    f"{called_part(part)} names {shown(called)}, which is none of the functions"
+                    f" ({', '.join(functions) or 'there are none'})",
+                    "functions",
+                )
+        for called, part in self.resets.items():
+            if called not in resets:
+                raise ParameterError(
+                    f"{called_part(part)} has the after_event {shown(called)}, which is none of the"
+                    f" resets ({', '.join(resets) or 'there are none'})",
+                    "resets",
+                )
+        for called in resets:
+            if called not in self.resets:
+                raise ParameterError(
+                    f"resets.{called} is the after_event of no surface: leave it out", "resets"
+                )
+        for called in sides:
+            if called not in self.surfaces:
+                known = ", ".join(self.surfaces) or "there are none"
+                raise ParameterError(
+                    f"sides has {shown(called)}, which is none of the surfaces ({known})", "sides"
+                )
+
+
+def _check_method_name(called: Any, own: set[str], what: str) -> None:
+    """Refuse a name that no method of the class can have."""
+    usable = isinstance(called, str) and called.isidentifier() and not called.startswith("_")
+    if not usable or called in own or hasattr(ContactModel, called):
+        raise ParameterError(
+            f"{what}: {shown(called)} is not a name for a method of the model, such as too_cold",
+            what,
+        )
+
+
+def _reset_of(what: str, given: Any, count: int, text: Any) -> tuple[str, ...]:
+    """The texts of all coordinates and of all velocities after an event."""
+    halves = given if isinstance(given, Sequence) and len(given) == 2 else ()
+    rows = [list(half) if isinstance(half, Sequence) else [half] for half in halves]
+    if [len(row) for row in rows] != [count, count]:
+        each = "an expression" if count == 1 else f"{count} expressions"
+        raise ParameterError(
+            f"{what} must have the coordinates and the velocities after the event, each {each},"
+            f" got {shown(given)}",
+            what,
+        )
+    return tuple(text(what, expression, "qvpc") for row in rows for expression in row)
 
 
 def _read_method(equations: Any) -> tuple[Any, Any, Any, Any]:
@@ -277,12 +516,14 @@ def _read_method(equations: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def _replacements(
-    sympy: Any, coordinates: Any, velocities: Any, parameters: Any, channels: Any
+    sympy: Any, coordinates: Any, velocities: Any, first_order: Any, tables: dict[str, Any]
 ) -> tuple[Any, dict[Any, Any]]:
     """What each symbol becomes in the text, derivatives first; and the symbols of the text."""
     names: dict[Any, Any] = {}
     for i, each in enumerate(coordinates):
         names[each] = sympy.Symbol(f"q[{i}]")
+        if each in first_order:
+            continue
         if each.args:
             names[each.diff(*each.args)] = sympy.Symbol(f"v[{i}]")
         if len(velocities) > i:
@@ -292,8 +533,9 @@ def _replacements(
                 f"velocities must have the rate of each coordinate, and {each} has none",
                 "velocities",
             )
-    names |= {symbol: sympy.Symbol(f"c[{channel!r}]") for channel, symbol in channels.items()}
-    for symbol in parameters:
+    for letter, table in (("c", tables["channels"]), ("s", tables["sides"])):
+        names |= {symbol: sympy.Symbol(f"{letter}[{called!r}]") for called, symbol in table.items()}
+    for symbol in tables["parameters"]:
         found = _name_of(symbol)
         if not found.isidentifier() or found.startswith("_"):
             raise ParameterError(
@@ -331,38 +573,49 @@ def _class_of(made: _Equations) -> Any:
         raise ParameterError(f"name must be one as Python's, got {shown(made.name)}", "name")
     one = len(made.coordinates) == 1
     size = len(made.coordinates)
-    pushed = _compiled("q, v, p, c", made.force)
+    moving = size - len(made.first_order)
+    pushed = _compiled("q, v, p, c, s", made.force)
     masses = _compiled("q, p", made.mass)
-    places = _compiled("p", made.positions)
 
     def rows(self: Any, theta: Any) -> Any:
         entries = masses((theta,) if one else theta, self)
         return entries[0] if one else [entries[size * i : size * (i + 1)] for i in range(size)]
 
-    def push(self: Any, t: Any, theta: Any, velocity: Any, load: Any) -> Any:
-        acting = {channel: getattr(load, channel)(t) for channel in made.channels}
-        given = pushed((theta,) if one else theta, (velocity,) if one else velocity, self, acting)
+    def acting(load: Any, t: Any) -> dict[str, Any]:
+        return {channel: getattr(load, channel)(t) for channel in made.channels}
+
+    def push(self: Any, t: Any, theta: Any, velocity: Any, load: Any, *sides: Any) -> Any:
+        state = ((theta,), (velocity,)) if one else (theta, velocity)
+        given = pushed(*state, self, acting(load, t), sides[0] if sides else {})
         return given[0] if one else tuple(given)
 
     def energy(self: Any, t: Any, theta: Any, velocity: Any, side: Any, load: Any) -> Any:
         mass = masses((theta,) if one else theta, self)
         rates = (velocity,) if one else velocity
         return 0.5 * sum(
-            mass[size * i + j] * rates[i] * rates[j] for i in range(size) for j in range(size)
-        )
-
-    def touching(self: Any) -> tuple[Contact, ...]:
-        return tuple(
-            replace(each, position=at) for each, at in zip(made.contacts, places(self), strict=True)
+            mass[size * i + j] * rates[i] * rates[j] for i in range(moving) for j in range(moving)
         )
 
     body: dict[str, Any] = {
         "coordinates": made.coordinates,
         "channels": made.channels,
-        "mass_matrix": rows,
         "force": push,
     }
-    body |= {"kinetic_energy": energy, "contacts": property(touching), "__module__": __name__}
+    if moving or made.mass != ("1",):  # a rate has no inertia
+        body["mass_matrix"] = rows
+    for what in ("contacts", "frictions", "surfaces"):
+        if parts := getattr(made, what):
+            body[what] = _property_of(parts)
+    if made.first_order:
+        body["first_order"] = made.first_order
+    if made.normal_forces is not None:
+        pressing = _Method(OF_STATE, made.normal_forces)
+        body["normal_forces"] = _method_of(pressing, one, acting, tuple)
+    resets = {each.part.after_event for each in made.surfaces}
+    for called, method in made.methods:
+        answer = _state_of(size) if called in resets else _only
+        body[called] = _method_of(method, one, acting, answer)
+    body |= {"kinetic_energy": energy, "__module__": __name__}
     body["__post_init__"] = lambda self: settle_numbers(self)
     body["__reduce__"] = lambda self: (
         _made_again,
@@ -375,6 +628,62 @@ def _class_of(made: _Equations) -> Any:
     found.__doc__ = f"{made.name}, a model from expressions of SymPy."
     _CLASSES[repr(made)] = MODELS[made.name] = found
     return found
+
+
+def _property_of(parts: tuple[_Part, ...]) -> property:
+    """The parts of a model with its own numbers."""
+    texts = tuple(text for each in parts for _, text in each.texts)
+    values = _compiled("p", texts)
+
+    def found(self: Any) -> tuple[Any, ...]:
+        known = iter(values(self))
+        return tuple(
+            replace(each.part, **{name: next(known) for name, _ in each.texts})
+            if each.texts
+            else each.part
+            for each in parts
+        )
+
+    return property(found)
+
+
+def _method_of(method: _Method, one: bool, acting: Any, answer: Any) -> Any:
+    """A method of a class; `acting` gives the channels of the load at a time, and `answer` makes
+    what it returns of its values.
+    """
+    values = _compiled("q, v, p, c", method.returns)
+
+    def state_of(q: Any) -> Any:
+        return (q,) if one else q
+
+    def of_state(self: Any, t: Any, q: Any, v: Any, load: Any) -> Any:
+        return answer(values(state_of(q), state_of(v), self, acting(load, t)))
+
+    def of_place_and_time(self: Any, t: Any, q: Any, load: Any) -> Any:
+        return answer(values(state_of(q), (), self, acting(load, t)))
+
+    def of_place(self: Any, q: Any) -> Any:
+        return answer(values(state_of(q), (), self, {}))
+
+    return {OF_STATE: of_state, OF_PLACE_AND_TIME: of_place_and_time, OF_PLACE: of_place}[
+        method.takes
+    ]
+
+
+def _only(values: list[Any]) -> Any:
+    """The value of a method that returns one."""
+    return values[0]
+
+
+def _state_of(size: int) -> Any:
+    """What a reset returns, of its values: coordinates and velocities."""
+
+    def state(values: list[Any]) -> tuple[Any, Any]:
+        if size == 1:
+            return values[0], values[1]
+        return tuple(values[:size]), tuple(values[size:])
+
+    return state
 
 
 def _made_again(made: _Equations, numbers: dict[str, float]) -> Any:
