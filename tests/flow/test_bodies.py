@@ -744,6 +744,10 @@ REFUSED = {
         Contact(name="a", coordinate=SUM),
         Contact(name="b", coordinate=SUM, sign=-1),
     ),
+    "'near' at 0 always comes first: leave 'far' out": (
+        Contact(name="far", coordinate=SUM, position=-57.0),
+        Contact(name="near", coordinate=SUM),
+    ),
 }
 
 

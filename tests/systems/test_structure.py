@@ -376,3 +376,12 @@ def test_a_structure_without_modes_is_proved_to_stay_at_rest() -> None:
 def test_a_structure_has_no_methods_for_relays_and_resets(part):
     with pytest.raises(saltus.ParameterError, match="valve: a Structure has no methods"):
         saltus.Structure(**chain(3), surfaces=[part])
+
+
+def test_a_structure_of_one_coordinate_shows_its_displacement() -> None:
+    """A free mass of 4 moves by 0.3 + 2 t, also where its state is a number."""
+    stop = saltus.Contact(name="stop", coordinate=0, position=-1.0)
+    mass = saltus.Structure(mass=[[4.0]], stiffness=[[0.0]], contacts=(stop,))
+    start = mass.start(displacement=0.3, velocity=2.0)
+    motion = saltus.simulate(saltus.System(model=mass), **start, duration=1.5)
+    np.testing.assert_allclose(mass.displacements(motion.position), [3.3], rtol=1e-13)

@@ -360,6 +360,17 @@ def check_contact(model: OneContactModel, impact: ImpactLaw) -> None:
             )
 
 
+def _why_not_both(a: Contact, b: Contact) -> str:
+    """Why one coordinate cannot have both contacts: they leave no room, or one hides the other."""
+    if a.sign != b.sign:
+        return f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between them"
+    near, far = (b, a) if b.gap(a.position) < 0.0 else (a, b)
+    return (
+        f"the contacts {near.name!r} and {far.name!r} stop {a.coordinate} on one side, and"
+        f" {near.name!r} at {float(near.position):g} always comes first: leave {far.name!r} out"
+    )
+
+
 def check_contact_model(model: ContactModel) -> bool:
     """Refuse contacts and frictions that have no meaning; returns whether there are sums of
     coordinates among them.
@@ -418,11 +429,7 @@ def check_contact_model(model: ContactModel) -> bool:
                 and a.coordinate == b.coordinate
                 and not (a.sign != b.sign and b.gap(a.position) > 0.0)
             ):
-                raise ParameterError(
-                    f"the contacts {a.name!r} and {b.name!r} leave {a.coordinate} no room between"
-                    " them",
-                    "model",
-                )
+                raise ParameterError(_why_not_both(a, b), "model")
     _check_frictions(model)
     _check_mass(model)
     placed = [part for part in (*parts, *frictions) if part.coordinate is not None]

@@ -691,9 +691,12 @@ class Structure(ContactModel):
         Parameters
         ----------
         of
-            Coordinates or their rates, as `Motion.at` gives them, (n,) or (n, times).
+            Coordinates or their rates, as `Motion.at` gives them, (n,) or (n, times); of one
+            coordinate also a number, as `Motion.position` is then.
         """
         given = np.asarray(of, dtype=float)
+        if given.ndim == 0 and len(self.names) == 1:
+            given = given[np.newaxis]
         if given.shape[:1] != (len(self.names),):
             raise ParameterError(
                 f"displacements takes {len(self.names)} coordinates along the first axis, got "
