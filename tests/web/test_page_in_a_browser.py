@@ -246,6 +246,29 @@ def test_the_marks_of_special_points_are_explained(page):
     assert page.evaluate("document.querySelector('#special-legend polygon').points.length") == 24
 
 
+def test_kinds_without_an_abbreviation_have_a_shape_each(window, tmp_path):
+    """A model's own margins are told apart, and their names are said once."""
+    kinds = ("LP", "reaction", "line_limit")
+    branch = spectrum() | {
+        "special": [
+            {"kind": kind, "parameter": 0.8 + 0.1 * i, "amplitude": 0.5, "text": kind}
+            for i, kind in enumerate(kinds)
+        ]
+    }
+    path = tmp_path / "margins.html"
+    path.write_text(stand_in.page_of(stand_in.wall() | {"results": [branch]}))
+    window.open(path, 1200)
+    shapes = window.evaluate(
+        "[...document.querySelectorAll('#special-legend polygon')].map((p) => "
+        "p.getAttribute('points'))"
+    )
+    assert len(set(shapes)) == 3
+    items = window.evaluate(
+        "[...document.querySelectorAll('#special-legend li')].map((item) => item.textContent)"
+    )
+    assert items == ["LP (LP), 1", "reaction, 1", "line_limit, 1"]
+
+
 def test_a_result_of_another_system_is_not_shown(page):
     assert page.evaluate("document.querySelector('#results-refused').textContent") == (
         "Other is a result of another system and is not shown."

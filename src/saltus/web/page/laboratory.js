@@ -3,7 +3,7 @@
 import { parameterName, parameterSymbol, symbolOf } from "./symbols.js";
 import { inDigits, rangeOf, shortly, typedNumber } from "./numbers.js";
 import { axisName } from "./views.js";
-import { SWEPT, goesOn } from "./description.js";
+import { SWEPT, entriesOf, goesOn } from "./description.js";
 import { button } from "./transport.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -19,7 +19,7 @@ export function sweepControls(host, session, entries, sweep) {
   const { store } = session;
   const choice = document.createElement("select");
   choice.setAttribute("aria-label", "parameter of the sweep");
-  for (const { path } of entries) choice.add(new Option(parameterName(path), path, false, path === store.state.sweep.path));
+  for (const { path, unit } of entries) choice.add(new Option(`${parameterName(path)}${unit && unit !== "1" ? ` (${unit})` : ""}`, path, false, path === store.state.sweep.path));
   choice.addEventListener("change", () => {
     const entry = entries.find(({ path }) => path === choice.value);
     if (entry) store.set({ sweep: { ...store.state.sweep, path: entry.path, low: inDigits(entry.low), high: inDigits(entry.high) } });
@@ -87,7 +87,9 @@ export function sweepView(session, sweep, show) {
     axes: () => {
       const symbol = parameterSymbol(path());
       const coordinate = /** @type {any} */ (session.coordinates[session.store.state.coordinate]);
-      const name = [`${parameterName(path())} `, ...(symbol ? [symbol] : [])];
+      const entry = entriesOf(session.description).find((each) => each.path === path());
+      const unit = entry?.unit && entry.unit !== "1" ? [` (${entry.unit})`] : [];
+      const name = [`${parameterName(path())} `, ...(symbol ? [symbol] : []), ...unit];
       return { x: { name }, y: { name: ["max |", symbolOf(coordinate.name), "|", ...axisName("", coordinate.unit).slice(1)], low: 0 } };
     },
     bounds: () => {

@@ -384,8 +384,11 @@ export class Page {
     const energy = at("view-energy").closest("figure");
     const { motion } = this.session;
     if (energy) energy.hidden = motion !== null && (motion.energy?.(motion.time.first) ?? null) === null; // not every model has one
-    hideFigure("view-section", !isPeriodic(this.description)); // without a period there is no section
-    hideFigure("view-basins", !goesOn(this.description));
+    const [periodic, lasting] = [isPeriodic(this.description), goesOn(this.description)];
+    hideFigure("view-section", !periodic); // without a period there is no section
+    at("view-history").closest("figure")?.classList.toggle("wide", !periodic); // it has the place of both then
+    hideFigure("view-sweep", !lasting); // after a pulse nothing settles that a sweep could carry on
+    hideFigure("view-basins", !lasting);
     this.stage.draw();
     for (const { plot } of this.plots) plot.draw();
     this.transport.show();

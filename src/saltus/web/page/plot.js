@@ -213,9 +213,17 @@ const SHAPES = {
   LP: [24, 0, 1], PD: [4, 0.5, 1], BPC: [4, 0, 1], NS: [5, -1, 0.45], GR: [3, -1, 1], SW: [3, 1, 1], GS: [3, 2, 1], SS: [3, 0, 1], CS: [4, 0.5, 0.4], AS: [4, 0, 0.4], RL: [6, 0, 1], CH: [6, 1, 0.5],
 };
 
-/** The corners of a kind's shape about (0, 0), of the radius 1. @param {string} kind @returns {[number, number][]} */
-export function cornersOf(kind) {
-  const [count, turn, between] = SHAPES[kind] ?? [8, 0.5, 1];
+/** The shapes of what a model has names of its own for, as its margins, one after the other. @type {[number, number, number][]} */
+const OWN_SHAPES = [[4, 0.5, 0.75], [2, 1, 0.35], [2, 0, 0.35], [5, 1, 0.45], [3, -1, 0.35], [3, 1, 0.35], [8, 0, 0.5], [5, -1, 1]];
+
+/** Whether a kind of special points is one of the field's, which have abbreviations. @param {string} kind */
+export function isAbbreviated(kind) {
+  return kind in SHAPES;
+}
+
+/** The corners of a kind's shape about (0, 0), of the radius 1. @param {string} kind @param {number} [place] among the kinds that have no shape of their own @returns {[number, number][]} */
+export function cornersOf(kind, place = 0) {
+  const [count, turn, between] = /** @type {[number, number, number]} */ (SHAPES[kind] ?? OWN_SHAPES[place % OWN_SHAPES.length]);
   const at = (/** @type {number} */ share, /** @type {number} */ r) => /** @type {[number, number]} */ ([r * Math.cos(Math.PI * (turn / 2 + 2 * share)), r * Math.sin(Math.PI * (turn / 2 + 2 * share))]);
   return Array.from({ length: count }, (_, i) => (between < 1 ? [at(i / count, 1), at((i + 0.5) / count, between)] : [at(i / count, 1)])).flat();
 }
@@ -291,10 +299,12 @@ export class Painter {
     const below = typeset(ctx, this.names.x.name, 0, 0, 13, palette.serif, false);
     typeset(ctx, this.names.x.name, box.left + (box.width - below) / 2, box.top + box.height + 34, 13, palette.serif);
     const beside = typeset(ctx, this.names.y.name, 0, 0, 13, palette.serif, false);
+    const size = 13 * Math.min(1, (this.height - 4) / Math.max(beside, 1)); // a low picture has a small name, none that is cut
+    const length = (beside * size) / 13;
     ctx.save();
-    ctx.translate(15, box.top + (box.height + beside) / 2);
+    ctx.translate(15, Math.max(length + 2, Math.min(box.top + (box.height + length) / 2, this.height - 2)));
     ctx.rotate(-Math.PI / 2);
-    typeset(ctx, this.names.y.name, 0, 0, 13, palette.serif);
+    typeset(ctx, this.names.y.name, 0, 0, size, palette.serif);
     ctx.restore();
   }
 
@@ -374,14 +384,14 @@ export class Painter {
     this.dots([x], [y], color, radius);
   }
 
-  /** A special point: the shape of its kind, with a rim of the paper's colour. @param {number} x @param {number} y @param {string} kind @param {number} radius */
-  special(x, y, kind, radius = 4) {
+  /** A special point: a shape, with a rim of the paper's colour. @param {number} x @param {number} y @param {[number, number][]} corners @param {number} radius */
+  special(x, y, corners, radius = 4) {
     const [left, top] = [this.x(x), this.y(y)];
     if (!Number.isFinite(left + top) || Math.abs(left) > 1e5 || Math.abs(top) > 1e5) return;
     for (const [color, size] of /** @type {[string, number][]} */ ([[this.palette.paper, radius + 1.6], [this.palette.ink, radius]])) {
       this.ctx.fillStyle = color;
       this.ctx.beginPath();
-      cornersOf(kind).forEach(([dx, dy], i) => (i ? this.ctx.lineTo(left + size * dx, top + size * dy) : this.ctx.moveTo(left + size * dx, top + size * dy)));
+      corners.forEach(([dx, dy], i) => (i ? this.ctx.lineTo(left + size * dx, top + size * dy) : this.ctx.moveTo(left + size * dx, top + size * dy)));
       this.ctx.closePath();
       this.ctx.fill();
     }

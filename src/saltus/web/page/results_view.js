@@ -3,7 +3,7 @@
 import { allDigits, clamp, rangeOf, shortly } from "./numbers.js";
 import { parameterName, parameterSymbol } from "./symbols.js";
 import { branchLine } from "./palette.js";
-import { cornersOf } from "./plot.js";
+import { cornersOf, isAbbreviated } from "./plot.js";
 
 /** @typedef {import("./types.js").ResultEntry} ResultEntry */
 /** @typedef {import("./types.js").ResultBranch} ResultBranch */
@@ -101,23 +101,31 @@ function paintDiagram(painter, result) {
       painter.curve(branch.parameter.slice(from, to + 1), branch.amplitude.slice(from, to + 1), { ...branchLine(palette, Boolean(branch.stable[from])), alpha: painter.fade ? 0.35 : 1 });
     }
   }
-  for (const { kind, parameter, amplitude } of result.special ?? []) painter.special(parameter, amplitude, kind);
+  const shapes = shapesOf(result);
+  for (const { kind, parameter, amplitude } of result.special ?? []) painter.special(parameter, amplitude, shapes.get(kind) ?? []);
+}
+
+/** The corners of the marks of each kind of special points that a result has. @param {ResultEntry} result @returns {Map<string, [number, number][]>} */
+export function shapesOf(result) {
+  const kinds = [...new Set((result.special ?? []).map(({ kind }) => kind))];
+  const own = kinds.filter((kind) => !isAbbreviated(kind));
+  return new Map(kinds.map((kind) => [kind, cornersOf(kind, own.indexOf(kind))]));
 }
 
 /** What the marks of a diagram mean, and how many there are. @param {HTMLElement} host @param {ResultEntry|null|undefined} result */
 export function specialLegend(host, result) {
   const special = result?.special ?? [];
-  const kinds = [...new Set(special.map(({ kind }) => kind))];
-  host.replaceChildren(...kinds.map((kind) => {
+  const shapes = result ? [...shapesOf(result)] : [];
+  host.replaceChildren(...shapes.map(([kind, corners]) => {
     const item = document.createElement("li");
     const shape = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     const outline = document.createElementNS("http://www.w3.org/2000/svg", "polygon");
     shape.setAttribute("viewBox", "-1 -1 2 2");
     shape.setAttribute("aria-hidden", "true");
-    outline.setAttribute("points", cornersOf(kind).map((corner) => corner.join(",")).join(" "));
+    outline.setAttribute("points", corners.map((corner) => corner.join(",")).join(" "));
     shape.append(outline);
     const of = special.filter((each) => each.kind === kind);
-    item.append(shape, `${of[0]?.text} (${kind}), ${of.length}`);
+    item.append(shape, `${of[0]?.text}${isAbbreviated(kind) ? ` (${kind})` : ""}, ${of.length}`);
     return item;
   }));
 }

@@ -38,13 +38,19 @@ function around(xs, ys) {
   return x && y ? [x.low, x.high, y.low, y.high] : null;
 }
 
+/** A coordinate in a sentence: a symbol where it is a letter, else its name. @param {string} name */
+function called(name) {
+  const symbol = symbolOf(name);
+  return symbol.italic ? asText(symbol) : name.replace(/_/g, " ");
+}
+
 /** The least and largest coordinates of the motion, and the largest kinetic energy, in words. @param {Session} session */
 export function extremaOf(session) {
   const { motion } = session;
   if (!motion) return "";
   const shown = session.coordinates.slice(0, MOST_NAMED).flatMap(({ name, unit }) => {
     const range = rangeOf([session.column(name)]);
-    return range ? [`${name.replace(/_/g, " ")} from ${shortly(range.low, 5)} to ${shortly(range.high, 5)}${unit === "1" ? "" : ` ${unit}`}`] : [];
+    return range ? [`${called(name)} from ${shortly(range.low, 5)} to ${shortly(range.high, 5)}${unit === "1" ? "" : ` ${unit}`}`] : [];
   });
   const span = motion.time.last - motion.time.first;
   const energies = Array.from({ length: OVERVIEW + 1 }, (_, i) => motion.energy?.(motion.time.first + (span * i) / OVERVIEW) ?? NaN);
