@@ -372,10 +372,10 @@ def _check_symbols(
 def _check_parts(what: str, kinds: tuple[type, ...], given: Any) -> None:
     """Refuse parts of other classes."""
     listed = isinstance(given, Sequence) and not isinstance(given, str)
-    wrong = next((each for each in given if not isinstance(each, kinds)), None) if listed else given
-    if wrong is not None:
+    wrong = [part for part in given if not isinstance(part, kinds)] if listed else [given]
+    if wrong:
         names = " or ".join(kind.__name__ for kind in kinds)
-        raise ParameterError(f"{what} must be a list of {names}, got {shown(wrong)}", what)
+        raise ParameterError(f"{what} must be a list of {names}, got {shown(wrong[0])}", what)
 
 
 def _part(sympy: Any, what: str, part: Any, text: Any) -> _Part:
