@@ -30,8 +30,8 @@ from saltus.systems.serial import MODELS
 
 @dataclass(frozen=True)
 class _Part:
-    """A contact, friction, surface or relay, and the texts of those of its numbers that are
-    expressions of the parameters.
+    """A contact, friction, surface or relay, and its numbers that are expressions of the
+    parameters, as texts.
     """
 
     part: Any
@@ -133,8 +133,7 @@ def from_sympy(
         What an `after_event` names: the expressions of all coordinates and of all velocities after
         the event, `{"kicked": ([x], [v + 1])}`.
     first_order
-        Those of the coordinates that have no velocities, the last ones: their `force` is their
-        rate.
+        The coordinates without velocities, which come last: the `force` of each is its rate.
     name
         The name of the model's class, which no model with other equations has; by default FromSympy
         with a digest of them.
