@@ -14,7 +14,7 @@ import saltus
 
 
 @dataclass(frozen=True, kw_only=True)
-class Room(saltus.ContactModel):
+class StudiedRoom(saltus.ContactModel):
     power: float = 3.0
 
     coordinates: ClassVar[tuple[str, ...]] = ("T",)
@@ -32,7 +32,7 @@ class Room(saltus.ContactModel):
 """
 STUDY = """
 [model]
-type = "room.py:Room"
+type = "room.py:StudiedRoom"
 
 [simulate]
 T = 20.0
@@ -69,7 +69,7 @@ def test_a_study_says_which_relays_are_on(tmp_path):
     [
         ("{ heater = 1 }", "a table of names with true or false"),
         ("true", "a table of names with true or false"),
-        ("{ motor = true }", "Room has heater"),
+        ("{ motor = true }", "StudiedRoom has heater"),
     ],
 )
 def test_relays_that_say_nothing_are_refused_with_their_place(tmp_path, relays, words):
