@@ -70,6 +70,10 @@ class BranchLimits:
     # Grazings are taken to accumulate when this many in a row have each added impacts, and one of
     # the next two conditions holds.
     accumulating: int = 5
+    # So do this many where the next change begins a rest, or no step succeeds: each lies nearer to
+    # it than the one before, by this share at most.
+    before_rest: int = 3
+    nearer: float = 0.5
     # Either all of them lie within this share of the parameter's value,
     accumulation_width: float = 1e-3
     # or the amplitude has shrunk below this share of the largest one, with more impacts than
@@ -309,6 +313,13 @@ class BranchEvents(OrbitEvents):
         following = equations.beyond(cut, run.points)
         if isinstance(following, End):
             return following
+        if _begins_to_rest(cut, following):
+            # the bounces behind so many grazings are too slow to be told from a rest
+            limit = _limit_of_grazings(run, cut.point)
+            if limit is not None:
+                run.special.pop()
+                count = cut.point.orbit.counted_impacts
+                return End(OrbitEnd.ACCUMULATES, limit, detail=str(count))
         if cut.special is not None:
             run.special[-1] = equations.located_beyond(cut, following) or cut.special
         if (further := equations.also_at(cut, following)) is not None:
@@ -340,6 +351,9 @@ class BranchEvents(OrbitEvents):
         found = point.orbit.equations.stalled(point, step, run.points, run.bounds)
         if found is not None:
             return found
+        limit = _limit_of_grazings(run, point)
+        if limit is not None and limit != point.parameter:
+            return End(OrbitEnd.ACCUMULATES, limit, detail=str(point.orbit.counted_impacts))
         largest = point.orbit.largest_multiplier
         if largest > STEEPEST and not point.orbit.grazes:
             return End(OrbitEnd.REPELS, point.parameter, detail=f"{largest:.1g}")
@@ -397,6 +411,37 @@ def _accumulate(run: Run, following: OrbitPoint) -> bool:
     grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.accumulating :]
     counts = [point.orbit.counted_impacts for point in (*grazings, following)]
     return _gather([point.parameter for point in grazings], counts, run.points, following)
+
+
+def _begins_to_rest(cut: Cut, following: OrbitPoint) -> bool:
+    """Whether an impact turns into a rest at a change that is no grazing."""
+    is_switch = cut.special is not None and cut.special.kind == SpecialKind.SW
+    return is_switch and following.orbit.releases.size > cut.point.orbit.releases.size
+
+
+def _limit_of_grazings(run: Run, point: OrbitPoint) -> float | None:
+    """The parameter at which grazings accumulate, the last of which lie behind `point`; None if
+    they do not.
+
+    Each grazing adds an impact to bounces that die away. The places of the grazings converge as a
+    geometric series, whose limit is Aitken's extrapolation: there the bounces come to rest. Where
+    `point` lies beyond this limit the series is too short, and `point` is nearer.
+    """
+    grazings = [s.point for s in run.special if s.kind == SpecialKind.GR][-SETTINGS.before_rest :]
+    counts = [graze.orbit.counted_impacts for graze in grazings]
+    counts.append(point.orbit.counted_impacts)
+    if len(grazings) < SETTINGS.before_rest or not (np.diff(counts) > 0).all():
+        return None
+    places = np.array([graze.parameter for graze in grazings])
+    distances = np.abs(places - point.parameter)
+    if distances[0] == 0.0 or (distances[1:] > SETTINGS.nearer * distances[:-1]).any():
+        return None
+    steps = np.diff(places)[-2:]
+    share = steps[1] / steps[0]
+    if not 0.0 < share <= SETTINGS.nearer:
+        return None
+    ahead = steps[1] * share / (1.0 - share)
+    return float(places[-1] + ahead) if abs(ahead) > distances[-1] else float(point.parameter)
 
 
 def _gather(
