@@ -59,6 +59,33 @@ def wall_page(tmp_path_factory):
     return saltus.page(WALL, path=path, title="A wall", presets=presets, x=0.0)
 
 
+def test_a_structure_is_drawn_by_its_points_with_their_stops(window, tmp_path):
+    """Three masses in a row: where the shapes are is where the displacements are, in one unit."""
+    stiffness = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+    contacts = [
+        saltus.Contact(name="tip", coordinate=2, position=0.5, sign=-1),
+        saltus.Contact(name="low", coordinate=0, position=-0.25),
+    ]
+    model = saltus.Structure(mass=np.eye(3), stiffness=stiffness, contacts=contacts)
+    system = saltus.System(model=model, impact=saltus.NewtonImpact(e=0.5))
+    u = np.array([-0.1, 0.2, 0.4])
+    path = tmp_path / "row.html"
+    window.open(saltus.page(system, path=path, **model.start(u), duration=5.0), 1300, 900)
+    shapes = window.evaluate("saltusPage.stage.pictureAt(0).shapes")
+    masses = [np.array(s["points"]) for s in shapes if s["role"] == "mass"]
+    walls = [np.array(s["points"]) for s in shapes if s["role"] == "wall"]
+    names = [s["text"] for s in shapes if s["kind"] == "text"]
+    middles = np.array([corners.mean(axis=0) for corners in masses])
+    scale = (middles[2, 1] - middles[0, 1]) / (u[2] - u[0])
+    np.testing.assert_allclose(middles[:, 1], scale * u, atol=1e-12)
+    assert names == ["x₀", "x₁", "x₂"]
+    half = np.ptp(masses[0][:, 1]) / 2
+    faces = sorted((wall[0, 0] + wall[1, 0], wall[0, 1]) for wall in walls)
+    np.testing.assert_allclose(faces[0][1], -0.25 * scale - half, atol=1e-12)
+    np.testing.assert_allclose(faces[1][1], 0.5 * scale + half, atol=1e-12)
+    assert window.errors == []
+
+
 def seen(window, identity):
     """Whether an element takes any room."""
     return window.evaluate(

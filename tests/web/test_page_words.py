@@ -11,10 +11,22 @@ from what_works.model_classes import NAMES, model_class, system_of
 from what_works.refused import REFUSED
 
 import saltus
+from saltus.flow import PortableMotion
 from saltus.web import one_file
+from saltus.web.description import description as description_of
 from saltus.web.study_page import _motion, page_content
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed here")
+# nothing is struck there; the block is moved by the acceleration of its ground alone; one contact
+# has no other one to which it could pass speed
+WITHOUT_EFFECT = {
+    "smooth": {"impact.e"},
+    "smooth, square wave": {"impact.e"},
+    "belt": {"impact.e"},
+    "belt, no load": {"impact.e"},
+    "rocking block": {"load.ground_horizontal.mean"},
+    "structure with a contact": {"impact.transfer"},
+}
 WITH_PAGES = [name for name in NAMES if (name, "page") not in REFUSED]
 
 
@@ -112,6 +124,67 @@ def test_a_model_of_ones_own_names_the_margin_that_ends_it_and_passes_others(tmp
     assert ends["model.restitution"] == (0.0, 1.0)
 
 
+def test_a_number_that_no_equation_reads_has_no_slider_and_is_named(tmp_path):
+    system = swinging()
+    _, description = page_content(
+        system, _motion(system, 2.5, {"phi": 0.0}, {"duration": 20.0}, 1e-12, 0.0), "", []
+    )
+    assert description["without_effect"] == ["impact.e"]
+    assert description["impact"]["parameters"] == []
+    ends = [
+        saltus.simulate(system.with_({"impact.e": e}), phi=0.0, velocity=1.5, duration=20.0).phi
+        for e in (0.2, 0.9)
+    ]
+    assert ends[0] == ends[1]
+    (said,) = words([(system, {"phi": 0.0}, {"duration": 20.0}, None)], tmp_path)
+    assert "impact.e" not in {slider["path"] for slider in said["sliders"]}
+
+
+def row_of_masses(**more):
+    """Four masses in a row, the second and the last of them with a stop."""
+    stiffness = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    stiffness[2, 3] = stiffness[3, 2] = 0.0
+    contacts = [
+        saltus.Contact(name="tip", coordinate=3, position=0.6, sign=-1),
+        saltus.Contact(name="inner", coordinate=1, position=-0.4),
+    ]
+    return saltus.Structure(
+        mass=np.diag([1.0, 2.0, 3.0, 4.0]), stiffness=stiffness, contacts=contacts, **more
+    )
+
+
+def points_of(model):
+    return description_of(PortableMotion(saltus.System(model=model)))["model"]["points"]
+
+
+def test_a_structure_is_drawn_by_its_rows_with_what_couples_them():
+    model = row_of_masses()
+    points = points_of(model)
+    assert [point["name"] for point in points] == ["x0", "x1", "x2", "x3"]
+    assert [point["tie"] for point in points] == ["", "spring", "spring", ""]  # as in the stiffness
+    u = np.array([0.1, -0.2, 0.3, 0.5])
+    state = model.start(u)
+    place = np.array([state[name] for name in model.coordinates])
+    weights = np.array([point["weights"] for point in points])
+    np.testing.assert_allclose(weights @ place, u, atol=1e-14)
+
+
+def test_a_structure_with_named_points_is_drawn_by_these_and_its_contacts():
+    model = row_of_masses(points={"mean": {0: 0.5, 2: 0.5}, "first": 0})
+    points = points_of(model)
+    assert [point["name"] for point in points] == ["mean", "first", "x3", "x1"]
+    u = np.array([0.1, -0.2, 0.3, 0.5])
+    state = model.start(u)
+    place = np.array([state[name] for name in model.coordinates])
+    weights = np.array([point["weights"] for point in points])
+    np.testing.assert_allclose(weights @ place, [0.2, 0.1, 0.5, -0.2], atol=1e-14)
+
+
+def test_rotations_of_a_beam_are_not_drawn_among_its_displacements():
+    model = row_of_masses(names=["w1", "w2", "phi1", "w3"])
+    assert [point["name"] for point in points_of(model)] == ["w1", "w2", "w3"]
+
+
 def span_of(name):
     """How long the motion of a class is: a forcing period, where there is one."""
     return {"duration": 6.0} if system_of(name).load.period is None else {"periods": 1}
@@ -128,9 +201,7 @@ def pages_of_all_classes(tmp_path_factory):
 @pytest.mark.parametrize("name", WITH_PAGES)
 def test_sliders_are_the_numbers_of_the_system_within_what_it_takes(name, pages_of_all_classes):
     system, sliders = system_of(name), pages_of_all_classes[name]["sliders"]
-    without = (
-        {"impact.e"} if name.startswith(("smooth", "belt")) else set()
-    )  # nothing is struck there
+    without = WITHOUT_EFFECT.get(name, set())
     assert {slider["path"] for slider in sliders} == set(system.parameters) - without
     for slider in sliders:
         assert slider["low"] < slider["high"], slider

@@ -42,6 +42,7 @@ from .motion.motion import Motion as Motion
 from .motion.motion import state_names as state_names
 from .motion.portable import PortableKernel as PortableKernel
 from .motion.portable import PortableMotion as PortableMotion
+from .motion.portable import numbers_read as numbers_read
 from .motion.quantities import Extreme as Extreme
 from .motion.quantities import Functions as Functions
 from .motion.quantities import Quantity as Quantity

@@ -13,9 +13,11 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 import saltus
 from saltus.errors import SaltusError, shown
-from saltus.flow import PortableMotion, state_names
+from saltus.flow import PortableMotion, numbers_read, state_names
 from saltus.number_ranges import BESIDE, NumberRange, ranges_of
 from saltus.systems import (
     Constant,
@@ -33,6 +35,7 @@ from saltus.web.objects import KERNEL_DATA, KERNEL_FUNCTIONS, kernel_code, struc
 FREQUENCY = "load.frequency"
 # How far beside its value a number is tried, odd in its digits so that no sentence has them.
 BESIDE_IT = 0.0070173
+MOST_ROWS = 60  # of a structure that are drawn
 
 
 def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
@@ -53,7 +56,17 @@ def page_parts(system: System) -> tuple[bytes, dict[str, Any]]:
         "code_sizes": [len(code) for code in modules],
         "kernel_data": KERNEL_DATA,
     }
-    return b"".join(modules), description(motion) | {"engine": engine}
+    described = description(motion) | {"without_effect": _without_effect(system, functions)}
+    return b"".join(modules), described | {"engine": engine}
+
+
+def _without_effect(system: System, functions: list[Any]) -> list[str]:
+    """The numbers that no equation reads, such as the factor of an impact law beside a model with a
+    restitution of its own. The frequency of a load is its period, which no equation need read.
+    """
+    read = numbers_read(functions)
+    given = {path for path, _ in numbers(system, given=True)} - {FREQUENCY}
+    return [path for i, (path, _) in enumerate(numbers(system)) if path in given and i not in read]
 
 
 def description(motion: PortableMotion) -> dict[str, Any]:
@@ -89,6 +102,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
             "parameters": below(model, "model"),
             **motion.parts(),
             "stops": list(_stops(system)),
+            "points": _points(model) if isinstance(model, saltus.Structure) else [],
             "channels": list(model.channels),
             "margins": [
                 {"name": name, "kind": str(model.margin_kind(name)), "stops": name in model.stops}
@@ -140,6 +154,38 @@ def _stops(system: System) -> Iterator[dict[str, Any]]:
     for stop, own in zip(first, slopes, strict=True):
         entry = {key: getattr(stop, key) for key in ("coordinate", "position", "side")}
         yield entry | {"slopes": own, "base": {path: base[path] for path in own}}
+
+
+def _points(model: saltus.Structure) -> list[dict[str, Any]]:
+    """What is drawn of a structure: each point's name, its weights of the coordinates, and how it
+    is tied to the one before: "spring" where the stiffness couples both rows, "order" for points
+    that its author names, or "".
+
+    Its named points, or else the rows of its matrices that are called as those with contacts are,
+    so that the rotations of a beam, which have another name, are left out. A contact that is no row
+    and no point comes last.
+    """
+    named = list(model.points)
+    local = list(model.coordinates[: model.local_count])
+    stems = {_stem(name) for name in local}
+    rows = [name for name in model.names if _stem(name) in stems]
+    chosen = named or (rows if len(rows) <= MOST_ROWS else [])
+    chosen += [name for name in local if name not in chosen]
+    stiffness = model.stiffness.array
+    found = []
+    for before, name in zip([None, *chosen], chosen, strict=False):
+        tie = "order" if name in named and before in named else ""
+        if not named and before in rows and name in rows:
+            coupling = stiffness[model.names.index(before), model.names.index(name)]
+            tie = "spring" if coupling != 0.0 else ""
+        weights = np.asarray(model.weights_of(name)).tolist()
+        found.append({"name": name, "weights": weights, "tie": tie})
+    return found
+
+
+def _stem(name: str) -> str:
+    """A name without the digits at its end."""
+    return name.rstrip("0123456789")
 
 
 def _numbers(system: System) -> Iterator[dict[str, Any]]:

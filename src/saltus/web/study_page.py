@@ -355,6 +355,7 @@ def page_content(
     content, described = page_parts(system)
     notice_undeclared(system, described["numbers"])
     fixed = {each["path"] for each in described["numbers"] if "only" in each["range"]}
+    fixed.update(described.get("without_effect", ()))
     for part in (described["model"], described["impact"], *described["load"]):
         part["parameters"] = [path for path in part["parameters"] if path not in fixed]
     return content, described | {

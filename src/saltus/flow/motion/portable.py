@@ -39,6 +39,7 @@ from saltus.taylor import (
     Case,
     Expr,
     Places,
+    SeriesOf,
     Trace,
     WrittenFunction,
     combine,
@@ -273,6 +274,23 @@ class PortableMotion:
             "frictions": [{"name": f.name, "coordinate": f.coordinate} for f in model.frictions],
             "sides": [{"side": side} for side in model.sides],
         }
+
+
+def numbers_read(functions: Sequence[WrittenFunction]) -> set[int]:
+    """The places of the numbers that functions of a structure read, among those of its system.
+
+    A number that none of them reads has no effect, whatever its value.
+    """
+    tapes = [
+        tape
+        for function in functions
+        for tape in (
+            [function.content.tape]
+            if isinstance(function.content, SeriesOf)
+            else [case.tape for case in function.content]
+        )
+    ]
+    return {node[1] for each in tapes for node in each.nodes if node[0] == "parameter"}
 
 
 def edges_function(roots: Sequence[Expr]) -> WrittenFunction:

@@ -134,6 +134,9 @@ export class Page {
     group("Load", description.load.flatMap(({ parameters }) => parameters));
     const starting = startEntries(description, this.first, isPeriodic(description));
     group("Start", starting);
+    const idle = description.without_effect ?? [];
+    at("without-effect").hidden = !idle.length;
+    at("without-effect").textContent = `Without effect on this model: ${idle.join(", ")}.`;
     const degrees = /** @type {HTMLInputElement} */ (at("degrees"));
     degrees.checked = store.state.degrees;
     degrees.addEventListener("change", () => store.set({ degrees: degrees.checked }));

@@ -3,14 +3,17 @@
 import { currentPalette } from "./palette.js";
 import { isDrawn, pictureOf } from "./drawings.js";
 import { rangeOf, shortly } from "./numbers.js";
+import { asText, symbolOf } from "./symbols.js";
 
 /** @typedef {import("./types.js").Shape} Shape */
 /** @typedef {import("./palette.js").Palette} Palette */
 /** @typedef {[number, number, number, number]} Box */
 
 const OWN_STATES = 60; // of a motion, around which the picture of a model's own drawing is laid
+const MOST_READ = 600; // instants of a motion at which the points of a structure are read
 const HALF_MASS = 0.16; // of the width of a mass that is drawn on a line
 const MOST_LINES = 6;
+const MOST_LABELLED = 12; // points of a structure whose names are all written
 const FLASH_TIME = 0.22; // seconds of the reader for which an impact is seen
 
 /** @typedef {{fill?: string, stroke?: string, width?: number, dash?: number[]}} Ink */
@@ -39,6 +42,8 @@ export class Stage {
     this.note = "";
     /** @type {number[]} */
     this.reach = [];
+    /** How far any of the points of a structure moves. */
+    this.pointReach = 0;
     /** @type {Box|null} */
     this.ownBox = null;
     this.spoken = 0;
@@ -56,6 +61,16 @@ export class Stage {
       return range ? Math.max(Math.abs(range.low), Math.abs(range.high)) : 1;
     });
     this.ownBox = this.boxOfOwn();
+    const { description, curve } = this.session;
+    const every = Math.ceil(curve.length / MOST_READ) || 1;
+    const columns = this.session.coordinates.map(({ name }) => this.session.column(name));
+    this.pointReach = 0;
+    for (const { weights } of description.model.points ?? []) {
+      for (let i = 0; i < curve.length; i += every) {
+        const moved = displacement(weights, (k) => columns[k]?.[i] ?? 0);
+        if (Math.abs(moved) > this.pointReach) this.pointReach = Math.abs(moved);
+      }
+    }
   }
 
   /** Around the model's own drawing, wherever the motion goes. @returns {Box|null} */
@@ -125,7 +140,16 @@ export class Stage {
     const channels = [...new Set(description.load.map((entry) => entry.channel))];
     const load = (/** @type {string} */ channel) => (channels.includes(channel) ? session.load(channel, time) : 0);
     const scene = { values: session.store.state.values, state, time, reach: this.reach, load, channels };
-    return isDrawn(description.model.name) ? pictureOf(description.model.name, scene) : this.point(state);
+    return isDrawn(description.model.name) ? pictureOf(description.model.name, scene) : this.undrawn(state);
+  }
+
+  /** A model without a drawing: a structure by its points, another one by its coordinates. @param {ArrayLike<number>} state */
+  undrawn(state) {
+    const points = this.session.description.model.points ?? [];
+    if (points.length < 2) return this.point(state);
+    const moved = points.map(({ weights }) => displacement(weights, (k) => state[k] ?? 0));
+    const stops = this.stops().map((stop) => ({ ...stop, point: points.findIndex(({ weights }) => isUnit(weights, stop.coordinate)) }));
+    return pointsInARow(points, moved, stops.filter(({ point }) => point >= 0), this.pointReach);
   }
 
   /** A model without a drawing: a point on a line for each coordinate. @param {ArrayLike<number>} state */
@@ -178,6 +202,48 @@ function rowsOf(coordinates, stops) {
   return stops.length && !few ? all.filter((i) => stops.some((stop) => stop.coordinate === i)) : all;
 }
 
+/** @param {number[]} weights @param {(coordinate: number) => number} coordinate */
+function displacement(weights, coordinate) {
+  return weights.reduce((sum, weight, k) => sum + (weight ? weight * coordinate(k) : 0), 0);
+}
+
+/** Whether a point is a coordinate itself. @param {number[]} weights @param {number} coordinate */
+function isUnit(weights, coordinate) {
+  return weights.every((weight, k) => Math.abs(weight - Number(k === coordinate)) < 1e-9);
+}
+
+/**
+ * The points of a structure side by side, each as far above or below a line as it is displaced, and its stops where they are.
+ * @param {import("./types.js").StructurePoint[]} points @param {number[]} moved @param {{point: number, side: number, position: number}[]} stops @param {number} reach
+ */
+function pointsInARow(points, moved, stops, reach) {
+  const unit = Math.max(reach, ...stops.map(({ position }) => Math.abs(position))) || 1;
+  const pitch = Math.min(0.8, 3.6 / (points.length - 1));
+  const half = Math.min(0.14, 0.34 * pitch);
+  const x = (/** @type {number} */ i) => (i - (points.length - 1) / 2) * pitch;
+  const y = (/** @type {number} */ i) => (moved[i] ?? 0) / unit;
+  const wide = x(points.length - 1) + 0.35;
+  /** @type {Shape[]} */
+  const shapes = [{ kind: "line", points: [[-wide, 0], [wide, 0]], role: "thin" }];
+  points.forEach(({ tie }, i) => {
+    if (tie) shapes.push({ kind: "line", points: [[x(i - 1), y(i - 1)], [x(i), y(i)]], role: tie === "spring" ? "spring" : "ghost" });
+  });
+  for (const { point, side, position } of stops) {
+    const face = position / unit + side * half;
+    const ends = [[-1.3, 0], [1.3, 0], [1.3, 1], [-1.3, 1]].map(([a, b]) => [x(point) + (a ?? 0) * half, face + side * 0.08 * (b ?? 0)]);
+    shapes.push({ kind: "polygon", points: ends, role: "wall" });
+  }
+  const low = -1.5 - half;
+  points.forEach(({ name }, i) => {
+    const square = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => [x(i) + (a ?? 0) * half, y(i) + (b ?? 0) * half]);
+    shapes.push({ kind: "polygon", points: square, role: "mass" });
+    if (points.length <= MOST_LABELLED || stops.some(({ point }) => point === i)) shapes.push({ kind: "text", points: [[x(i), low]], role: "thin", text: asText(symbolOf(name)) });
+  });
+  /** @type {Box} */
+  const box = [-Math.max(wide, 1.5), Math.max(wide, 1.5), low - 0.2, 1.25 + half];
+  return { shapes, box };
+}
+
 /** A mass on a line between its stops, in lengths of the larger of its reach and theirs. @param {number} x @param {number} y @param {{side: number, position: number}[]} stops @param {number} reach @returns {Shape[]} */
 function massAtStops(x, y, stops, reach) {
   const unit = Math.max(reach, ...stops.map(({ position }) => Math.abs(position))) || 1;
@@ -224,6 +290,7 @@ function boxOf(shapes) {
 export function paintShape(ctx, shape, place, ink) {
   const points = shape.points.map(([x, y]) => [place.x(x ?? 0), place.y(y ?? 0)]);
   if (!points.length || !points.flat().every(Number.isFinite)) return;
+  if (shape.kind === "text") return written(ctx, shape.text ?? "", points[0] ?? [0, 0], ink.stroke ?? "");
   ctx.lineWidth = Math.min(ink.width ?? 1, Math.max(0.6, ((ink.width ?? 1) * place.scale) / 70));
   ctx.setLineDash(ink.dash ?? []);
   ctx.lineCap = "round";
@@ -242,6 +309,14 @@ export function paintShape(ctx, shape, place, ink) {
 /** @param {any} ctx @param {number[]} at @param {Shape} shape @param {number} scale */
 function disc(ctx, at, shape, scale) {
   ctx.arc(at[0], at[1], Math.max(shape.kind === "point" ? 5 : (shape.radius ?? 0.05) * scale, 1), 0, 2 * Math.PI);
+}
+
+/** @param {any} ctx @param {string} text @param {number[]} at @param {string} color */
+function written(ctx, text, at, color) {
+  ctx.font = "13px serif";
+  ctx.fillStyle = color;
+  ctx.textAlign = "center";
+  ctx.fillText(text, at[0], at[1]);
 }
 
 /** @param {any} ctx @param {string} color */

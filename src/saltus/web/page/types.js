@@ -11,10 +11,13 @@
  * @typedef {{coordinate: number, side: number, position: number, slopes: Record<string, number>, base: Record<string, number>}} Stop  A wall in a
  *   drawing: `side` is +1 to the right of the mass; the position changes with numbers by slopes from their base.
  *
+ * @typedef {{name: string, weights: number[], tie: string}} StructurePoint  What is drawn of a structure: the weights of its coordinates
+ *   in the point's displacement, and how it is tied to the one before.
+ *
  * @typedef {object} Description
  * @property {number} version
  * @property {string} [title]
- * @property {{name: string, coordinates: CoordinateEntry[], parameters: NumberEntry[], contacts?: any[], frictions?: any[], stops?: Stop[],
+ * @property {{name: string, coordinates: CoordinateEntry[], parameters: NumberEntry[], contacts?: any[], frictions?: any[], stops?: Stop[], points?: StructurePoint[],
  *   margins?: MarginEntry[], text?: string}} model
  * @property {{name?: string, parameters: NumberEntry[]}} [impact]
  * @property {LoadEntry[]} load
@@ -23,6 +26,7 @@
  * @property {string} digest
  * @property {ResultEntry[]} [results]
  * @property {{name: string, values: Numbers, start: Numbers}[]} [presets]  What the author proposes to try.
+ * @property {string[]} [without_effect]  Numbers that no equation of the model reads, and which have no slider.
  * @property {boolean} [embedded]  Whether the page is shown in a notebook, which it tells what is changed.
  *
  * @typedef {Record<string, number>} Numbers
@@ -44,7 +48,7 @@
  * @property {Validity|null} [checked]
  *
  * @typedef {{period: number|null, values?: Numbers}} EngineSystem
- * @typedef {{kind: string, points: number[][], radius?: number, role: string}} Shape
+ * @typedef {{kind: string, points: number[][], radius?: number, role: string, text?: string}} Shape
  * @typedef {object} Engine
  * @property {(values: Numbers) => EngineSystem} system  Throws a refusal `{where, message}`.
  * @property {(system: EngineSystem, start: Numbers, duration: number, options?: {tolerance?: number, periods?: number}) => Motion} simulate
