@@ -26,6 +26,7 @@ from saltus.flow import (
 )
 from saltus.orbits.contract.equations import OrbitEquations, OrbitEvaluation, Solution
 from saltus.orbits.contract.event_sequence import remembered_at
+from saltus.orbits.eigenvalues import eigenvalues
 from saltus.orbits.signature import TOLERANCES, Signature
 from saltus.progress import html_table
 from saltus.result import Result, function_for
@@ -459,7 +460,7 @@ class PeriodicOrbit(Result):
             a, b = _eigenvalues_of_two(chain)
             return _two_by_falling_modulus(*((a * a, b * b) if self.symmetric else (a, b)))
         values = np.zeros(count, dtype=complex)  # 0 for what contacts hold where the state is given
-        values[: len(chain)] = np.linalg.eigvals(chain)
+        values[: len(chain)] = eigenvalues(chain)
         return by_falling_modulus(values**2 if self.symmetric else values)
 
     @cached_property
@@ -798,7 +799,7 @@ def _sticks(chain: np.ndarray) -> bool:
     """Whether a return map keeps one direction as it is, to rounding alone."""
     if not np.isfinite(chain).all():
         return False
-    apart = np.abs(np.linalg.eigvals(chain) - 1.0)
+    apart = np.abs(eigenvalues(chain) - 1.0)
     return bool(apart.min(initial=math.inf) < TOLERANCES.kept)
 
 
