@@ -144,6 +144,11 @@ def test_killed_at_random_moments_a_study_ends_with_the_same_bytes(kind, tmp_pat
         assert finished(folder, kind)[1] == whole
 
 
+def _hears_interrupts():
+    """A script's background commands, and with them these tests, ignore Ctrl-C from the start."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["motion", "spectrum", "chart", "basins"])
 def test_interrupted_at_random_moments_a_study_says_so_and_ends_with_the_same_bytes(kind, tmp_path):
@@ -158,7 +163,11 @@ def test_interrupted_at_random_moments_a_study_says_so_and_ends_with_the_same_by
         folder = tmp_path / f"{case}"
         folder.mkdir()
         process = subprocess.Popen(
-            command(folder, kind), stderr=subprocess.PIPE, text=True, start_new_session=True
+            command(folder, kind),
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=_hears_interrupts,
         )
         # before, Python itself may not have begun
         time.sleep(0.15 + rng.uniform(0.0, 1.0) * seconds)
