@@ -183,3 +183,10 @@ def test_what_does_not_follow_relays_says_so():
     ]:
         with pytest.raises(ParameterError, match=words):
             asked()
+
+
+@pytest.mark.parametrize("side", [0.5, 0.0, 2.0])
+def test_a_further_start_has_each_relay_on_one_of_its_sides(side):
+    system = System(model=Latched(), load=SHAKEN)
+    with pytest.raises(ParameterError, match=rf"also .* \(valve\) .* 1 or -1, got {side:g}"):
+        find_attractors(system, starts=1, also=[[0.0, 0.0, 1.0], [0.0, 0.0, side]])

@@ -372,7 +372,17 @@ def _further(system: System, also: Any) -> np.ndarray:
     """The further states (n, d), with the sides of relays behind them."""
     size = size_with_sides(system)
     if size > system.dimension and np.shape(also)[-1:] == (size,):
-        return check_states("also", also, size)
+        states = check_states("also", also, size)
+        sides = states[:, system.dimension :]
+        wrong = sides[~np.isin(sides, (-1.0, 1.0))]
+        if wrong.size:
+            names = ", ".join(relay.name for relay in system.model.relays)
+            raise ParameterError(
+                f"also must have the sides of relays ({names}) behind its coordinates and"
+                f" velocities, each 1 or -1, got {wrong[0]:g}",
+                "also",
+            )
+        return states
     return relays_in_turns(system, check_states("also", also, system.dimension))
 
 
