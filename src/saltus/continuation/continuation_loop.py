@@ -16,7 +16,7 @@ from saltus.continuation.course import Course, middle_of, solved_between, turnin
 from saltus.continuation.curve import Zero
 from saltus.continuation.end import CurveEnd, CurveMissed, End, Missed
 from saltus.continuation.pseudo_arclength import STEPS, StepSettings
-from saltus.continuation.test_functions import Cut, Events, located
+from saltus.continuation.test_functions import Cut, Events, TestFunction, located
 from saltus.continuation.trail import SETTINGS as TRAIL
 from saltus.continuation.trail import Trail, TrailPoint
 from saltus.progress import Progress, is_idle, silent
@@ -209,17 +209,21 @@ class Continuation:
         """Locate the special points of a step, in order."""
         found = []
         for a, b in pairwise(samples):
-            zeros = self._zeros(a, b)
+            zeros, jumps = self._zeros(a, b)
             found += zeros
             # a test function with two zeros in the interval shows them at the zero of another one
             # between them, as an NS just before an LP
             inner = self.trail.with_zeros(a, b, zeros) if zeros else []
             for first, last in pairwise(inner if len(inner) > 2 else []):
-                found += self._zeros(first, last, self.trail.unchanged(a, b))
-            if not self.trail.explained(a, b):
-                self.missed.append(
-                    Missed(CurveMissed.STABILITY, "", a.point.parameters, b.point.parameters)
-                )
+                found += self._zeros(first, last, self.trail.unchanged(a, b))[0]
+            reason = CurveMissed.JUMP if jumps else CurveMissed.STABILITY
+            if jumps and not self.trail.explained(a, b, jumps):
+                # a jump may hide a special point beside it
+                a, b = self.trail.narrowed(a, b, jumps)
+                zeros, jumps = self._zeros(a, b)
+                found += zeros
+            if not self.trail.explained(a, b, jumps):
+                self.missed.append(Missed(reason, "", a.point.parameters, b.point.parameters))
         first = samples[0].point
         for zero in sorted(
             self.events.distinct(found),
@@ -247,25 +251,30 @@ class Continuation:
             middle = middle_of(last, special)
             self.points += [] if middle is None else [middle]
 
-    def _zeros(self, a: TrailPoint, b: TrailPoint, chosen: np.ndarray | bool = True) -> list[Zero]:
+    def _zeros(
+        self, a: TrailPoint, b: TrailPoint, chosen: np.ndarray | bool = True
+    ) -> tuple[list[Zero], list[TestFunction]]:
         """The zeros of the test functions, or of those chosen, that change their signs between two
-        points.
+        points; and the test functions that jump over 0 there.
         """
         changes = np.sign(a.values) * np.sign(b.values) < 0.0
         if not any(changes.tolist()):
-            return []
+            return [], []
         signs = zip(self.trail.tests, changes & chosen, strict=True)
         changed = [test for test, sign in signs if sign and test is not self.trail.barrier]
         singular = any(test.singular for test in changed)
         found = []
+        jumps = []
         for test in changed:
             zero = located(test, a.point, b.point, singular)
-            if zero is None:
+            if self.events.jumps_over(test.kind, a.point, b.point, zero):
+                jumps.append(test)
+            elif zero is None:
                 places = a.point.parameters, b.point.parameters
                 self.missed.append(Missed(CurveMissed.NOT_LOCATED, test.kind, *places))
             else:
                 found.append(zero)
-        return found
+        return found, jumps
 
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""

@@ -93,6 +93,7 @@ class CurveMissed(MissedReason):
 
     NOT_LOCATED = "{kind} between {first} and {last}"
     STABILITY = "a change of stability between {first} and {last}"
+    JUMP = "a change of stability near {first} by a jump, which is no special point"
 
 
 @dataclass(frozen=True, eq=False)

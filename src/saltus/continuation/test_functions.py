@@ -374,6 +374,13 @@ class Events:
         """The test functions for the step that begins at a point."""
         return ()
 
+    def jumps_over(self, kind: str, point: Any, ahead: Any, zero: Zero | None) -> bool:
+        """Whether the test function of a kind of special point, whose sign differs at two points,
+        jumps over 0 between them, or is rounding there: then there is no special point. `zero` is
+        where its sign changes, if that was located.
+        """
+        return False
+
     def outside(self, point: Any) -> int | None:
         """A count that changes at special points only, as of multipliers outside the unit circle;
         None where it has none.

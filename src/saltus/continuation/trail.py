@@ -14,7 +14,7 @@ import numpy as np
 from saltus.continuation.curve import Zero
 from saltus.continuation.pseudo_arclength import arc, between
 from saltus.continuation.step_arithmetic import arithmetic
-from saltus.continuation.test_functions import Events
+from saltus.continuation.test_functions import Events, TestFunction
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,30 @@ class Trail:
             found[1:1] = [] if beside is None else [beside]
         return found
 
-    def explained(self, a: TrailPoint, b: TrailPoint) -> bool:
+    def explained(self, a: TrailPoint, b: TrailPoint, jumps: Sequence[TestFunction] = ()) -> bool:
         """Whether the counts of `Events.outside` at two points are equal, or a decisive test
-        function changes its sign between."""
+        function changes its sign between that does not jump there.
+        """
         if a.outside == b.outside or None in (a.outside, b.outside):
             return True
-        return bool((a.values * b.values <= 0.0)[self.decisive].any())
+        changed = self.decisive & (a.values * b.values <= 0.0)
+        return any(
+            test not in jumps for test, sign in zip(self.tests, changed, strict=True) if sign
+        )
+
+    def narrowed(
+        self, a: TrailPoint, b: TrailPoint, jumps: Sequence[TestFunction]
+    ) -> tuple[TrailPoint, TrailPoint]:
+        """Two nearer points between which the count of `Events.outside` changes as well, or a
+        decisive test function that is none of `jumps` changes its sign.
+        """
+        narrowest = SETTINGS.narrowest * (b.arc - a.arc)
+        while b.arc - a.arc > narrowest and not self.explained(a, b, jumps):
+            middle = self._middle(a, b, 0.5)
+            if middle is None or middle.outside is None:
+                break
+            a, b = (middle, b) if middle.outside == a.outside else (a, middle)
+        return a, b
 
     def with_zeros(self, a: TrailPoint, b: TrailPoint, zeros: Sequence[Zero]) -> list[TrailPoint]:
         """The two points with the zeros of test functions between them, in order; values there that

@@ -270,6 +270,40 @@ def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
     return first, second
 
 
+# The multiplier that an orbit has at special points of these kinds. The multipliers of symmetric
+# orbits are those of the whole period, the squares of those of a half.
+CRITICAL: dict[str, float] = {SpecialKind.LP: 1.0, SpecialKind.BPC: 1.0, SpecialKind.PD: -1.0}
+# How far rounding leaves this multiplier from its value: as far as the root of rounding, of an
+# order that is the number of multipliers which come together there.
+NEAR_CRITICAL = 0.1
+
+
+def has_critical_multiplier(kind: str, orbit: PeriodicOrbit) -> bool:
+    """Whether an orbit has the multiplier of a kind of special point, as far as it has multipliers
+    and the kind has one; an orbit that grazes has no multipliers.
+    """
+    value = CRITICAL.get(kind)
+    found = orbit.multipliers
+    if value is None or not found.size or not np.isfinite(found).all():
+        return True
+    return bool(np.abs(found - value).min() < NEAR_CRITICAL)
+
+
+def may_pass(kind: str, first: PeriodicOrbit, last: PeriodicOrbit) -> bool:
+    """Whether a multiplier may have passed the value of a kind of special point between two orbits:
+    not if as many real ones, up to an even number, are beyond this value at both.
+    """
+    value = CRITICAL.get(kind)
+    counts = []
+    for orbit in (first, last):
+        found = orbit.multipliers
+        # those of a symmetric orbit are squares, whose roots may have either sign
+        if value is None or orbit.symmetric or not found.size or not np.isfinite(found).all():
+            return True
+        counts.append(int(((found.imag == 0.0) & (found.real * value > 1.0)).sum()))
+    return (counts[1] - counts[0]) % 2 == 1
+
+
 def complex_pairs(orbit: PeriodicOrbit) -> np.ndarray:
     """The moduli of the complex pairs of multipliers, (n,).
 

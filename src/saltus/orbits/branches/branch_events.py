@@ -31,6 +31,8 @@ from saltus.orbits.beyond.orbit_curve import (
     branch_tests,
     complex_pairs,
     grazing,
+    has_critical_multiplier,
+    may_pass,
     never_torus,
 )
 from saltus.orbits.beyond.special_point import (
@@ -250,6 +252,18 @@ class BranchEvents(OrbitEvents):
             return None
         moduli = [abs(value) for value in point.orbit.multipliers.tolist()]
         return len([modulus for modulus in moduli if modulus > 1.0 + TOLERANCES.on_circle])
+
+    def jumps_over(
+        self, kind: str, point: OrbitPoint, ahead: OrbitPoint, zero: Zero | None
+    ) -> bool:
+        """Whether no multiplier passes through 1 or -1, as one does at LP, BPC and PD.
+
+        Multipliers jump over such a value where an event appears or is lost. There the equations
+        may be degenerate too, so that rounding decides the signs of their determinants.
+        """
+        if zero is not None:
+            return not has_critical_multiplier(kind, zero.point.orbit)
+        return not may_pass(kind, point.orbit, ahead.orbit)
 
     def distinct(self, found: list[Zero]) -> list[Zero]:
         """The special points, without crossings of branches that are only folds. Zeros of `torus`
