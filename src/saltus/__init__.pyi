@@ -121,6 +121,7 @@ from .systems.loads.repeating import Table as Table
 from .systems.loads.repeating import Triangle as Triangle
 from .systems.structures.from_symbols import from_sympy as from_sympy
 from .systems.structures.structure import Structure as Structure
+from .systems.structures.switched import SwitchedForce as SwitchedForce
 from .web.study_page import Explorer as Explorer
 from .web.study_page import explore as explore
 from .web.study_page import page as page

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 from collections import UserDict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -218,6 +218,21 @@ class Factors(tuple[Any, ...]):
 
     __slots__ = ()
 
+    @property
+    def named(self) -> dict[str, Any]:
+        """Its entries by the names that they have in paths: their numbers from 0."""
+        return {str(i): value for i, value in enumerate(self)}
+
+    def with_values(self, values: Iterable[Any]) -> Factors:
+        """The same with other entries.
+
+        Parameters
+        ----------
+        values
+            In the same order.
+        """
+        return type(self)(values)
+
 
 class Coefficients(Factors):
     """Numbers that follow from others: a trace replaces them by symbols, but they are no
@@ -233,6 +248,11 @@ class NamedParts(Factors):
     """
 
     __slots__ = ()
+
+    @property
+    def named(self) -> dict[str, Any]:
+        """The parts by their names."""
+        return {part.name: part for part in self}
 
 
 class RowNumbers(tuple[float, ...]):

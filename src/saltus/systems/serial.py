@@ -18,7 +18,7 @@ import numpy as np
 from saltus.errors import ParameterError, SaltusError, near, shown
 from saltus.systems.contracts.model import Count, Model, OneContactModel, check_one_contact
 from saltus.systems.gap_coordinates import IN_GAPS, fields_of, in_gap_coordinates
-from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw, NamedParts
+from saltus.systems.impact_laws import Coefficients, Factors, ImpactLaw
 from saltus.systems.loads.load import Load
 from saltus.systems.loads.signals import Constant, Harmonic, Record, Setting, Signal, Sum, as_signal
 
@@ -29,12 +29,10 @@ def children(node: Any) -> dict[str, Any]:
     """
     if isinstance(node, Load):
         return {"frequency": node.frequency, **node.channels}
-    if isinstance(node, NamedParts):
-        return {part.name: part for part in node}
-    if isinstance(node, (Sum, Factors)):
-        return {
-            str(i): term for i, term in enumerate(node.terms if isinstance(node, Sum) else node)
-        }
+    if isinstance(node, Factors):
+        return node.named
+    if isinstance(node, Sum):
+        return {str(i): term for i, term in enumerate(node.terms)}
     kind: Any = type(node)
     return {name: getattr(node, name) for name in fields_of(kind)}
 
@@ -113,7 +111,7 @@ def replace(node: Any, changes: Mapping[str, Any], where: str = "") -> Any:
     if isinstance(node, Sum):
         return Sum(tuple(as_signal(part, f"{where}{name}") for name, part in parts.items()))
     if isinstance(node, Factors):
-        return type(node)(parts.values())
+        return node.with_values(parts.values())
     try:
         return dataclasses.replace(node, **parts)
     except SaltusError as error:
@@ -198,7 +196,7 @@ def substitute(node: Any, leaf: Callable[[str, float], Any], prefix: str = "") -
         object.__setattr__(twin, "terms", tuple(parts.values()))
         return twin
     if isinstance(node, Factors):
-        return type(node)(parts.values())
+        return node.with_values(parts.values())
     if not dataclasses.is_dataclass(node):
         return node
     twin = object.__new__(type(node))

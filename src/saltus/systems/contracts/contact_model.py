@@ -522,7 +522,7 @@ def _check_function(part: Contact | Friction | Surface, name: str, **usual: Any)
     _check_texts(part, name)
     for other, value in usual.items():
         given = getattr(part, other)
-        if type(given) is not type(value) or given != value:
+        if isinstance(given, bool) or not isinstance(given, type(value)) or given != value:
             raise ParameterError(
                 f"{called_part(part)} has a {name}, which says all: leave its {other} out", other
             )

@@ -49,6 +49,9 @@ def eigenmodes_of(structure: Any, spacing: int, derivatives: bool = False) -> np
     derivatives
         Whether the derivatives of its motions follow from the eigenmodes, too.
     """
+    # Forces that switch with functions are in no set of them.
+    if structure.switched or any(part.function is not None for part in structure.surfaces):
+        return np.zeros(0)
     # The eigenmodes of all sets are kept.
     if len(structure.contacts) + len(structure.surfaces) > MOST_PARTS:
         return np.zeros(0)

@@ -22,8 +22,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from dataclasses import MISSING, dataclass, fields, replace
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -47,8 +47,20 @@ from saltus.systems.files.record_files import (
     read_array,
 )
 from saltus.systems.impact_laws import Coefficients, NamedParts, RowNumbers, Vectors
+from saltus.systems.loads.signals import Setting
 from saltus.systems.structures.eigenmodes import eigenmodes_of
 from saltus.systems.structures.reduction import check_symmetric, shapes_of, sparse_matrix
+from saltus.systems.structures.switched import (
+    NamedNumbers,
+    Shares,
+    SwitchedForce,
+    Terms,
+    check_named,
+    displacements_in,
+    independent,
+    read_functions,
+    value_of_product,
+)
 
 MODE = "mode_"  # begins the names of the amplitudes
 # The names of the arrays in files, and what they are called in papers.
@@ -74,9 +86,10 @@ class Modes:
     forces: np.ndarray  # T' g, a column for each channel
     inverse: np.ndarray  # of T: R, and T_z' M
 
-    def coefficients(self) -> list[float]:
+    def coefficients(self, shares: np.ndarray) -> list[float]:
         """The numbers of the local equations, in the order in which `Equations` reads them; without
-        any, those of the modes.
+        any, those of the modes. `shares` has the coefficients of displacements that follow from the
+        local ones.
         """
         m = len(self.mass)
         damped = [] if self.damping is None else [self.damping[:m, :m]]
@@ -85,6 +98,7 @@ class Modes:
             self.stiffness[:m, :m],
             *damped,
             self.forces[:m],
+            shares,
             *([] if m else [self.records()]),
         ]
         return [float(x) for block in found for x in block.ravel()]
@@ -210,7 +224,7 @@ class Equations:
     """The numbers of a structure's equations, or their symbols, by their places."""
 
     def __init__(self, structure: Structure) -> None:
-        local, self.damped, self.coupled, _ = structure.form
+        local, self.damped, self.coupled, _, shares = structure.form
         self._numbers = structure.coefficients
         self._at = 0
         self.local = len(local)
@@ -222,6 +236,10 @@ class Equations:
         self.stiffness = self._block(m, m)
         self.damping = self._block(m, m) if self.damped else []
         self.forces = self._block(m, channels)
+        self.shares = {
+            name: (known, factors)
+            for (name, known), factors in zip(shares, self._block(len(shares), m), strict=True)
+        }
         self.record = ModeRecord(m, channels, self.damped)
         if m:
             self._numbers = structure.records.array
@@ -238,12 +256,13 @@ class Equations:
 @dataclass(frozen=True, kw_only=True)
 class Structure(ContactModel):
     """A linear structure of up to 200 coordinates u, with contacts, surfaces and frictions at some
-    of its points:
+    of its points, and forces that switch:
 
         M u'' + C u' + K u = sum over channels of g f(t) + the forces of surfaces + reactions +
-        frictions.
+        frictions + switched forces.
 
     Its coordinates are the displacements of contacts, surfaces and frictions, under their names,
+    then those of switched forces and of functions that do not follow from these,
     and behind them the amplitudes `mode_1`, `mode_2`, ... of its modes. The modes have mass 1, are
     those while these displacements are held, and the slowest is the first. `start` makes a state of
     displacements u, and `displacements` gives u.
@@ -259,7 +278,14 @@ class Structure(ContactModel):
         `Contact`, `Surface` and `Friction`, whose `coordinate` is a row of the matrices, its number
         from 0 or its name, a point, or coefficients as a point has them. On the side +1 of a
         surface its `stiffness` and its `damping` act. The normal force of a friction is 1, so that
-        its coefficients are forces.
+        its coefficients are forces. A surface may be one of the `functions`, and a `Relay` among
+        the surfaces goes on and off where two of them rise through 0.
+    functions
+        By their names, what surfaces, relays and switched forces name: a sum of displacements,
+        their rates, channels of the load and a constant, {"tip": 1.0, "tip_velocity": 0.2,
+        "constant": -0.1}; or a list of such sums, whose product it is.
+    switched
+        `SwitchedForce`, each on a displacement and switched by the side of a surface or a relay.
     forces
         The vector g of each channel of the load by its name, as points are given.
     points
@@ -279,7 +305,8 @@ class Structure(ContactModel):
     ParameterError
         Matrices that are not square, of different sizes, or not finite; a mass that is not
         symmetric and positive definite; a stiffness that is not symmetric; an unknown coordinate;
-        local displacements that are not independent.
+        local displacements that are not independent; a part that names a function or a surface that
+        is not given, a function that no part names, or a surface with an `after_event`.
 
     Examples
     --------
@@ -307,6 +334,8 @@ class Structure(ContactModel):
     points: Any = None
     names: tuple[str, ...] = ()
     basis: Any = None
+    functions: Any = None
+    switched: Any = ()
     # What follows from the others: numbers of the local equations; those of the modes, which
     # without local displacements are among the first; and which blocks of numbers there are, with
     # the names of the local displacements.
@@ -333,12 +362,11 @@ class Structure(ContactModel):
         names = _names_of(self.names, len(mass.array))
         points = _vectors(self.points, "points", names)
         forces = _vectors(self.forces, "forces", names)
-        parts = _parts(self.contacts, self.surfaces, self.friction, names, points)
-        local = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
-        rows = np.array([points.get(name) or _vector(name, names, name) for name in local]).reshape(
-            len(local), len(names)
-        )
-        check_independent(rows, tuple(local))
+        given_parts = (self.contacts, self.surfaces, self.friction, self.switched)
+        parts = _parts(*given_parts, names, points)
+        functions = read_functions(self.functions, Terms(names, points, forces), Structure)
+        check_named(parts["surfaces"], parts["switched"], functions)
+        local, shares, rows = _local_displacements(parts, functions, names, points, forces)
         basis = _basis(self.basis, len(names))
         columns = np.array([*forces.values()]).reshape(len(forces), len(names)).T
         modes = modes_of(
@@ -356,15 +384,28 @@ class Structure(ContactModel):
             "file": "",
             "names": names,
             "basis": basis,
+            "functions": functions,
             **parts,
         }
         made |= {
             "forces": Vectors(forces),
             "points": Vectors(points),
-            "coefficients": Coefficients(modes.coefficients()),
+            "coefficients": Coefficients(modes.coefficients(shares.rows)),
         }
         made |= {"records": ConstantNumbers(modes.records(), "records")}
-        made |= {"form": (tuple(local), modes.damping is not None, modes.coupled, pattern)}
+        sharing = {
+            name: tuple(bool(x) for x in row)
+            for name, row in zip(shares.names, shares.rows, strict=True)
+        }
+        made |= {
+            "form": (
+                tuple(local),
+                modes.damping is not None,
+                modes.coupled,
+                pattern,
+                tuple(sharing.items()),
+            )
+        }
         vars(self).update(made, _modes=modes)
 
     @classmethod
@@ -383,6 +424,8 @@ class Structure(ContactModel):
         forces: Any = None,
         points: Any = None,
         names: Sequence[str] = (),
+        functions: Any = None,
+        switched: Any = (),
     ) -> Structure:
         """A structure of thousands of rows in few coordinates, by the method of Craig and Bampton:
         the displacements of its contacts, surfaces and frictions and those that are kept, and its
@@ -402,7 +445,7 @@ class Structure(ContactModel):
             How many modes.
         keep
             Further rows or points that become coordinates of their own, as where loads act.
-        contacts, surfaces, friction, forces, points, names
+        contacts, surfaces, friction, forces, points, names, functions, switched
             As `Structure` takes them, for the rows of these matrices.
 
         Returns
@@ -456,8 +499,15 @@ class Structure(ContactModel):
         all_names = _names_of(names, size)
         all_points = _vectors(points, "points", all_names)
         all_forces = _vectors(forces, "forces", all_names)
-        parts: dict[str, Any] = dict(_parts(contacts, surfaces, friction, all_names, all_points))
-        kept = dict.fromkeys(part.coordinate for each in parts.values() for part in each)
+        parts: dict[str, Any] = dict(
+            _parts(contacts, surfaces, friction, switched, all_names, all_points)
+        )
+        read = read_functions(functions, Terms(all_names, all_points, all_forces), cls)
+        check_named(parts["surfaces"], parts["switched"], read)
+        local, shares, _ = _local_displacements(parts, read, all_names, all_points, all_forces)
+        kept = dict.fromkeys(local)
+        for name in shares.names:  # they follow from what is kept
+            all_points.setdefault(name, _vector(name, all_names, name))
         for row in _each(keep, "keep"):
             known = isinstance(row, str) and row in all_points
             kept[row if known else all_names[_place(row, all_names, "keep")]] = None
@@ -477,6 +527,7 @@ class Structure(ContactModel):
         return cls(
             **small,
             **parts,
+            functions=read,
             names=(*kept, *(f"amplitude_{i + 1}" for i in range(int(modes)))),
             forces={name: np.array(row) @ basis for name, row in all_forces.items()},
             points={
@@ -562,6 +613,40 @@ class Structure(ContactModel):
             return np.asarray(self._row_of(displacement) @ vars(self)["_modes"].basis)
         return found
 
+    def __getattr__(self, name: str) -> Any:
+        """A function, in the place of a method of a class."""
+        functions = vars(self).get("functions")
+        if isinstance(functions, NamedNumbers) and name in functions.names:
+            return partial(self._value_of, name)
+        raise AttributeError(
+            f"{type(self).__name__} has no attribute {name!r}", name=name, obj=self
+        )
+
+    def _value_of(self, name: str, t: Any, q: Any, velocity: Any, load: Any) -> Any:
+        """The value of one of its functions."""
+        own = Equations(self)
+        local = {
+            "displacement": list(q) if own.size > 1 else [q],
+            "rate": list(velocity) if own.size > 1 else [velocity],
+        }
+
+        def value_of_term(term: str) -> Any:
+            kind, of = meaning.meaning(term, name)
+            if kind in local:
+                return _sum_of_shares(self._shares_of(of, own), local[kind])
+            return getattr(load, of)(t) if kind == "channel" else 1.0
+
+        meaning = Terms(self.names, self.points, self.forces)
+        return value_of_product(self.functions.named[name], value_of_term)
+
+    def _shares_of(self, displacement: str, own: Equations) -> list[tuple[int, Any]]:
+        """The places of the local displacements from which one follows, and its coefficients; of a
+        local one itself."""
+        if displacement in self.form[0]:
+            return [(self.form[0].index(displacement), 1.0)]
+        known, factors = own.shares[displacement]
+        return [(i, x) for i, (x, there) in enumerate(zip(factors, known, strict=True)) if there]
+
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
         """The channels of the load."""
@@ -579,12 +664,19 @@ class Structure(ContactModel):
             for name in (*IN_FILES, "basis")
             if (m := getattr(self, name)) is not None
         }
-        for field in ("contacts", "surfaces", "friction"):
+        for field in ("contacts", "surfaces", "friction", "switched"):
             if parts := getattr(self, field):
                 table[field] = [_table_of(part) for part in parts]
         for field in ("forces", "points"):
             if rows := getattr(self, field):
                 table[field] = {name: list(row) for name, row in rows.items()}
+        if self.functions:
+            table["functions"] = {
+                name: each.named
+                if isinstance(each, NamedNumbers)
+                else [part.named for part in each]
+                for name, each in self.functions.named.items()
+            }
         return table | (
             {"names": list(self.names)} if self.names != _names_of((), len(self.names)) else {}
         )
@@ -649,10 +741,18 @@ class Structure(ContactModel):
                 )
                 found[-1] = found[-1] - slowed - _sum([record[k] for k in places.by_local], v[:m])
         for surface in self.surfaces:
+            if surface.coordinate is None:
+                continue
             i = self.form[0].index(surface.coordinate)
             side = sides[0][surface.name]
             pressed = surface.stiffness * (q[i] - surface.position) + surface.damping * v[i]
             found[i] = found[i] - 0.5 * (1.0 + side) * pressed
+        for each in self.switched:
+            push = each.factor(sides[0][each.surface])
+            if each.function is not None:
+                push = push * self._value_of(each.function, t, theta, velocity, load)
+            for i, share in self._shares_of(each.coordinate, own):
+                found[i] = found[i] + (push if _is_whole(share) else share * push)
         return found[0] if own.size == 1 else tuple(found)
 
     def mode_equations(
@@ -746,6 +846,17 @@ def _sum(factors: Sequence[Any], values: Sequence[Any]) -> Any:
     return total
 
 
+def _sum_of_shares(shares: Sequence[tuple[int, Any]], values: Sequence[Any]) -> Any:
+    """A displacement, or its rate, by the local ones."""
+    found = [values[i] if _is_whole(share) else share * values[i] for i, share in shares]
+    return sum(found[1:], found[0])
+
+
+def _is_whole(share: Any) -> bool:
+    """Whether a coefficient is that of a local displacement itself."""
+    return isinstance(share, float) and share == 1.0
+
+
 # --- what is given -----------------------------------------------------------
 
 
@@ -776,6 +887,7 @@ def _parts(
     contacts: Any,
     surfaces: Any,
     friction: Any,
+    switched: Any,
     names: tuple[str, ...],
     points: dict[str, RowNumbers],
 ) -> dict[str, NamedParts]:
@@ -786,8 +898,40 @@ def _parts(
             ("contacts", Contact, contacts),
             ("surfaces", Surface, surfaces),
             ("friction", Friction, friction),
+            ("switched", SwitchedForce, switched),
         )
     }
+
+
+def _local_displacements(
+    parts: Mapping[str, Any],
+    functions: NamedNumbers,
+    names: tuple[str, ...],
+    points: Mapping[str, RowNumbers],
+    forces: Mapping[str, RowNumbers],
+) -> tuple[list[str], Shares, np.ndarray]:
+    """The displacements that become coordinates: those of contacts, surfaces and frictions, and of
+    those of switched forces and functions what does not follow from others; with what follows, and
+    the coefficients of the local ones.
+    """
+
+    def row_of(name: str) -> np.ndarray:
+        return np.array(points.get(name) or _vector(name, names, name))
+
+    held = dict.fromkeys(
+        part.coordinate
+        for field in ("contacts", "surfaces", "friction")
+        for part in parts[field]
+        if part.coordinate is not None
+    )
+    rows = {name: row_of(name) for name in held}
+    check_independent(np.array([*rows.values()]).reshape(len(held), len(names)), tuple(held))
+    rows |= {part.coordinate: row_of(part.coordinate) for part in parts["switched"]}
+    terms = Terms(names, points, forces)
+    rows |= {name: row_of(name) for name in displacements_in(functions, terms)}
+    local, shares = independent(rows, tuple(held))
+    own = np.array([rows[name] for name in local]).reshape(len(local), len(names))
+    return local, shares, own
 
 
 def _basis(given: Any, size: int) -> ConstantNumbers | None:
@@ -899,6 +1043,10 @@ def _part(
     """A contact, surface or friction whose coordinate is the name of a row or of a point; a sum
     becomes a point with its name.
     """
+    if kind is Surface and (
+        isinstance(part, Relay) or (isinstance(part, Mapping) and "on" in part)
+    ):
+        kind = Relay
     if isinstance(part, Mapping):
         known = [each.name for each in fields(kind)]
         if unknown := [name for name in part if name not in known]:
@@ -907,26 +1055,34 @@ def _part(
                 f"{near(str(unknown[0]), known)}",
                 field,
             )
-        if "name" not in part or "coordinate" not in part:
+        needed = [each.name for each in fields(kind) if each.default is MISSING]
+        if "function" not in part and kind in (Surface, Contact, Friction):
+            needed.append("coordinate")
+        if not {*needed} <= part.keys():
             raise ParameterError(
-                f"{field}: a {kind.__name__} needs a name and a coordinate, got {shown(part)}",
+                f"{field}: a {kind.__name__} needs a {' and a '.join(needed)}, got {shown(part)}",
                 field,
             )
         part = kind(**part)
-    if isinstance(part, Relay) or getattr(part, "after_event", None) is not None:
-        raise ParameterError(
-            f"{field}.{part.name}: a Structure has no methods of its own, which a Relay and an"
-            " after_event name; take a ContactModel with the same matrices in its force",
-            field,
-        )
     if not isinstance(part, kind):
         raise ParameterError(f"{field} must be of class {kind.__name__}, got {shown(part)}", field)
     where = f"{field}.{part.name}"
     on = part.coordinate
     _check_name(part.name, where)
+    if getattr(part, "after_event", None) is not None:
+        raise ParameterError(
+            f"{where}: a Structure does not follow an after_event; take a ContactModel with the same"
+            " matrices in its force",
+            where,
+        )
+    if isinstance(part, Relay):
+        return part
+    if isinstance(part, Surface) and on is None:
+        return _surface_of_function(part)
     if on is None:
         raise ParameterError(
-            f"{where}: a Structure has no methods of its own, so the part needs a coordinate", where
+            f"{where}: a Structure has no distances and no rates, so the part needs a coordinate",
+            where,
         )
     if isinstance(on, str) and (on in points or on in names):
         coordinate = on
@@ -942,11 +1098,25 @@ def _part(
         coordinate = part.name
     for each in fields(part):
         value = getattr(part, each.name)
-        if each.name not in ("name", "coordinate", "sign", "group") and value is not None:
+        if each.name not in (*NO_NUMBERS, *TEXTS.get(kind, ())) and value is not None:
             check_number(f"{where}.{each.name}", value)
     made: Any = replace(part, coordinate=coordinate)
     if hasattr(made, "sign"):
         object.__setattr__(made, "sign", Count(int(made.sign)))
+    return made
+
+
+NO_NUMBERS = ("name", "coordinate", "sign", "group")
+TEXTS: dict[Any, tuple[str, ...]] = {SwitchedForce: ("surface", "function")}
+
+
+def _surface_of_function(part: Surface) -> Surface:
+    """A surface of a function, whose fields that only a coordinate has are no numbers of the
+    structure."""
+    made = replace(part)
+    object.__setattr__(made, "sign", Count(1))
+    for name in ("position", "stiffness", "damping"):
+        object.__setattr__(made, name, Setting(0.0))
     return made
 
 
@@ -957,4 +1127,5 @@ def _table_of(part: Any) -> dict[str, Any]:
         for each in fields(part)
         if getattr(part, each.name) != each.default
     }
-    return table | ({"sign": int(part.sign)} if hasattr(part, "sign") else {})
+    has_sign = part.coordinate is not None and hasattr(part, "sign")
+    return table | ({"sign": int(part.sign)} if has_sign else {})
