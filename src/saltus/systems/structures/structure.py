@@ -86,10 +86,10 @@ class Modes:
     forces: np.ndarray  # T' g, a column for each channel
     inverse: np.ndarray  # of T: R, and T_z' M
 
-    def coefficients(self, shares: np.ndarray) -> list[float]:
-        """The numbers of the local equations, in the order in which `Equations` reads them; without
-        any, those of the modes. `shares` has the coefficients of displacements that follow from the
-        local ones.
+    def coefficients(self, shares: np.ndarray, whole: bool) -> list[float]:
+        """The numbers of the local equations, in the order in which `Equations` reads them; of the
+        `whole` structure also those of the modes. `shares` has the coefficients of displacements
+        that follow from the local ones.
         """
         m = len(self.mass)
         damped = [] if self.damping is None else [self.damping[:m, :m]]
@@ -99,7 +99,7 @@ class Modes:
             *damped,
             self.forces[:m],
             shares,
-            *([] if m else [self.records()]),
+            *([self.records()] if whole else []),
         ]
         return [float(x) for block in found for x in block.ravel()]
 
@@ -241,7 +241,7 @@ class Equations:
             for (name, known), factors in zip(shares, self._block(len(shares), m), strict=True)
         }
         self.record = ModeRecord(m, channels, self.damped)
-        if m:
+        if not structure.is_written_out:
             self._numbers = structure.records.array
             self._at = 0
         self._at += 1
@@ -390,7 +390,6 @@ class Structure(ContactModel):
         made |= {
             "forces": Vectors(forces),
             "points": Vectors(points),
-            "coefficients": Coefficients(modes.coefficients(shares.rows)),
         }
         made |= {"records": ConstantNumbers(modes.records(), "records")}
         sharing = {
@@ -407,6 +406,8 @@ class Structure(ContactModel):
             )
         }
         vars(self).update(made, _modes=modes)
+        numbers = Coefficients(modes.coefficients(shares.rows, self.is_written_out))
+        vars(self)["coefficients"] = numbers
 
     @classmethod
     @answered
@@ -686,7 +687,16 @@ class Structure(ContactModel):
         """The number of coordinates whose equations are traced one by one, while those of the modes
         are loops.
         """
-        return len(self.form[0]) or len(self.names)
+        return len(self.names) if self.is_written_out else len(self.form[0])
+
+    @property
+    def is_written_out(self) -> bool:
+        """Whether the equations of the modes are traced one by one too: without local displacements,
+        and with functions along which motions may slide. Then the accelerations depend on sums over
+        modes in another way than linearly, which the loops do not follow.
+        """
+        sliding = (part.function is not None and not part.remembered for part in self.surfaces)
+        return not self.form[0] or any(sliding)
 
     def mass_matrix(self, theta: Any) -> Any:
         """M_b, and 1 for each mode; M_b alone for the local coordinates of a trace."""
