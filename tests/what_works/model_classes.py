@@ -274,9 +274,11 @@ class ModelClass:
     def whole_start(self) -> dict[str, Any]:
         """The start with the amplitudes of a structure's modes."""
         model = self.system().model
-        return (
-            dict(model.start(**self.start)) if isinstance(model, saltus.Structure) else self.start
-        )
+        if not isinstance(model, saltus.Structure):
+            return self.start
+        sides = {name: self.start[name] for name in ("relays",) if name in self.start}
+        place = {name: value for name, value in self.start.items() if name not in sides}
+        return {**model.start(**place), **sides}
 
 
 def _metainterface() -> System:
@@ -365,6 +367,44 @@ def _structure() -> System:
 def _structure_with_soft_stop() -> System:
     stop = Surface(name="stop", coordinate="c", position=0.2, stiffness=5.0, damping=0.1)
     return System(model=_row_of_masses(surfaces=[stop]), load=_pushed())
+
+
+def _structure_with_relay() -> System:
+    """A damper at c is switched on above 0.2 and off below 0.1."""
+    model = _row_of_masses(
+        surfaces=[saltus.Relay(name="valve", on="high", off="low")],
+        functions={
+            "high": {"c": 1.0, "constant": -0.2},
+            "low": {"c": -1.0, "constant": 0.1},
+            "rate": {"c_velocity": 1.0},
+        },
+        switched=[
+            saltus.SwitchedForce(
+                name="damper", coordinate="c", surface="valve", function="rate", on=-0.6
+            )
+        ],
+    )
+    return System(model=model, load=_pushed())
+
+
+def _structure_with_function() -> System:
+    """A damper between b and c is harder in rebound than in bump."""
+    model = _row_of_masses(
+        points={"strut": {"c": 1.0, "b": -1.0}},
+        surfaces=[Surface(name="bump", function="closing")],
+        functions={"closing": {"strut_velocity": -1.0}},
+        switched=[
+            saltus.SwitchedForce(
+                name="damper",
+                coordinate="strut",
+                surface="bump",
+                function="closing",
+                on=0.1,
+                off=0.6,
+            )
+        ],
+    )
+    return System(model=model, load=_pushed())
 
 
 def _two_bodies() -> System:
@@ -458,6 +498,22 @@ CLASSES = (
         {"displacement": (0.1, 0.0, 0.0)},
         "model.surfaces.stop.stiffness",
         "c",
+    ),
+    ModelClass(
+        "structure with a relay",
+        "`Structure` with a `Relay` and a switched force",
+        _structure_with_relay,
+        {"displacement": (0.1, 0.0, 0.0), "relays": {"valve": False}},
+        "model.functions.high.constant",
+        "c",
+    ),
+    ModelClass(
+        "structure with a function",
+        "`Structure` with a surface of velocities and a switched force",
+        _structure_with_function,
+        {"displacement": (0.1, 0.0, 0.0)},
+        "model.switched.damper.off",
+        "strut",
     ),
     ModelClass(
         "own, gaps between bodies",
