@@ -330,6 +330,14 @@ def good(made):
         "Surface": (saltus.Surface, {"name": "stop", "coordinate": "x"}),
         "Surface.side": (saltus.Surface(name="stop", coordinate="x").side, {"position": 0.5}),
         "Relay": (saltus.Relay, {"name": "heater", "on": "too_cold", "off": "too_warm"}),
+        "SwitchedForce": (
+            saltus.SwitchedForce,
+            {"name": "damper", "coordinate": "x", "surface": "valve"},
+        ),
+        "SwitchedForce.factor": (
+            saltus.SwitchedForce(name="damper", coordinate="x", surface="valve").factor,
+            {"side": 1.0},
+        ),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
         "Friction.coefficient": (
             saltus.Friction(name="belt", coordinate="x", kinetic=0.2).coefficient,

@@ -214,7 +214,8 @@ def read_functions(given: Any, terms: Terms, taken: type) -> NamedNumbers:
     found = {}
     for name, function in dict(given or {}).items():
         usable = isinstance(name, str) and name.isidentifier() and not name.startswith("_")
-        if not usable or hasattr(taken, name) or hasattr(InGapCoordinates, name):
+        own = hasattr(taken, name) or name in InGapCoordinates.__annotations__
+        if not usable or own or hasattr(InGapCoordinates, name):
             raise ParameterError(
                 f"functions: {shown(name)} is not a name for a function, such as too_high",
                 "functions",
