@@ -261,9 +261,9 @@ class Structure(ContactModel):
         M u'' + C u' + K u = sum over channels of g f(t) + the forces of surfaces + reactions +
         frictions + switched forces.
 
-    Its coordinates are the displacements of contacts, surfaces and frictions, under their names,
-    then those of switched forces and of functions that do not follow from these,
-    and behind them the amplitudes `mode_1`, `mode_2`, ... of its modes. The modes have mass 1, are
+    Its coordinates are the displacements of contacts, surfaces and frictions, under their names.
+    Those of switched forces and of functions are next, if they do not follow from these. Behind
+    them are the amplitudes `mode_1`, `mode_2`, ... of its modes. The modes have mass 1, are
     those while these displacements are held, and the slowest is the first. `start` makes a state of
     displacements u, and `displacements` gives u.
 
