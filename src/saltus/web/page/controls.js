@@ -170,7 +170,7 @@ export class NumberField {
 
   /** @param {string} message */
   refuse(message) {
-    if (this.refusal) this.refusal.textContent = `${message}. The page still shows ${this.written(this.host.value(this.entry.path))}.`;
+    if (this.refusal) this.refusal.textContent = `${message}. The page still shows ${this.written(this.host.value(this.entry.path))}${this.entry.angle ? (this.inDegrees() ? "°" : " rad") : ""}.`;
     this.text?.setAttribute("aria-invalid", "true");
     this.element.classList.add("refused");
   }

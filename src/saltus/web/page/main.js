@@ -140,6 +140,7 @@ export class Page {
     const degrees = /** @type {HTMLInputElement} */ (at("degrees"));
     degrees.checked = store.state.degrees;
     degrees.addEventListener("change", () => store.set({ degrees: degrees.checked }));
+    at("motion-in-radians").hidden = !description.model.coordinates.some(({ unit }) => unit === "rad");
     at("degrees-row").hidden = !entriesOf(description).some(({ angle }) => angle);
   }
 

@@ -54,10 +54,7 @@ export class PageMotion {
     /** @type {Record<string, Float64Array>} */
     const columns = { time: Float64Array.from(times) };
     const lists = this.names.map((name) => (columns[name] = new Float64Array(times.length)));
-    for (let i = 0; i < times.length; i++) {
-      const state = this.state(/** @type {number} */ (times[i]));
-      for (let k = 0; k < lists.length; k++) /** @type {any} */ (lists[k])[i] = state[k];
-    }
+    this.steps.sample(times, this.time.last, this.end, lists);
     return columns;
   }
 

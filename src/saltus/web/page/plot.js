@@ -13,6 +13,7 @@ import { followGestures } from "./gestures.js";
 
 const THIN = 1.4; // pixels
 const UNSEEN = 0.4; // pixels: points of a curve that are nearer than this to the one before are left out
+const PIECE = 40; // points of a curve that are drawn at once: browsers draw short paths faster
 const FULL = 1e-300; // No window is narrower than rounding allows: see `narrowest`.
 
 /**
@@ -350,6 +351,8 @@ export class Painter {
     ctx.beginPath();
     let open = false;
     let [left, top] = [0, 0];
+    const piece = ctx.canvas && !line.dash?.length ? PIECE : Infinity; // a file has one path, and dashes go on
+    let count = 0;
     for (let i = 0; i < xs.length; i++) {
       const x = clamp(this.x(/** @type {number} */ (xs[i])), -1e5, 1e5);
       const y = clamp(this.y(/** @type {number} */ (ys[i])), -1e5, 1e5);
@@ -357,6 +360,12 @@ export class Painter {
       if (there && open && i < xs.length - 1 && Math.abs(x - left) < UNSEEN && Math.abs(y - top) < UNSEEN) continue;
       if (there && open) ctx.lineTo(x, y);
       else if (there) ctx.moveTo(x, y);
+      if (there && open && ++count === piece) {
+        ctx.stroke();
+        ctx.beginPath();
+        ctx.moveTo(x, y);
+        count = 0;
+      }
       [open, left, top] = [there, x, y];
     }
     ctx.stroke();

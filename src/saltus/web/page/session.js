@@ -11,6 +11,7 @@ import { refusedNumbers } from "./checks.js";
 
 const PER_PERIOD = 144; // samples of a forcing period for the curve in the phase plane
 const LONG = 30; // periods of a motion that is sampled half as closely, to be drawn within a frame
+const OVERVIEW = 900; // samples of the energy over what is seen
 const MOST_SAMPLES = 20000; // of a whole motion: more of them are no longer drawn within a frame
 export const MOST_PERIODS = 2000; // of a motion on the page, which remembers every step of it
 
@@ -29,6 +30,16 @@ export class Session {
     /** Where a number was refused, and the sentence. @type {{where: string, message: string}|null} */
     this.refusal = null;
     this.curve = emptyCurve();
+    /** The section of a motion, which several views ask for. @type {{motion: Motion|null, found: {times: Float64Array, lists: Record<string, Float64Array>}|null}} */
+    this.sectionOf = { motion: null, found: null };
+    /** The kinetic energy over a motion, likewise. @type {{motion: Motion|null, times: Float64Array, found: Float64Array}} */
+    this.energiesOf = { motion: null, times: new Float64Array(0), found: new Float64Array(0) };
+  }
+
+  /** The kinetic energy over the whole motion; NaN where the model has none. @param {Motion} motion */
+  energies(motion) {
+    if (this.energiesOf.motion !== motion) this.energiesOf = { motion, ...energiesBetween(motion, motion.time.first, motion.time.last) };
+    return this.energiesOf;
   }
 
   get coordinates() {
@@ -108,29 +119,28 @@ export class Session {
     const names = this.coordinates.flatMap(({ name, velocity }) => [name, velocity]);
     /** @type {Record<string, Float64Array>} */
     const lists = Object.fromEntries(["time", ...names].map((name) => [name, new Float64Array(size)]));
+    // of each point of the curve: its sample, and the jump before which it is, or -1
+    const [samples, before] = [new Int32Array(size), new Int32Array(size).fill(-1)];
     let [at, next] = [0, 0];
     for (let i = 0; i < times.length; i++) {
-      const time = /** @type {number} */ (times[i]);
-      const jump = jumps[next];
-      if (jump && jump.time === time) {
-        this.put(lists, at++, time, found, i, jump.before);
-        next++;
+      if (next < jumps.length && jumps[next]?.time === times[i]) {
+        samples[at] = i;
+        before[at++] = next++;
       }
-      if (at < size) this.put(lists, at++, time, found, i, null);
+      if (at < size) samples[at++] = i;
     }
-    return { time: /** @type {Float64Array} */ (lists.time).subarray(0, at), lists, length: at };
-  }
-
-  /**
-   * @param {Record<string, Float64Array>} lists @param {number} at @param {number} time
-   * @param {Record<string, Float64Array>} found @param {number} i @param {ArrayLike<number>|null} before
-   */
-  put(lists, at, time, found, i, before) {
-    /** @type {any} */ (lists.time)[at] = time;
+    const copied = (/** @type {Float64Array} */ into, /** @type {ArrayLike<number>} */ from) => {
+      for (let i = 0; i < at; i++) into[i] = from[samples[i] ?? 0] ?? NaN;
+    };
+    const { time = new Float64Array(0) } = lists;
+    copied(time, times);
     this.coordinates.forEach(({ name, velocity }, k) => {
-      /** @type {any} */ (lists[name])[at] = found[name]?.[i];
-      /** @type {any} */ (lists[velocity])[at] = before ? before[k] : found[velocity]?.[i];
+      copied(/** @type {Float64Array} */ (lists[name]), found[name] ?? []);
+      const speeds = /** @type {Float64Array} */ (lists[velocity]);
+      copied(speeds, found[velocity] ?? []);
+      for (let i = 0; i < at; i++) if ((before[i] ?? -1) >= 0) speeds[i] = jumps[before[i] ?? 0]?.before[k] ?? NaN;
     });
+    return { time: time.subarray(0, at), lists, length: at };
   }
 
   /** One column of the sampled curve. @param {string} name */
@@ -150,10 +160,16 @@ export class Session {
   section() {
     const motion = this.motion;
     if (!motion || !this.period) return null;
-    const first = Math.ceil(motion.time.first / this.period - 1e-9);
-    const last = Math.floor(motion.time.last / this.period + 1e-9);
+    if (this.sectionOf.motion !== motion) this.sectionOf = { motion, found: this.sectionAnew(motion, this.period) };
+    return this.sectionOf.found;
+  }
+
+  /** @param {Motion} motion @param {number} period */
+  sectionAnew(motion, period) {
+    const first = Math.ceil(motion.time.first / period - 1e-9);
+    const last = Math.floor(motion.time.last / period + 1e-9);
     const times = new Float64Array(Math.max(last - first + 1, 0)).map((_, i) =>
-      clamp((first + i) * /** @type {number} */ (this.period), motion.time.first, motion.time.last),
+      clamp((first + i) * period, motion.time.first, motion.time.last),
     );
     return { times, lists: motion.sample(times) };
   }
@@ -163,6 +179,12 @@ export class Session {
     if (this.engine.load && this.system) return this.engine.load(this.system, channel, time);
     return plainLoad(this.description, this.store.state.values, channel, time);
   }
+}
+
+/** The kinetic energy at even times. @param {Motion} motion @param {number} from @param {number} to */
+export function energiesBetween(motion, from, to) {
+  const times = new Float64Array(OVERVIEW + 1).map((_, i) => from + ((to - from) * i) / OVERVIEW);
+  return { times, found: times.map((time) => motion.energy?.(time) ?? NaN) };
 }
 
 /** @returns {{time: Float64Array, lists: Record<string, Float64Array>, length: number}} */

@@ -65,11 +65,14 @@ export class Stage {
     const every = Math.ceil(curve.length / MOST_READ) || 1;
     const columns = this.session.coordinates.map(({ name }) => this.session.column(name));
     this.pointReach = 0;
+    const moved = new Float64Array(Math.ceil(curve.length / every));
     for (const { weights } of description.model.points ?? []) {
-      for (let i = 0; i < curve.length; i += every) {
-        const moved = displacement(weights, (k) => columns[k]?.[i] ?? 0);
-        if (Math.abs(moved) > this.pointReach) this.pointReach = Math.abs(moved);
-      }
+      moved.fill(0);
+      weights.forEach((weight, k) => {
+        const column = columns[k] ?? moved;
+        if (weight) for (let i = 0; i < moved.length; i++) moved[i] = (moved[i] ?? 0) + weight * (column[i * every] ?? 0);
+      });
+      for (const each of moved) this.pointReach = Math.max(this.pointReach, Math.abs(each));
     }
   }
 

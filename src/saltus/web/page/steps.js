@@ -75,6 +75,37 @@ export class Steps {
     return state;
   }
 
+  /**
+   * Coordinates and velocities at many times, into a list for each. Times that grow are found by going on from step to step.
+   * @param {ArrayLike<number>} times @param {number} last from this time on the state is `end` @param {ArrayLike<number>} end @param {Float64Array[]} lists
+   */
+  sample(times, last, end, lists) {
+    const { dof, terms, series, starts, count } = this;
+    let step = 0;
+    for (let i = 0; i < times.length; i++) {
+      const time = times[i];
+      if (time >= last || !count) {
+        for (let k = 0; k < 2 * dof; k++) lists[k][i] = end[k];
+        continue;
+      }
+      if (time < starts[step]) step = this.at(time);
+      while (step + 1 < count && starts[step + 1] <= time) step++;
+      const tau = time - starts[step];
+      for (let k = 0; k < dof; k++) {
+        const from = (step * dof + k) * terms;
+        const highest = series[from + terms - 1];
+        let [value, slope] = [highest, highest * (terms - 1)];
+        for (let n = terms - 2; n >= 1; n--) {
+          const coefficient = series[from + n];
+          value = value * tau + coefficient;
+          slope = slope * tau + coefficient * n;
+        }
+        lists[k][i] = value * tau + series[from];
+        lists[dof + k][i] = slope;
+      }
+    }
+  }
+
   /** Coordinates, then velocities, at a time. @param {number} time */
   state(time) {
     const step = this.at(time);

@@ -1,6 +1,7 @@
 /** The four views of a motion: phase plane, time history, stroboscopic section, energy. They share one time and one selection. */
 
 import { allDigits, clamp, rangeOf, shortly } from "./numbers.js";
+import { energiesBetween } from "./session.js";
 import { asText, symbolOf } from "./symbols.js";
 
 /** @typedef {import("./session.js").Session} Session */
@@ -13,7 +14,6 @@ import { asText, symbolOf } from "./symbols.js";
 const MOST_NAMED = 6; // coordinates in a sentence
 const NEAR = 12; // pixels from which a click or the cursor takes hold of a point
 const PER_PIXEL = 3; // samples of a curve over time
-const OVERVIEW = 900; // samples of the energy over what is seen
 const TIME = ["time ", symbolOf("tau")];
 
 /** @param {Session} session */
@@ -52,9 +52,7 @@ export function extremaOf(session) {
     const range = rangeOf([session.column(name)]);
     return range ? [`${called(name)} from ${shortly(range.low, 5)} to ${shortly(range.high, 5)}${unit === "1" ? "" : ` ${unit}`}`] : [];
   });
-  const span = motion.time.last - motion.time.first;
-  const energies = Array.from({ length: OVERVIEW + 1 }, (_, i) => motion.energy?.(motion.time.first + (span * i) / OVERVIEW) ?? NaN);
-  const most = rangeOf([energies])?.high;
+  const most = rangeOf([session.energies(motion).found])?.high;
   return [...shown, ...(most === undefined ? [] : [`kinetic energy up to ${shortly(most, 4)}`])].join("; ");
 }
 
@@ -221,7 +219,8 @@ function strokesOfImpacts(session, painter) {
   const seen = (session.motion?.events ?? []).filter(({ kind, time }) => kind === "impact" && time >= x0 && time <= x1);
   if (seen.length > painter.box.width / 2) return;
   const top = y0 + 0.045 * (y1 - y0);
-  for (const { time } of seen) painter.curve([time, time], [y0, top], { color: painter.palette.ink, width: 0.9 });
+  const times = seen.flatMap(({ time }) => [time, time, NaN]); // one path: many short ones take longer to draw
+  painter.curve(times, times.map((_, i) => (i % 3 ? top : y0)), { color: painter.palette.ink, width: 0.9 });
 }
 
 /** The stroboscopic section. @param {Session} session @param {(time: number) => void} show @returns {View} */
@@ -286,19 +285,7 @@ export function stroboscopic(session, show) {
 
 /** Kinetic energy over time. @param {Session} session @param {(time: number) => void} show @returns {View} */
 export function energyView(session, show) {
-  const over = (/** @type {number} */ from, /** @type {number} */ to, /** @type {number} */ count) => {
-    const energy = session.motion?.energy;
-    const times = new Float64Array(count + 1).map((_, i) => from + ((to - from) * i) / count);
-    const found = times.map((time) => energy?.call(session.motion, time) ?? NaN);
-    return { times, found };
-  };
-  /** @type {{motion: import("./types.js").Motion|null, all: ReturnType<typeof over>|null}} */
-  let kept = { motion: null, all: null };
-  const whole = () => {
-    const { motion } = session;
-    if (motion !== kept.motion) kept = { motion, all: motion && over(motion.time.first, motion.time.last, OVERVIEW) };
-    return kept.all;
-  };
+  const whole = () => (session.motion ? session.energies(session.motion) : null);
   return {
     id: "energy", title: "Kinetic energy", instructions: "A click shows that time.",
     axes: () => ({ x: { name: TIME }, y: { name: ["kinetic energy ", symbolOf("T")], low: undefined } }),
@@ -313,7 +300,7 @@ export function energyView(session, show) {
       const from = clamp(painter.window[0], motion.time.first, motion.time.last);
       const to = clamp(painter.window[1], motion.time.first, motion.time.last);
       const all = from === motion.time.first && to === motion.time.last ? whole() : null;
-      const { times, found } = all ?? over(from, to, OVERVIEW);
+      const { times, found } = all ?? energiesBetween(motion, from, to);
       painter.curve(times, found, { color: painter.palette.stable, width: 1.2 });
       strokesOfImpacts(session, painter);
     },
