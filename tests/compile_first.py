@@ -8,7 +8,11 @@ from functools import partial
 from saltus.continuation import arithmetic
 from saltus.flow.programs.compiled import load_contacts_kernel, load_kernel
 from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
-from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
+from saltus.flow.programs.orbit_segments import (
+    load_contact_equations,
+    load_contact_segments,
+    load_segments,
+)
 from saltus.web.objects import kernel_code
 
 # The kernels that all models share, here and on pages, those that take longest first.
@@ -22,6 +26,7 @@ PARTS = {
     "segments": load_segments,
     "page's kernel": partial(kernel_code, False),
     "arithmetic of curves": arithmetic,
+    "equations for contacts": load_contact_equations,
     "helpers": load_helpers,
     "helpers for contacts": partial(load_helpers, several=True),
 }

@@ -11,7 +11,11 @@ from saltus.continuation import arithmetic
 from saltus.errors import SaltusError
 from saltus.flow.programs.compiled import load_contacts_kernel, load_fillers, load_kernel
 from saltus.flow.programs.compiled_lanes import load_driver, load_helpers
-from saltus.flow.programs.orbit_segments import load_contact_segments, load_segments
+from saltus.flow.programs.orbit_segments import (
+    load_contact_equations,
+    load_contact_segments,
+    load_segments,
+)
 
 # All kernels but those of proofs; what takes longest comes first.
 KERNELS: dict[str, Callable[[], object]] = {
@@ -24,6 +28,7 @@ KERNELS: dict[str, Callable[[], object]] = {
     "orbits of one contact": load_segments,
     "steps along branches": arithmetic,
     "helpers of one contact": load_helpers,
+    "equations of several contacts": load_contact_equations,
     "tables": load_fillers,
 }
 

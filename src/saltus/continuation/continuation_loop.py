@@ -257,10 +257,13 @@ class Continuation:
         """The zeros of the test functions, or of those chosen, that change their signs between two
         points; and the test functions that jump over 0 there.
         """
-        changes = np.sign(a.values) * np.sign(b.values) < 0.0
-        if not any(changes.tolist()):
+        changes = [
+            before < 0.0 < after or after < 0.0 < before
+            for before, after in zip(a.values.tolist(), b.values.tolist(), strict=True)
+        ]
+        if not any(changes):
             return [], []
-        signs = zip(self.trail.tests, changes & chosen, strict=True)
+        signs = zip(self.trail.tests, changes & np.asarray(chosen), strict=True)
         changed = [test for test, sign in signs if sign and test is not self.trail.barrier]
         singular = any(test.singular for test in changed)
         found = []
@@ -278,10 +281,12 @@ class Continuation:
 
     def _on_a_bound(self, point: Any) -> End | None:
         """The end of a curve that starts on a bound and leads beyond it."""
-        tangent = point.tangent[-len(self.bounds) :].tolist()
-        for (name, (low, high)), value, rate in zip(
-            self.bounds.items(), point.parameters.tolist(), tangent, strict=True
-        ):
+        values = point.parameters.tolist()
+        for i, (name, (low, high)) in enumerate(self.bounds.items()):
+            value = values[i]
+            if low < value < high:
+                continue
+            rate = float(point.tangent[i - len(values)])
             if (value <= low and rate < 0.0) or (value >= high and rate > 0.0):
                 return self._bound(name, value)
         return None
@@ -295,8 +300,11 @@ class Continuation:
         """The point on the first bound that a step crosses or reaches, with the end there; an end
         alone if it is not found.
         """
+        length = a.curve.norm(b.place - a.place)
         passed = [
-            crossing for i in range(len(self.bounds)) for crossing in self._crossings(a, b, i)
+            crossing
+            for i, bounds in enumerate(self.bounds.values())
+            for crossing in self._crossings(a, b, i, bounds, length)
         ]
         if not passed:
             return b, self._on_a_bound(b)
@@ -305,16 +313,18 @@ class Continuation:
         index, bound, point = min(passed, key=lambda found: a.curve.norm(found[2].place - a.place))
         return point, self._bound(list(self.bounds)[index], bound)
 
-    def _crossings(self, a: Any, b: Any, i: int) -> list[tuple[int, float, Any]]:
-        """The places at which a step leaves the bounds of a parameter, even if it comes back: the
-        parameter's index, the bound, and the point if it is found."""
+    def _crossings(
+        self, a: Any, b: Any, i: int, bounds: tuple[float, float], length: float
+    ) -> list[tuple[int, float, Any]]:
+        """The places at which a step of a length leaves the bounds of a parameter, even if it comes
+        back: the parameter's index, the bound, and the point if it is found."""
         found: list[tuple[int, float, Any]] = []
         index = i - len(self.bounds)
-        (low, high) = list(self.bounds.values())[i]
+        low, high = bounds
         first = float(a.place[index])
         last = float(b.place[index])
         room = min(first - low, last - low, high - first, high - last)
-        if room * a.curve.weights[index] > a.curve.norm(b.place - a.place):
+        if room * a.curve.weights[index] > length:
             return found  # not even a step that turns round reaches a bound
         turn = turning_point(a, b, index)
         for bound, beyond in zip((low, high), (np.less, np.greater), strict=True):
@@ -334,10 +344,17 @@ class Continuation:
         across = b.place - a.place
         length = b.curve.norm(across)
         # how far the parameters lie off those of the step: `nearest` may take long
-        ends = np.sort([a.parameters, b.parameters], axis=0)
-        off = first.parameters - np.clip(first.parameters, *ends)
-        off *= b.curve.weights[-len(self.bounds) :]
-        if math.hypot(*off.tolist()) > STEPS.closing * length:
+        off = [
+            weight * (value - min(max(value, min(ends)), max(ends)))
+            for weight, value, *ends in zip(
+                b.curve.weights[-len(self.bounds) :].tolist(),
+                first.parameters.tolist(),
+                a.parameters.tolist(),
+                b.parameters.tolist(),
+                strict=True,
+            )
+        ]
+        if math.hypot(*off) > STEPS.closing * length:
             return False
         place = self.events.nearest(first, first.place, b)
         if place is None or length == 0.0:

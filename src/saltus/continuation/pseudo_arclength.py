@@ -142,7 +142,7 @@ def newton(
     """
     place = np.array(guess, dtype=float)
     sizes_of = arithmetic().sizes_of
-    sizes, _ = units.of_unknowns(len(place))
+    sizes, bounded = units.of_unknowns(len(place))
     of_residuals: tuple[np.ndarray, ...] = ()
     for iteration in range(iterations + 1):
         thorough = before <= NEWTON.last or (near and iteration == 0)
@@ -157,7 +157,9 @@ def newton(
         if error <= NEWTON.converged * scale or rounded:
             looked = found if thorough else evaluate(place, True)
             return None if looked is None else Corrected(place, looked, iteration)
-        taken = _step(*linear(found, place), units, place) if error < NEWTON.diverged else None
+        if not error < NEWTON.diverged:
+            return None
+        taken = _step(*linear(found, place), place, sizes, bounded, units.scaled)
         if taken is None:
             return None
         step, moved = taken
@@ -169,19 +171,19 @@ def newton(
 
 
 def _step(
-    matrix: np.ndarray, right: np.ndarray, units: Units, place: np.ndarray
+    matrix: np.ndarray,
+    right: np.ndarray,
+    place: np.ndarray,
+    sizes: np.ndarray,
+    bounded: np.ndarray,
+    scaled: bool,
 ) -> tuple[np.ndarray, float] | None:
     """Newton's step, shortened where it is too long, and its largest component in units; None where
-    there is none.
+    there is none. `sizes` and `bounded` are `Units.of_unknowns`.
     """
     step = np.empty(len(right))
-    moved = arithmetic().newton_step(
-        *as_floats(matrix, right, place),
-        *units.of_unknowns(len(place)),
-        units.scaled,
-        NEWTON.longest,
-        step,
-    )
+    numbers = as_floats(matrix, right, place)
+    moved = arithmetic().newton_step(*numbers, sizes, bounded, scaled, NEWTON.longest, step)
     return None if math.isnan(moved) else (step, moved)
 
 
@@ -279,10 +281,11 @@ class EquationCurve(Curve[P]):
         right = bordered(found, 0.0)
         matrix = bordered(self.derivatives_at(point), normal)
         units = self.units_at(guess)
+        sizes = units.of_unknowns(len(guess))
         error = units.residual(found)
         for _ in range(self.iterations_at):
             near = not NEWTON.converged < error < NEWTON.diverged
-            taken = None if near else _step(matrix, -right, units, place)
+            taken = None if near else _step(matrix, -right, place, *sizes, units.scaled)
             if taken is None or self.norm(place + taken[0] - guess) > reach:
                 break
             step = taken[0]

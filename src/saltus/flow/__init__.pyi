@@ -75,4 +75,5 @@ from .programs.compiled import program as program
 from .programs.lane_threads import available_cores as available_cores
 from .programs.lane_threads import share_cores as share_cores
 from .programs.orbit_segments import SegmentFollower as SegmentFollower
+from .programs.orbit_segments import load_contact_equations as load_contact_equations
 from .programs.orbit_segments import load_segments as load_segments

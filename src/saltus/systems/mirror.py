@@ -98,10 +98,10 @@ class Mirror:
         directions
             The differences.
         """
-        return np.asarray(-np.take(directions, self._of_state, axis=-1))
+        return np.asarray(-np.take(directions, self.places_of_state, axis=-1))
 
     @cached_property
-    def _of_state(self) -> np.ndarray:
+    def places_of_state(self) -> np.ndarray:
         """For each number of an image's state, the place of the original one."""
         n = len(self.places)
         return np.array([*self.places, *(n + place for place in self.places)])

@@ -10,7 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from saltus.flow.contacts import complementarity, extremes, held_rows, propagators, rows, tangent
+from saltus.flow.contacts import (
+    complementarity,
+    extremes,
+    held_rows,
+    orbit_equations,
+    propagators,
+    rows,
+    tangent,
+)
 from saltus.flow.contacts import impacts as contact_impacts
 from saltus.flow.contacts import segments as contact_segments
 from saltus.flow.kernel import contact_layout, layout, roots, steps
@@ -51,6 +59,15 @@ def load_contact_segments() -> Callable[..., int]:
             "contact_segments", kernel_text(layout, roots, steps, *parts)
         ).follow_contact_segments
     )
+
+
+@cache
+def load_contact_equations() -> Callable[..., None]:
+    """The function that makes the equations of orbits with several contacts of their segments,
+    `contact_equations` of `contacts/orbit_equations.py`.
+    """
+    text = kernel_text(contact_layout, orbit_equations)
+    return entry_point(load_module("contact_equations", text).contact_equations)
 
 
 class SegmentFollower:

@@ -28,6 +28,7 @@ from saltus.flow import (
     SegmentEnd,
     SegmentExtremes,
     SegmentPlan,
+    load_contact_equations,
 )
 from saltus.orbits.beyond.orbit_curve import (
     GRAZING,
@@ -356,12 +357,18 @@ class ContactsEquations(OrbitEquations):
         Events at one instant of contacts that do not act on one another stay together along a
         branch, as those of cells that move alike: the time between them is rounding.
         """
-        phases = self.split(solution.unknowns)[1]
-        apart = np.diff(np.append(phases, phases[:1] + self.closing))
-        alike = self._independent & (np.abs(apart) <= ONE_INSTANT * self.closing)
-        apart = apart[~alike]
+        phases = solution.unknowns[len(self._free) :].tolist()
+        following = [*phases[1:], *(phase + self.closing for phase in phases[:1])]
+        together = ONE_INSTANT * self.closing
+        apart = [
+            later - phase
+            for phase, later, independent in zip(
+                phases, following, self._independent.tolist(), strict=True
+            )
+            if not (independent and abs(later - phase) <= together)
+        ]
         evaluation: Any = solution.evaluation
-        return float(min(evaluation.seen[:, PRESSING].min(), apart.min(initial=math.inf)))
+        return float(min(evaluation.seen.take(PRESSING, axis=1).min(), *apart, math.inf))
 
     def covered(self, solution: Solution) -> int | None:
         signature = self.signature
@@ -710,96 +717,41 @@ class ContactsEquations(OrbitEquations):
     ) -> ContactsEvaluation:
         """The residual and its derivatives, by the chain rule from segment to segment; `end` is the
         state asked for at the end.
-
-        Columns are the state at the start, the phases, the phase of the first event a period later,
-        and the parameters.
         """
         own = self.own
-        free = self._free
-        events = len(self.signature.events)
-        first = len(free)
-        end_phase = first + events
-        parameters = first + events + 1
-        slope = self._slope_at_start.copy()
-        guards = ends[:events, SegmentEnd.GUARD]
-        rows = np.zeros((events, slope.shape[1]))
-        by_start, by_end = self._by_phases(ends, columns, frequency)
-        if self._place_of_frequency >= 0:
-            by_frequency = by_start * times[:-1, None] + by_end * times[1:, None]
-        for s in range(len(ends)):
-            before = columns[s] @ slope
-            if events:
-                before[:, first + s] += by_start[s]
-                before[:, first + s + 1] += by_end[s]
-            if self._place_of_frequency >= 0:
-                before[:, parameters + self._place_of_frequency] -= by_frequency[s]
-            slope[: 2 * own] = before[:-1]
-            if events:
-                rows[s] = before[-1]
-                slope[: 2 * own] = maps[s] @ slope
-        slope = slope[: 2 * own]
-        last = SegmentEnd.NUMBERS + (8 if events else 4) * own
-        after = ends[-1, last : last + 2 * own]
-        if self.signature.symmetric:
-            slope, after = (
-                self.turned(slope.T).T,
-                self.image_of(after),
-            )
-        total = np.concatenate([rows, slope[free]])
-        here = total[:, :end_phase]
-        there = self._state_asked_for.copy()
-        if events:
-            there[:, first] = total[:, end_phase]
-        residual = np.concatenate([guards, (after - end)[free]])
+        size = self.size
+        count = len(self.paths)
+        residual = np.zeros(size)
+        here = np.zeros((size, size))
+        there = np.zeros((size, size))
+        parameters = np.zeros((size, count))
+        closed_by = (*self._image, frequency, self._place_of_frequency)
+        load_contact_equations()(
+            (self._free, times, end, *closed_by),
+            (ends, columns, maps, seen),
+            (residual, here, there, parameters),
+        )
+        rates = ends[0, SegmentEnd.NUMBERS + 2 * own : SegmentEnd.NUMBERS + 4 * own]
         return ContactsEvaluation(
             residual,
             here,
             there,
-            total[:, parameters:],
+            parameters,
             ends,
             self._extremes(seen),
             seen,
-            first,
-            ends[0, SegmentEnd.NUMBERS + 2 * own : SegmentEnd.NUMBERS + 4 * own][free] / frequency,
+            len(self._free),
+            rates[self._free] / frequency,
         )
 
     @cached_property
-    def _slope_at_start(self) -> np.ndarray:
-        """The derivatives of the state at the start and, below them, of the parameters, in the
-        columns of `_assembled`."""
-        free = self._free
-        count = len(self.paths)
-        parameters = self.size + 1
-        slope = np.zeros((2 * self.own + count, parameters + count))
-        slope[free, np.arange(len(free))] = 1.0
-        slope[2 * self.own :, parameters:] = np.eye(count)
-        return slope
-
-    @cached_property
-    def _state_asked_for(self) -> np.ndarray:
-        """The derivatives of the equations to the unknowns a period later, but for those to the
-        phase of the first event."""
-        events = len(self.signature.events)
-        there = np.zeros((self.size, self.size))
-        there[events:, : self.size - events] = -np.eye(self.size - events)
-        return there
-
-    def _by_phases(
-        self, ends: np.ndarray, columns: np.ndarray, frequency: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The derivatives of each segment's last state and guard to the phases of its start and of
-        its end, (n, 2 own + 1) each.
-        """
-        own = self.own
-        numbers = ends[:, SegmentEnd.NUMBERS :]
-        by_start = np.empty((len(ends), 2 * own + 1))
-        by_end = np.empty((len(ends), 2 * own + 1))
-        rates = numbers[:, 2 * own : 4 * own, None]
-        by_start[:, :-1] = -(columns[:, :-1, : 2 * own] @ rates)[:, :, 0]
-        by_start[:, -1] = ends[:, SegmentEnd.BY_START]
-        by_end[:, :-1] = numbers[:, 6 * own : 8 * own]
-        by_end[:, -1] = ends[:, SegmentEnd.BY_END]
-        return by_start / frequency, by_end / frequency
+    def _image(self) -> tuple[np.ndarray, np.ndarray]:
+        """The mirror image that closes an orbit, as `contact_equations` takes it; empty arrays
+        without one."""
+        if not self.signature.symmetric:
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        assert self.mirror is not None, "asked for where the symmetry is known alone"
+        return self.mirror.places_of_state, self.mirror.of(np.zeros(2 * self.own))
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
         """The extremes along the segments, in the columns that orbits with one contact use
