@@ -651,16 +651,35 @@ def in_mode(motion, rows, states):
 
 @lean_jit
 def add_modes(motion, factors, states, order, series):
-    """Fill a series with a sum of eigenmodes."""
+    """Fill a series with a sum of eigenmodes; four of them at a time, so that the series is read and
+    written a quarter as often.
+    """
     table = motion.eigenmodes
     for k in range(order + 2):
         series[k] = 0.0
-    for j in range(states):
-        factor = table[factors + j]
-        mode = motion.mode_series[j]
-        if factor != 0.0:
+    j = 0
+    while j + 4 <= states:
+        one = table[factors + j]
+        two = table[factors + j + 1]
+        three = table[factors + j + 2]
+        four = table[factors + j + 3]
+        if one != 0.0 or two != 0.0 or three != 0.0 or four != 0.0:
+            first = motion.mode_series[j]
+            second = motion.mode_series[j + 1]
+            third = motion.mode_series[j + 2]
+            fourth = motion.mode_series[j + 3]
             for k in range(order + 2):
-                series[k] += factor * mode[k]
+                total = series[k] + one * first[k]
+                total = total + two * second[k]
+                total = total + three * third[k]
+                series[k] = total + four * fourth[k]
+        j += 4
+    while j < states:
+        one = table[factors + j]
+        mode = motion.mode_series[j]
+        for k in range(order + 2):
+            series[k] += one * mode[k]
+        j += 1
 
 
 @lean_jit
