@@ -17,14 +17,16 @@ import logging
 import os
 import shutil
 import stat
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import is_dataclass
 from functools import cache
 from importlib.abc import InspectLoader
 from pathlib import Path
-from types import FunctionType, ModuleType
-from typing import Any, cast
+from types import CodeType, FunctionType, ModuleType, NoneType, SimpleNamespace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -34,6 +36,10 @@ from saltus.systems import Record, System, children, is_number
 
 NOBODY = 65534  # the user to whom, inside a container, the files of the superuser outside belong
 DIGEST = hashlib.sha256().digest_size  # bytes
+# of values that a model's methods read from elsewhere: how far into containers they are compared
+DEEPEST = 4
+RUN_BY_PYTHON = frozenset({"__post_init__", "__getattr__", "__getattribute__", "__call__"})
+PLAIN = frozenset({float, int, bool, str, complex, NoneType})
 # Code is known while it is still being loaded or compiled: other threads wait for it.
 loading = threading.RLock()
 log = logging.getLogger("saltus.cache")
@@ -238,16 +244,53 @@ def structure_key(system: System) -> Any:
 
 def _spaces(node: Any) -> Iterator[tuple[Mapping[str, Any], str]]:
     parts: dict[str, Any] = {} if isinstance(node, Record) else children(node)
-    kind: Any = type(node)
-    if parts:
-        yield from _outside(kind)
+    yield from _outside(type(node))
     for part in parts.values():
         if type(part) is not float:
             yield from _spaces(part)
 
 
 def _values(spaces: tuple[tuple[Mapping[str, Any], str], ...]) -> tuple[Any, ...]:
-    return tuple(space.get(name) for space, name in spaces)
+    return tuple(_content(space.get(name)) for space, name in spaces)
+
+
+class _Itself:
+    """An object that equals itself alone, whatever its class says of equality."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value  # kept, so that no other object takes its place in memory
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and other.value is self.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
+def _content(value: Any, depth: int = 0) -> Any:
+    """What a trace may contain of a value that methods read: numbers and texts, what containers,
+    arrays and simple objects hold, and else which object it is.
+    """
+    kind = type(value)
+    equality: Any = kind.__eq__
+    if kind in PLAIN or equality is object.__eq__:
+        return value
+    if depth == DEEPEST:
+        return _Itself(value)
+    if kind in (tuple, list):
+        return kind, tuple([_content(entry, depth + 1) for entry in value])
+    if kind is dict:
+        return kind, tuple([(key, _content(entry, depth + 1)) for key, entry in value.items()])
+    if isinstance(value, (np.ndarray, np.generic)) and value.dtype != object:
+        return kind, value.shape, value.dtype.str, value.tobytes()
+    if kind is SimpleNamespace or _may_change(kind):
+        return kind, _content(vars(value), depth + 1)
+    return _Itself(value)
+
+
+def _may_change(kind: type) -> bool:
+    """Whether objects of a class are dataclasses whose fields can be replaced."""
+    return is_dataclass(kind) and not kind.__dataclass_params__.frozen  # type: ignore[attr-defined]
 
 
 def _key(node: Any) -> Any:
@@ -268,42 +311,117 @@ def _key(node: Any) -> Any:
         return float
     if isinstance(node, np.ndarray):
         return node.shape, node.dtype.str, node.tobytes()
-    if type(node).__hash__ is None:
+    if kind.__hash__ is None:
         raise ParameterError(
             f"a field of a model must be a number, an array or a tuple, got a "
-            f"{type(node).__name__}, {node!r}"
+            f"{kind.__name__}, {node!r}"
         )
-    return node
+    outside = _outside(kind)
+    return (node, _values(outside)) if outside else node
+
+
+class _Read(NamedTuple):
+    """The names that the methods of a class read, and the functions in which they were found."""
+
+    spaces: tuple[tuple[Mapping[str, Any], str], ...]
+    functions: tuple[tuple[Mapping[str, Any], str, FunctionType], ...]
+
+
+class _Cells(Mapping[str, Any]):
+    """The values that a function closes over, by name."""
+
+    def __init__(self, function: FunctionType) -> None:
+        cells = function.__closure__ or ()
+        self._cells = dict(zip(function.__code__.co_freevars, cells, strict=True))
+
+    def __getitem__(self, name: str) -> Any:
+        try:
+            return self._cells[name].cell_contents
+        except ValueError:  # it is given a value later
+            return None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._cells)
+
+    def __len__(self) -> int:
+        return len(self._cells)
+
+
+_read: dict[type, _Read] = {}  # of the classes of users
+
+
+def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
+    """The names and namespaces of values that the methods of a user's class read from its module or
+    class; a trace contains these values. They are looked for again where a function that reads
+    them was replaced.
+    """
+    read = _read.get(cls)
+    if read is None or any(space.get(name) is not f for space, name, f in read.functions):
+        read = _read[cls] = _names_read(cls)
+    return read.spaces
+
+
+def _names_read(cls: type) -> _Read:
+    spaces: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
+    functions: list[tuple[Mapping[str, Any], str, FunctionType]] = []
+    waiting = list[Any]()
+    seen: set[int] = set()
+
+    def note(space: Mapping[str, Any], name: str) -> None:
+        value = space[name]
+        if (id(space), name) in spaces:
+            return
+        spaces[id(space), name] = space, name
+        if isinstance(value, FunctionType):
+            functions.append((space, name, value))
+        waiting.append(value)
+
+    for owner in cls.__mro__:
+        if owner.__module__.partition(".")[0] in ("saltus", "builtins"):
+            continue
+        attributes = vars(owner)
+        for name in attributes:
+            # what else Python adds to a class says nothing about what its methods do
+            if not name.startswith("__") or name in RUN_BY_PYTHON:
+                note(attributes, name)
+    while waiting:
+        value = waiting.pop()
+        function = getattr(value, "fget", None) or getattr(value, "__func__", value)
+        if (
+            not isinstance(function, FunctionType)
+            or id(function) in seen
+            or _is_installed(function.__module__)
+        ):
+            continue
+        seen.add(id(function))
+        cells = _Cells(function)
+        for name in cells:
+            note(cells, name)
+        space = function.__globals__
+        names = _names_in(function.__code__)
+        for name in names & space.keys():
+            value = space[name]
+            if not isinstance(value, ModuleType):
+                note(space, name)
+            elif not _is_installed(value.__name__):
+                for attribute in names & vars(value).keys():
+                    note(vars(value), attribute)
+    return _Read(tuple(spaces.values()), tuple(functions))
+
+
+def _names_in(code: CodeType) -> set[str]:
+    """The names of globals and of attributes in code, and in that of functions inside of it."""
+    inner = [part for part in code.co_consts if isinstance(part, CodeType)]
+    return set(code.co_names).union(*map(_names_in, inner))
 
 
 @cache
-def _outside(cls: type) -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """The names and namespaces of values that the methods of a user's class read from its module or
-    class; a trace contains these values."""
-    found: dict[tuple[int, str], tuple[Mapping[str, Any], str]] = {}
-    owners = [
-        owner
-        for owner in cls.__mro__
-        if owner.__module__.partition(".")[0] not in ("saltus", "builtins")
-    ]
-    waiting = [value for owner in owners for value in vars(owner).values()]
-    seen: set[int] = set()
-    for owner in owners:
-        found |= {
-            (id(owner), name): (vars(owner), name)
-            for name, value in vars(owner).items()
-            if is_number(value)
-        }
-    while waiting:
-        function = getattr(waiting[-1], "fget", None) or getattr(
-            waiting[-1], "__func__", waiting[-1]
-        )
-        waiting.pop()
-        if not isinstance(function, FunctionType) or id(function) in seen:
-            continue
-        seen.add(id(function))
-        space = function.__globals__
-        named = [name for name in function.__code__.co_names if name in space]
-        found |= {(id(space), name): (space, name) for name in named if is_number(space[name])}
-        waiting += [space[name] for name in named]  # functions that it calls
-    return tuple(found.values())
+def _is_installed(module: str | None) -> bool:
+    """Whether a module is of saltus, of Python or of an installed package, and so never changes."""
+    root = (module or "__main__").partition(".")[0]
+    if root == "__main__":
+        return False
+    if root in sys.stdlib_module_names or root == "saltus":
+        return True
+    file = getattr(sys.modules.get(root), "__file__", None)
+    return file is not None and not {"site-packages", "dist-packages"}.isdisjoint(Path(file).parts)
