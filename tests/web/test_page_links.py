@@ -5,7 +5,9 @@ These tests need no browser and no node: what a page lacks is read from what the
 """
 
 import os
+from pathlib import Path
 
+import numba
 import pytest
 from what_works.model_classes import NAMES, model_class, system_of
 from what_works.refused import REFUSED
@@ -31,6 +33,14 @@ def test_a_kernel_of_the_page_calls_nothing_that_is_not_in_it(kernel):
     imported = _imports(objects.kernel_code(KERNELS[kernel]))
     assert imported
     assert imported <= SHARED
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_kernel_of_the_page_names_no_folder_of_this_machine(kernel):
+    """Where numba lies is in its exceptions, one of them of `int_power`."""
+    code = objects.kernel_code(KERNELS[kernel])
+    assert str(Path(numba.__file__).parent).encode() not in code
+    assert b"numbers.py" not in code
 
 
 @pytest.mark.parametrize("name", NAMES)

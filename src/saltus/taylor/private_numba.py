@@ -36,6 +36,7 @@ import importlib
 import io
 import os
 import pickle
+import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -181,7 +182,24 @@ def llvm_of(function: Any, signature: Any) -> tuple[str, str]:
     (result,) = dispatcher.overloads.values()
     with _private("numba.core.compiler_lock", "global_compiler_lock"):
         result.library._ensure_finalized()
-    return result.library.get_llvm_str(), result.fndesc.llvm_func_name
+    return _without_places(result.library.get_llvm_str()), result.fndesc.llvm_func_name
+
+
+# what numba writes of an exception: its pickled bytes, their digest, and their number
+_PICKLED = re.compile(
+    r'(@\.const\.pickledata\.\S+ = internal constant )\[\d+ x i8\] c"(?:[^"\\]|\\..)*"'
+)
+_PICKLED_LENGTH = re.compile(
+    r"(@\.const\.picklebuf\.\S+ = internal constant \{ ptr, i32, ptr, ptr, i32 \} \{ ptr \S+ i32 )\d+"
+)
+
+
+def _without_places(text: str) -> str:
+    """LLVM's text without the contents of exceptions, which name the folders of this machine.
+    What is not Python never reads them, and knows an exception by its status.
+    """
+    text = _PICKLED.sub(r"\1[1 x i8] zeroinitializer", text)
+    return _PICKLED_LENGTH.sub(r"\g<1>1", text)
 
 
 def value_type(kind: Any) -> Any:

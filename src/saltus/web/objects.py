@@ -189,6 +189,7 @@ def kernel_code(several: bool) -> bytes:
         PortableKernel(several).source,
         source_of(elementary),
         source_of(portable_text),
+        source_of(sys.modules[llvm_of.__module__]),
         source_of(sys.modules[__name__]),
     ]
     return kept_bytes(
