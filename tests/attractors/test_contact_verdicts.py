@@ -164,7 +164,13 @@ def test_a_chain_of_equal_cells_is_classified_and_ends_on_the_orbit_of_one_of_th
         theta_2=0.0,
     )
     assert (str(verdict.kind), verdict.period) == ("periodic", alone.period)
-    assert verdict.orbit.amplitude == pytest.approx(alone.amplitude, abs=1e-9)
+    # `amplitude` is of the displacement that the load drives: in the chain the upper one alone
+    for layer, name in (("lower", "theta_1"), ("upper", "theta_2")):
+        for side in ("largest", "smallest"):
+            expected = alone.quantity(f"{side}_{name}")
+            for cell in range(1, cells + 1):
+                found = verdict.orbit.quantity(f"{side}_{layer}_{cell}")
+                assert found == pytest.approx(expected, abs=1e-9)
     assert verdict.orbit.signature.impact_count == cells * alone.signature.impact_count
     if coupling == 0.0:  # every cell adds the multipliers of its own
         moduli = np.sort(np.abs(verdict.orbit.multipliers))[-cells:]

@@ -144,6 +144,14 @@ class NoDataclass(ContactModel):
     force = pulled
 
 
+class OwnInit(ContactModel):
+    coordinates = ("x",)
+    force = pulled
+
+    def __init__(self, stiffness=1.0):
+        self.stiffness = stiffness
+
+
 UNIT = [[1.0, 0.0], [0.0, 1.0]]
 
 
@@ -163,6 +171,10 @@ UNIT = [[1.0, 0.0], [0.0, 1.0]]
                 r"NoDataclass is not a dataclass, so stiffness would not be a parameter: write "
                 r"@dataclass\(frozen"
             ),
+        ),
+        (
+            OwnInit(),
+            r"OwnInit is not a dataclass, so stiffness .* such as stiffness: float, in place of",
         ),
         (
             with_two(UNIT, lambda self, t, q, v, load: (1.0, 2.0, 3.0)),

@@ -80,6 +80,7 @@ def check_works(model: Model) -> bool:
     sums = False
     if type(model) not in _known:
         _check_class(type(model))
+        _check_attributes(model)
     if model.first_order or type(model) not in _known:
         _check_first_order(model)
     if isinstance(model, OneContactModel):
@@ -156,6 +157,27 @@ def _check_class(kind: type[Model]) -> None:
         for name, function in vars(base).items():
             if isinstance(function, FunctionType) and not name.startswith("_"):
                 _check_arguments(kind, name, function)
+
+
+def _check_attributes(model: Model) -> None:
+    """Refuse numbers that a class of its own `__init__` keeps: they are no parameters, and are in no
+    file.
+    """
+    kind = type(model)
+    if getattr(kind, "__dataclass_fields__", {}):
+        return
+    lost = [
+        name
+        for name in getattr(model, "__dict__", {})
+        if not name.startswith("_") and not hasattr(kind, name)
+    ]
+    if lost:
+        raise ParameterError(
+            f"{kind.__name__} is not a dataclass, so {', '.join(lost)} would not be a parameter:"
+            f" write @dataclass(frozen=True, kw_only=True) above class {kind.__name__}, and its"
+            f" numbers as fields, such as {lost[0]}: float, in place of __init__",
+            "model",
+        )
 
 
 def _check_fields(kind: type[Model]) -> None:
