@@ -336,7 +336,7 @@ def good(made):
         ),
         "SwitchedForce.factor": (
             saltus.SwitchedForce(name="damper", coordinate="x", surface="valve").factor,
-            {"side": 1.0},
+            {"s": 1.0},
         ),
         "Friction": (saltus.Friction, {"name": "belt", "coordinate": "x", "kinetic": 0.2}),
         "Friction.coefficient": (

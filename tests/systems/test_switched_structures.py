@@ -41,15 +41,20 @@ def structure(**more):
         },
         "switched": [
             saltus.SwitchedForce(
-                name="damper", coordinate=3, surface="valve", function="rate", on=-0.8, off=-0.05
+                name="damper",
+                coordinate=3,
+                surface="valve",
+                function="rate",
+                factor_on=-0.8,
+                factor_off=-0.05,
             ),
             saltus.SwitchedForce(
                 name="shock",
                 coordinate={1: 1.0, 0: -1.0},
                 surface="rebound",
                 function="stretching",
-                on=-0.6,
-                off=-0.1,
+                factor_on=-0.6,
+                factor_off=-0.1,
             ),
         ],
     }
@@ -121,8 +126,8 @@ def test_motions_and_derivatives_are_those_of_the_class():
         parameters=[
             "load.frequency",
             "model.functions.high.constant",
-            "model.switched.damper.on",
-            "model.switched.shock.on",
+            "model.switched.damper.factor_on",
+            "model.switched.shock.factor_on",
         ],
     )
     written = saltus.sensitivities(
@@ -209,9 +214,11 @@ def test_an_on_off_damper_is_that_of_dop853_with_events():
         },
         switched=[
             saltus.SwitchedForce(
-                name="damper", coordinate="seat", surface="skyhook", function="rate", on=-0.9
+                name="damper", coordinate="seat", surface="skyhook", function="rate", factor_on=-0.9
             ),
-            saltus.SwitchedForce(name="bias", coordinate=0, surface="skyhook", on=0.02, off=-0.02),
+            saltus.SwitchedForce(
+                name="bias", coordinate=0, surface="skyhook", factor_on=0.02, factor_off=-0.02
+            ),
         ],
     )
     system = saltus.System(model=model, load=LOAD)
@@ -265,7 +272,7 @@ def test_a_skyhook_is_a_product_of_speeds():
                 coordinate={"x": 1.0, "y": -1.0},
                 surface="skyhook",
                 function="slip",
-                on=-0.8,
+                factor_on=-0.8,
             )
         ],
     )
@@ -322,7 +329,9 @@ def test_a_motion_slides_along_a_function_as_dry_friction_does():
         surfaces=[saltus.Surface(name="moves", function="rate")],
         functions={"rate": {"x2_velocity": 1.0}},
         switched=[
-            saltus.SwitchedForce(name="rub", coordinate=2, surface="moves", on=-0.2, off=0.2)
+            saltus.SwitchedForce(
+                name="rub", coordinate=2, surface="moves", factor_on=-0.2, factor_off=0.2
+            )
         ],
     )
     rubbing = saltus.Structure(
@@ -332,7 +341,7 @@ def test_a_motion_slides_along_a_function_as_dry_friction_does():
     )
     found = []
     for model, path in (
-        (switched, "model.switched.rub.on"),
+        (switched, "model.switched.rub.factor_on"),
         (rubbing, "model.friction.rub.kinetic"),
     ):
         derivatives = saltus.sensitivities(
@@ -351,7 +360,9 @@ def test_a_motion_slides_along_a_function_as_dry_friction_does():
     assert np.abs(np.subtract(*changes)).max() < 1e-9
 
 
-@pytest.mark.parametrize("path", ["model.functions.high.constant", "model.switched.shock.on"])
+@pytest.mark.parametrize(
+    "path", ["model.functions.high.constant", "model.switched.shock.factor_on"]
+)
 def test_numbers_of_functions_and_forces_have_paths(path):
     model = structure()
     system = saltus.System(model=model, load=LOAD)
@@ -408,7 +419,7 @@ def test_a_switch_without_effect_changes_nothing():
         functions={"high": HIGH, "low": LOW, "rate": {"x3_velocity": 1.0}},
         switched=[
             saltus.SwitchedForce(
-                name="damper", coordinate=3, surface="valve", function="rate", on=0.0
+                name="damper", coordinate=3, surface="valve", function="rate", factor_on=0.0
             )
         ],
     )
@@ -438,7 +449,7 @@ def test_a_reduced_structure_of_all_modes_is_the_whole_one():
         },
         "switched": [
             saltus.SwitchedForce(
-                name="damper", coordinate="tip", surface="valve", function="rate", on=-0.8
+                name="damper", coordinate="tip", surface="valve", function="rate", factor_on=-0.8
             )
         ],
         "points": {"tip": {3: 1.0, 2: -1.0}},
@@ -521,8 +532,8 @@ def test_what_is_no_switched_structure_is_refused(sentence):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"on": "much"}, "on of the switched force 'damper' must be a finite number"),
-        ({"off": np.inf}, "off of the switched force 'damper' must be"),
+        ({"factor_on": "much"}, "factor_on of the switched force 'damper' must be a finite number"),
+        ({"factor_off": np.inf}, "factor_off of the switched force 'damper' must be"),
         ({"surface": 3}, "surface of a SwitchedForce must be a text, got 3"),
         ({"name": ""}, "name of a SwitchedForce must be a text, got ''"),
         ({"function": 1.0}, "function of a SwitchedForce must be a text, got 1.0"),

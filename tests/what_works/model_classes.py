@@ -380,7 +380,7 @@ def _structure_with_relay() -> System:
         },
         switched=[
             saltus.SwitchedForce(
-                name="damper", coordinate="c", surface="valve", function="rate", on=-0.6
+                name="damper", coordinate="c", surface="valve", function="rate", factor_on=-0.6
             )
         ],
     )
@@ -399,8 +399,8 @@ def _structure_with_function() -> System:
                 coordinate="strut",
                 surface="bump",
                 function="closing",
-                on=0.1,
-                off=0.6,
+                factor_on=0.1,
+                factor_off=0.6,
             )
         ],
     )
@@ -512,7 +512,7 @@ CLASSES = (
         "`Structure` with a surface of velocities and a switched force",
         _structure_with_function,
         {"displacement": (0.1, 0.0, 0.0)},
-        "model.switched.damper.off",
+        "model.switched.damper.factor_off",
         "strut",
     ),
     ModelClass(

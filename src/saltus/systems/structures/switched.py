@@ -29,10 +29,10 @@ class SwitchedForce:
     """A force of a `Structure` on a displacement d, which is switched by the side s of a surface or
     a relay:
 
-        F = on f(t, u, u')    while s = +1,    F = off f(t, u, u')    while s = -1.
+        F = factor_on f(t, u, u')  while s = +1,    F = factor_off f(t, u, u')  while s = -1.
 
     f is one of the structure's `functions`, or 1. F acts along d: its work is F d'. A damper of a
-    rate c that acts while s = +1 has the function {"d_velocity": 1.0} and `on` = -c.
+    rate c that acts while s = +1 has the function {"d_velocity": 1.0} and `factor_on` = -c.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ class SwitchedForce:
         The name of the `Surface` or the `Relay` whose side switches it.
     function
         The name of f; by default f = 1.
-    on, off
+    factor_on, factor_off
         The factors on the sides +1 and -1.
 
     Examples
     --------
-    >>> brake = saltus.SwitchedForce(name="brake", coordinate=0, surface="valve", function="rate", on=-0.4)
+    >>> brake = saltus.SwitchedForce(name="brake", coordinate=0, surface="valve", function="rate", factor_on=-0.4)
     >>> brake.factor(-1.0)
     0.0
     """
@@ -58,8 +58,8 @@ class SwitchedForce:
     coordinate: Any
     surface: str
     function: str | None = None
-    on: Any = 1.0
-    off: Any = 0.0
+    factor_on: Any = 1.0
+    factor_off: Any = 0.0
 
     def __post_init__(self) -> None:
         texts = {"name": self.name, "surface": self.surface}
@@ -70,7 +70,7 @@ class SwitchedForce:
                 raise ParameterError(
                     f"{field} of a SwitchedForce must be a text, got {shown(value)}", field
                 )
-        for field in ("on", "off"):
+        for field in ("factor_on", "factor_off"):
             try:
                 check_number(field, getattr(self, field))
             except ParameterError as error:
@@ -79,16 +79,16 @@ class SwitchedForce:
                     f"{field} of the switched force {self.name!r}{sentence}", field
                 ) from None
 
-    def factor(self, side: Any) -> Any:
+    def factor(self, s: Any) -> Any:
         """The factor on a side; between the two, where a motion slides along the surface, in
         between.
 
         Parameters
         ----------
-        side
-            s, from -1 to +1.
+        s
+            The side, from -1 to +1.
         """
-        return 0.5 * ((self.on + self.off) + side * (self.on - self.off))
+        return 0.5 * ((self.factor_on + self.factor_off) + s * (self.factor_on - self.factor_off))
 
 
 class NamedNumbers(Factors):
