@@ -170,6 +170,26 @@ def test_a_number_without_influence_is_named():
     assert np.isfinite(found.errors["model.damping"])
 
 
+@pytest.mark.parametrize("sigma", [None, 0.01])
+def test_data_in_other_units_are_said_to_be_missed(sigma):
+    """Angles in thousandths of a radian: no number makes the motion a thousand times as large."""
+    data = record(count=60, duration=3.0, sigma=1e-4)
+    data = saltus.Measurement(
+        start=data.start, time=data.time, values={"theta": 1e3 * data.values["theta"]}, sigma=sigma
+    )
+    found = saltus.fit(CELL, data, {"impact.e": (0.6, 1.0)}, starts=1)
+    assert "explains next to nothing of theta" in found.remarks[0]
+    assert "units" in found.remarks[0]
+    if sigma is None:  # what is missed counts as noise, beside which all numbers look alike
+        assert not any("the data say nothing" in sentence for sentence in found.remarks)
+
+
+def test_noise_above_the_signal_is_not_said_to_be_missed():
+    data = record(count=60, duration=3.0, sigma=3.0)
+    found = saltus.fit(CELL, data, {"impact.e": (0.6, 1.0)}, starts=1)
+    assert not any("next to nothing" in sentence for sentence in found.remarks)
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [

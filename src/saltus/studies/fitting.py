@@ -17,6 +17,7 @@ from saltus.flow import state_names
 from saltus.progress import Progress, html_table, silent
 from saltus.result import Result, result_dataset
 from saltus.studies.measured_motions import (
+    IMPACTS,
     START,
     Compared,
     Function,
@@ -41,6 +42,10 @@ class FitSettings:
     good: float = 2.0  # chi^2 per degree of freedom below which no further start is tried.
     # The share of an unknown in a direction from which on a sentence about the direction names it.
     named: float = 0.1
+    # The share of a quantity's variation that a motion may leave before a sentence says so.
+    left: float = 0.9
+    # so many standard deviations of the noise may be left in any case
+    noisy: float = 3.0
 
 
 FIT = FitSettings()
@@ -566,7 +571,10 @@ def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
     covariance[blind] = np.nan
     covariance[:, blind] = np.nan
     covariance[blind, blind] = np.inf
-    remarks = [_blind_sentence(names, row * scale, row) for row in rows[~known]]
+    remarks = _missed(comparison, _noise_known(search))
+    # where the motion misses the data, what it misses counts as their noise
+    if not remarks or _noise_known(search):
+        remarks += [_blind_sentence(names, row * scale, row) for row in rows[~known]]
     on_bound = np.minimum(x - search.low, search.high - x) <= 1e-9 * scale
     remarks += [
         f"{name} ended on its bound: the data ask for more than it allows"
@@ -593,6 +601,27 @@ def _result(search: _Search, x: np.ndarray, size: float) -> Fit:
             for name, a, b in zip(names, search.low, search.high, strict=True)
         },
     )
+
+
+def _missed(comparison: Iterable[Compared], noise_known: bool) -> list[str]:
+    """A sentence for each quantity of which the best motion explains next to nothing."""
+    missed = dict[str, float]()
+    for part in comparison:
+        names = np.array(part.quantity)
+        for name in sorted(set(part.quantity) - {IMPACTS}):
+            chosen = names == name
+            measured = part.measured[chosen]
+            variation = float(np.mean((measured - measured.mean()) ** 2))
+            square = float(np.mean((measured - part.model[chosen]) ** 2))
+            noise = float(np.mean(part.sigma[chosen] ** 2)) if noise_known else 0.0
+            if square > max(FIT.left**2 * variation, FIT.noisy**2 * noise):
+                share = math.sqrt(square / variation) if variation > 0.0 else math.inf
+                missed[name] = max(share, missed.get(name, 0.0))
+    return [
+        f"the best motion explains next to nothing of {name}, of whose variation it misses"
+        f" {share:.0%}: check the units of the data, the starts and the model"
+        for name, share in missed.items()
+    ]
 
 
 def _blind_sentence(names: tuple[str, ...], direction: np.ndarray, shares: np.ndarray) -> str:
