@@ -2,8 +2,10 @@
 motion of a fresh process, x'' = -x - 2 d v from x = 1, v = 0.
 """
 
+import importlib
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar
 
@@ -189,5 +191,30 @@ def test_a_value_that_a_class_closes_over_is_read_again() -> None:
 
     system = saltus.System(model=Inside())
     for d in (0.1, 0.5):
+        motion = saltus.simulate(system, x=1.0, velocity=0.0, duration=2.0)
+        assert motion.x == pytest.approx(expected(d, 2.0), abs=1e-9)
+
+
+def test_constants_of_an_installed_package_are_read_again_by_its_own_models(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "site-packages" / "models_of_a_group"
+    folder.mkdir(parents=True)
+    (folder / "constants.py").write_text("D = 0.1\n")
+    (folder / "__init__.py").write_text(
+        "from dataclasses import dataclass\n"
+        "import saltus\n"
+        "from . import constants\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Installed(saltus.ContactModel):\n"
+        "    coordinates = ('x',)\n"
+        "    def force(self, t, x, v, load):\n"
+        "        return -x - 2.0 * constants.D * v\n"
+    )
+    monkeypatch.syspath_prepend(folder.parent)
+    package = importlib.import_module("models_of_a_group")
+    system = saltus.System(model=package.Installed())
+    for d in (0.1, 0.5):
+        package.constants.D = d
         motion = saltus.simulate(system, x=1.0, velocity=0.0, duration=2.0)
         assert motion.x == pytest.approx(expected(d, 2.0), abs=1e-9)

@@ -366,6 +366,10 @@ def _names_read(cls: type) -> _Read:
     functions: list[tuple[Mapping[str, Any], str, FunctionType]] = []
     waiting = list[Any]()
     seen: set[int] = set()
+    own = _package_of(cls.__module__)
+
+    def never_changes(module: str | None) -> bool:
+        return _package_of(module) != own and _is_installed(module)
 
     def note(space: Mapping[str, Any], name: str) -> None:
         value = space[name]
@@ -390,7 +394,7 @@ def _names_read(cls: type) -> _Read:
         if (
             not isinstance(function, FunctionType)
             or id(function) in seen
-            or _is_installed(function.__module__)
+            or never_changes(function.__module__)
         ):
             continue
         seen.add(id(function))
@@ -403,7 +407,7 @@ def _names_read(cls: type) -> _Read:
             value = space[name]
             if not isinstance(value, ModuleType):
                 note(space, name)
-            elif not _is_installed(value.__name__):
+            elif not never_changes(value.__name__):
                 for attribute in names & vars(value).keys():
                     note(vars(value), attribute)
     return _Read(tuple(spaces.values()), tuple(functions))
@@ -415,10 +419,14 @@ def _names_in(code: CodeType) -> set[str]:
     return set(code.co_names).union(*map(_names_in, inner))
 
 
+def _package_of(module: str | None) -> str:
+    return (module or "__main__").partition(".")[0]
+
+
 @cache
 def _is_installed(module: str | None) -> bool:
-    """Whether a module is of saltus, of Python or of an installed package, and so never changes."""
-    root = (module or "__main__").partition(".")[0]
+    """Whether a module is of saltus, of Python or of an installed package."""
+    root = _package_of(module)
     if root == "__main__":
         return False
     if root in sys.stdlib_module_names or root == "saltus":
