@@ -13,10 +13,9 @@ TESTS = Path(__file__).parents[1]
 PAGE = TESTS.parent / "docs" / "what_works.md"
 HEAD = """# What works with what
 
-Each cell of these tables is a test of one small system (`tests/what_works/`), which `make test` runs.
-A tick says that it works, and that its result agrees with a motion, with another verb or with the file read back.
-A number says that it is refused in one sentence, and stands for the reason below.
-This page is written from the data of the tests: `python tests/what_works/table.py`.
+Each cell is a test of one small system (`tests/what_works/`), from which this page is written.
+A tick says that it works, and that its result agrees with a motion, another verb or the file read back.
+A number says that it is refused in one sentence, for the reason below.
 """
 
 
