@@ -17,6 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -135,10 +136,10 @@ def build(target: Path) -> tuple[Path, Path]:
     wheels.
     """
     with tempfile.TemporaryDirectory() as folder:
-        archive = subprocess.run(
+        sources = subprocess.run(
             ["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE
         )
-        subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
+        subprocess.run(["tar", "-x", "-C", folder], input=sources.stdout, check=True)
         own = ROOT / ".venv" / "bin" / "python"  # has numba, which builds need not have
         maker = own if own.exists() else sys.executable
         ship = ROOT / "release" / "ship_kernels.py"
@@ -147,8 +148,20 @@ def build(target: Path) -> tuple[Path, Path]:
             subprocess.run(
                 [sys.executable, "-m", "hatchling", "build", "-d", target], cwd=project, check=True
             )
-    (wheel,), (paper,) = target.glob("saltus-*.whl"), target.glob("saltus_paper-*.whl")
+        (wheel,), (paper,) = target.glob("saltus-*.whl"), target.glob("saltus_paper-*.whl")
+        for archive in (wheel, paper):
+            check_names_no_folder(archive, (Path(folder), ROOT))
     return wheel, paper
+
+
+def check_names_no_folder(wheel: Path, folders: tuple[Path, ...]) -> None:
+    """Stop if a file of a wheel holds the path of a folder of this machine."""
+    with zipfile.ZipFile(wheel) as content:
+        for name in content.namelist():
+            held = content.read(name)
+            for folder in folders:
+                if os.fsencode(folder) in held:
+                    raise SystemExit(f"{wheel.name}: {name} holds the path {folder}")
 
 
 def main() -> None:

@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import numba
 import pytest
 
 from saltus.taylor import shipped
@@ -21,6 +23,8 @@ from saltus.taylor.private_numba import cached_jit
 
 @cached_jit(types.float64(types.float64))
 def doubled(x):
+    if x < 0:
+        raise ValueError
     return 2.0 * x
 '''
 print(load_module("shipped", TEXT).doubled(3.0), shipped.shipped_level())
@@ -64,6 +68,16 @@ def test_a_wheels_code_is_run_without_compiling(wheel, tmp_path):
     folder, level = wheel
     assert run(folder, tmp_path, {}) == ["6.0", level]
     assert not compiled_in(tmp_path)
+
+
+def test_a_wheels_code_names_no_folder_of_the_machine_that_built_it(wheel):
+    # the exception of `doubled` holds the path of its source, and so does the text of its types
+    folder, _ = wheel
+    (file,) = folder.rglob(f"*{shipped.SUFFIX}")
+    content = file.read_bytes()
+    assert b"shipped_" in content  # the module's name is there
+    for place in (folder.parent, Path(numba.__file__).parents[1]):
+        assert os.fsencode(place) not in content
 
 
 def test_numba_asked_for_another_processor_compiles(wheel, tmp_path):

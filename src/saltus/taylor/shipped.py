@@ -112,7 +112,13 @@ def environment_of(name: str) -> dict[str, str]:
 def ship(cached: Path, name: str) -> int:
     """Put the code of a cache that was compiled for a level where wheels have it; how many
     functions there were.
+
+    numba writes into it where the source of a function and its own package lie. A wheel says
+    nothing of the machine that built it.
     """
+    import numba
+
+    folders = (cached, Path(numba.__file__).parents[1])
     target = folder_of(name)
     target.mkdir(parents=True, exist_ok=True)
     count = 0
@@ -120,8 +126,16 @@ def ship(cached: Path, name: str) -> int:
         code = without_digest(path.read_bytes())
         if code is None:
             continue
+        for folder in folders:
+            code = _without_folder(code, folder)
         written = target / f"{path.name.removesuffix('.1.nbc')}{SUFFIX}"
         written.write_bytes(with_digest(code))
         os.utime(written, (0, 0))
         count += 1
     return count
+
+
+def _without_folder(code: bytes, folder: Path) -> bytes:
+    """Pickled code with another path of the same length, as pickles count bytes."""
+    path = os.fsencode(folder)
+    return code.replace(path, b".".ljust(len(path), b"/"))
