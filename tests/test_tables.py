@@ -153,6 +153,16 @@ def test_comma_separated_text_has_every_digit(branch, motion, tmp_path):
     assert branch.to_csv(tmp_path / "again.csv").read_bytes() == path.read_bytes()
 
 
+def test_each_column_of_comma_separated_text_has_a_name(branch, motion, tmp_path):
+    sweep = saltus.frequency_sweep(SYSTEM, [0.95, 1.0], theta=0.3)
+    for number, result in enumerate((branch, branch.special, motion, motion.events, sweep)):
+        lines = saltus.to_csv(tmp_path / f"{number}.csv", result).read_text().splitlines()
+        names = lines[0].split(",")
+        assert all(names)
+        assert len(lines[1].split(",")) == len(names)
+        assert len(lines) == 1 + len(saltus.to_pandas(result))
+
+
 def test_events_impacts_and_special_points_are_tables(branch, motion):
     events = motion.events.to_pandas()
     assert list(events.time) == motion.events.times.tolist()

@@ -302,7 +302,7 @@ def to_pandas(result: Any, table: str | None = None) -> pandas.DataFrame:
 
 def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
     """Write a table of any result as comma-separated text, every number with all of its digits;
-    returns the path.
+    returns the path. Rows have no numbers of their own; each column has a name.
 
     Parameters
     ----------
@@ -331,7 +331,9 @@ def to_csv(path: str | Path, result: Any, table: str | None = None) -> Path:
         raise ParameterError(
             f"path must name a file, such as branch.csv, got {shown(path)}", "path"
         )
-    return write_text(path, to_pandas(result, table).to_csv(lineterminator="\n"))
+    rows = to_pandas(result, table)
+    is_named = any(name is not None for name in rows.index.names)
+    return write_text(path, rows.to_csv(index=is_named, lineterminator="\n"))
 
 
 class RowTable:
