@@ -612,7 +612,7 @@ OTHER_KINDS = (
     *(SYSTEM, SYSTEM.load, SYSTEM.model, "\0", "x" * 5000, np, saltus.Harmonic(1.0), 10**400),
 )
 # formulas, which compute with whatever they get, and what calls a function of the user's
-UNCHECKED = ("Surface.side", "Friction.slipping", "Friction.coefficient")
+UNCHECKED = ("Surface.side", "Friction.slipping", "Friction.coefficient", "SwitchedForce.factor")
 CALLED = ("workers", "scheduler", "progress", "response", "functions")
 KIND_CASES = int(os.environ.get("SALTUS_CASES", "20000"))
 

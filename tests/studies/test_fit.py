@@ -210,6 +210,14 @@ def test_what_has_no_meaning_is_refused(change, sentence):
         saltus.fit(CELL, given["data"], given["parameters"])
 
 
+@pytest.mark.parametrize("times", [np.array("a"), np.empty((0, 2)), [[1], [1, 2]]])
+@pytest.mark.parametrize("name", ["time", "impacts"])
+def test_times_of_another_shape_are_refused(name, times):
+    measured = {"time": [0.0, 1.0], "values": {"theta": [0.3, 0.2]}, "impacts": [0.5]}
+    with pytest.raises(ParameterError, match=f"{name} must be increasing numbers"):
+        saltus.Measurement(start={"theta": 0.3}, **measured | {name: times})
+
+
 def calibration(cases, count, seed):
     """Simulation-based calibration: numbers drawn from a prior, a record with noise of each, and
     where the true numbers lie in the distribution that the fit gives: ranks in [0, 1], which are

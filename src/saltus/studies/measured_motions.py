@@ -66,7 +66,10 @@ class Measurement:
     def __post_init__(self) -> None:
         for name in ("time", "impacts"):
             given = getattr(self, name)
-            empty = isinstance(given, (list, tuple, np.ndarray)) and len(given) == 0
+            is_array = isinstance(given, np.ndarray)
+            empty = (
+                given.shape == (0,) if is_array else isinstance(given, (list, tuple)) and not given
+            )
             times = np.empty(0) if empty else np.ravel(as_numbers(given, name))
             if not empty and not times.size:
                 raise ParameterError(f"{name} must be increasing numbers, got {shown(given)}", name)
