@@ -194,12 +194,20 @@ _PICKLED_LENGTH = re.compile(
 )
 
 
+# their names end with the same digest
+_PICKLED_NAME = re.compile(r"(@\.const\.pickle(?:data|buf)\.)([0-9a-f]{40})")
+
+
 def _without_places(text: str) -> str:
-    """LLVM's text without the contents of exceptions, which name the folders of this machine.
-    What is not Python never reads them, and knows an exception by its status.
+    """LLVM's text without the contents of exceptions, which name the folders of this machine, and
+    without their digests. What is not Python never reads them, and knows an exception by its
+    status.
     """
     text = _PICKLED.sub(r"\1[1 x i8] zeroinitializer", text)
-    return _PICKLED_LENGTH.sub(r"\g<1>1", text)
+    text = _PICKLED_LENGTH.sub(r"\g<1>1", text)
+    digests = dict.fromkeys(match[2] for match in _PICKLED_NAME.finditer(text))
+    numbers = {digest: number for number, digest in enumerate(digests)}
+    return _PICKLED_NAME.sub(lambda match: f"{match[1]}{numbers[match[2]]}", text)
 
 
 def value_type(kind: Any) -> Any:
