@@ -145,3 +145,26 @@ def test_an_excursion_vanishes_in_a_structure_of_forty_stiff_coordinates() -> No
     assert below.evidence.witness == "duration of an excursion"
     assert above.evidence.witness == "reaction of stop"
     assert abs(below.parameter - above.parameter) < 1.5 * below.evidence.bracket < 1e-5
+
+
+@ROUNDED_MORE
+def test_rounding_at_the_begin_of_an_excursion_is_no_grazing() -> None:
+    """With a speed that grows as the duration d squared, an excursion of stiff modes vanishes where
+    d^2 does, which is linear in the frequency nearby.
+    """
+    whole = system(1.031, elements=20)
+    orbit = saltus.find_orbit(whole, **whole.model.start())
+    bounds = (1.0309 * FIRST, 1.0333 * FIRST)
+    followed = saltus.continue_orbit(orbit, "load.frequency", bounds)
+    assert all(str(end).startswith("bound") for end in followed.ends)
+    (change,) = followed.special
+    assert change.kind == "SW"
+    with_excursion = [
+        (point.parameter, float(np.diff(point.orbit.motion().events.times)[1]) ** 2)
+        for point in followed.points
+        if 1.03275 * FIRST < point.parameter < 1.0328 * FIRST
+    ]
+    assert len(with_excursion) > 1
+    (first, longer), (second, shorter) = with_excursion[0], with_excursion[-1]
+    vanishes = second + (second - first) * shorter / (longer - shorter)
+    assert abs(change.parameter - vanishes) < 2e-5

@@ -57,14 +57,15 @@ def find_minimum(motion, c, t, h):
 @lean_jit
 def from_rest(guard, units):
     """Make 0 what rounding leaves of the first terms of a gap that opens from rest: its speed, and
-    its acceleration after a release. They would give it minima just behind the event.
+    its acceleration after a release. They would give it minima just behind the event. Elastic
+    forces of stiff modes leave more of the acceleration, `units[3]`.
     """
     length = units[0]
     time = units[1]
     at_rest = AT_REST * length
     if abs(guard[0]) < at_rest and abs(guard[1]) * time < at_rest:
         guard[1] = 0.0
-        if abs(guard[2]) * time**2 < at_rest:
+        if abs(guard[2]) * time**2 < max(at_rest, units[3] * length):
             guard[2] = 0.0
 
 

@@ -366,7 +366,8 @@ class ContactsSegmentRequest(NamedTuple):
     plan: Any  # (n, ...), in the columns of `SegmentPlan`
     times: Any  # (n + 1,)
     first: Any  # the state at the first of them
-    # the natural units of the system in which extremes are given: of length, time and force, (3,)
+    # the natural units in which extremes are given, of length, time and force, and the reaction in
+    # them that is the rounding of elastic forces, (4,)
     units: Any
 
 

@@ -367,7 +367,7 @@ def _with_other_events(point: OrbitPoint, known: tuple[Cycle, ...] = ()) -> Orbi
             end = ends_at_another(point, covered)
             continue
         end = End(OrbitEnd.NO_DIRECTION, point.parameter)
-        ahead = _admissible(begun) or (
+        ahead = _admissible(begun, here.at_once > TOLERANCES.switching) or (
             _with_other_events(begun, known) if len(known) < MOST_TOGETHER else None
         )
         if isinstance(ahead, OrbitPoint):
@@ -471,9 +471,10 @@ def _beyond_both_halves(point: OrbitPoint) -> OrbitPoint | End:
     return ahead if isinstance(ahead, End) else half_point(ahead)
 
 
-def _admissible(start: OrbitPoint) -> OrbitPoint | None:
-    return (
-        admissible_direction(start, BEGUN, begun=True)
-        if begins_excursion(start)
-        else admissible_direction(start)
-    )
+def _admissible(start: OrbitPoint, is_lost: bool = False) -> OrbitPoint | None:
+    """The first point of a branch with other events; `is_lost` where an excursion ends that is
+    still too long: its orbits have a pull at `start`, and only those somewhat ahead have none.
+    """
+    if is_lost or begins_excursion(start):
+        return admissible_direction(start, BEGUN, begun=True)
+    return admissible_direction(start)

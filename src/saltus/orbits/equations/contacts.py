@@ -683,9 +683,12 @@ class ContactsEquations(OrbitEquations):
 
     @cached_property
     def _units_of_extremes(self) -> np.ndarray:
-        """The natural units of length, time and force."""
+        """The natural units of length, time and force, and the reaction in these units that is the
+        rounding of elastic forces.
+        """
         natural = self.natural
-        return np.array([natural.length, natural.time, natural.force])
+        rounding = NEWTON.converged * self.elastic_forces
+        return np.array([natural.length, natural.time, natural.force, rounding])
 
     def _followed(
         self,
