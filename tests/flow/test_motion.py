@@ -307,14 +307,15 @@ def test_motion_that_starts_beyond_a_limit_stops_at_once():
     assert (stopped.time, stopped.theta, stopped.limit) == (0.0, 2.0, "line_limit")
 
 
-def test_respected_margins_are_reported_as_such():
+def test_margins_that_are_not_passed_are_reported_as_such():
     quiet = simulate(forced(H=0.0), theta=0.05, duration=1.0)
     assert quiet.validity.respected
     assert (
-        str(quiet.validity) == "line_limit respected; kinematic_limit respected; reaction respected"
+        str(quiet.validity)
+        == "line_limit: not passed; kinematic_limit: not passed; reaction: not passed"
     )
     passed = simulate(LARGE, theta=1.7, velocity=1.3, duration=1.0)
-    assert "line_limit passed first at" in str(passed.validity)
+    assert "line_limit: passed first at" in str(passed.validity)
     assert str(simulate(WALL, x=0.0, duration=1.0).validity) == "the model has no margins"
 
 

@@ -264,7 +264,7 @@ def test_what_is_not_to_be_believed_is_said_there_and_then(page):
         f"new Promise((done) => {{ const look = () => ({said} ? done() : setTimeout(look, 20)); "
         "look(); })"
     )
-    assert f"line limit passed first at {first:.6g}" in text(page, "#summary")
+    assert f"line limit: passed first at {first:.6g}" in text(page, "#summary")
 
 
 def test_a_click_starts_a_motion_and_keys_do_the_same(page):

@@ -99,13 +99,13 @@ def test_a_block_that_overturns_says_so(tmp_path):
     assert f"The block overturns at {motion.time:.6g}." in said["summary"]
     assert said["atEnd"] == {"kind": "limit", "text": "The block overturns here: the motion ends."}
     assert said["atStart"]["kind"] == "fine"
-    for wrong in ("respected", "no such mechanism", "margin"):
+    for wrong in ("not passed", "no such mechanism", "margin"):
         assert wrong not in said["summary"] + said["atEnd"]["text"]
 
 
-def test_a_block_that_stands_says_that_its_margin_is_respected(tmp_path):
+def test_a_block_that_stands_says_that_its_margin_is_not_passed(tmp_path):
     (said,) = words([(overturning(0.4), {"theta": 0.0}, {"duration": 20.0}, None)], tmp_path)
-    assert "overturned respected." in said["summary"]
+    assert "overturned: not passed." in said["summary"]
     assert "overturns" not in said["summary"]
 
 
@@ -118,7 +118,7 @@ def test_a_model_of_ones_own_names_the_margin_that_ends_it_and_passes_others(tmp
     assert (
         f"It ends at {motion.time:.6g}, where the margin “upright” reaches zero." in said["summary"]
     )
-    assert f"level passed first at {motion.validity.first['level']:.6g}" in said["summary"]
+    assert f"level: passed first at {motion.validity.first['level']:.6g}" in said["summary"]
     assert said["atEnd"]["text"] == "The margin “upright” is zero here: the motion ends."
     ends = {slider["path"]: (slider["low"], slider["high"]) for slider in said["sliders"]}
     assert ends["model.restitution"] == (0.0, 1.0)

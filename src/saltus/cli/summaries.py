@@ -78,7 +78,7 @@ def _validity(motion: Motion) -> list[tuple[str, str]]:
     for name, first in motion.validity.first.items():
         share = 100 * motion.validity.share[name]
         verdict = (
-            "respected"
+            "not passed"
             if first is None
             else f"passed first at {first:.9g}, beyond it {share:.3g} % of the time"
         )

@@ -128,7 +128,7 @@ class Validity:
         if not self.first and not self.gains and not self.not_unique():
             return html_table("Validity", {"margins": str(self)})
         rows = {
-            name: "respected" if t is None else f"passed first at {t:.6g}"
+            name: "not passed" if t is None else f"passed first at {t:.6g}"
             for name, t in self.first.items()
         }
         shares = [f"{100 * self.share[name]:.3g} %" for name in self.first]
@@ -139,9 +139,9 @@ class Validity:
 
     def __str__(self) -> str:
         parts = [
-            f"{name} "
+            f"{name}: "
             + (
-                "respected"
+                "not passed"
                 if t is None
                 else f"passed first at {t:.6g}, {100 * self.share[name]:.3g} % of the time"
             )

@@ -69,11 +69,11 @@ export function validityOfAll(session) {
   const { motion } = session;
   if (!motion) return "";
   const known = motion.checked === undefined ? motion.validity : motion.checked;
-  // what ends the motion is said once, and is not "respected" where rounding leaves it above zero
+  // what ends the motion is said once, and is not "not passed" where rounding leaves it above zero
   const others = Object.entries(known?.first ?? {}).filter(([name]) => motion.stop !== "limit" || name !== motion.limit);
   const parts = others.map(([name, time]) => {
     const share = known?.share[name] ?? 0;
-    return time === null ? `${inWords(name)} respected` : `${inWords(name)} passed first at ${shortly(time)}, ${shortly(100 * share, 3)} % of the time`;
+    return time === null ? `${inWords(name)}: not passed` : `${inWords(name)}: passed first at ${shortly(time)}, ${shortly(100 * share, 3)} % of the time`;
   });
   const ended = motion.stop === "limit" ? endOnMargin(motion) : (STOPS[motion.stop] ?? motion.stop);
   const why = motion.reason && ended && !["rest", "horizon", "limit"].includes(motion.stop) ? `${ended} (${motion.reason})` : ended;
