@@ -14,6 +14,7 @@ from saltus.errors import SaltusError
 
 RANGE = 0.06  # of the frequency, on both sides, along which branches and sweeps go
 STARTS = 12
+BESIDE_A_GRAZING = 2e-7  # a share of the parameter within which a fold may be missed
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,13 @@ def branch_of(recipe: Recipe) -> VerbAnswer:
     special = sorted(
         (point.parameter * recipe.view.time, str(point.kind)) for point in branch.special
     )
+    # Orbits of whole motions, as those with a surface, begin a little beyond a grazing.
+    grazings = [place for place, kind in special if kind == "GR"]
+    special = [
+        (place, kind)
+        for place, kind in special
+        if kind != "LP" or not np.isclose(place, grazings, rtol=BESIDE_A_GRAZING, atol=0.0).any()
+    ]
     ends = sorted(
         (str(end.reason.code), round(end.parameter * recipe.view.time, 6)) for end in branch.ends
     )
