@@ -1,30 +1,15 @@
 """In which order the gallery shows the examples, and how each begins."""
 
+import re
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 
 from saltus.plots.conventions import LOOK, RC
 
-GROUPS = {  # by subject, as the first paragraph of the gallery lists them
-    "Impacts and stops": (
-        "wall_orbits hammered grazing two_stops preloaded_stop impact_pair shaken_table up_and_down"
-    ),
-    "Rocking blocks and records": (
-        "rocking_block housner overturning overturning_spectrum at2_record record falling_block"
-    ),
-    "Friction, backlash, soft stops": "belt stribeck rubbing_absorber backlash bilinear soft_stop",
-    "Structures": "mass_chain ten_masses elastic_bar beam_on_stop beam_on_hard_stop large_beam_with_stop",
-    "Harvesters and coordinates of first order": "harvester piezo_harvester",
-    "Orbits, branches, spectra": (
-        "orbits period_doubling resting_orbit proved_orbit proved_fold response_spectrum duffing square_wave smoothing"
-    ),
-    "Attractors and chaos": (
-        "basins erosion capture chaos coming_to_rest potential_wells ensemble stability_chart"
-    ),
-    "The metainterface": "quickstart two_layers cell_chain physical_units",
-    "Fits, design, other programs": "identification sensitivities design_grid from_sympy in_jax",
-    "To show": "animation notebook",
-}
-ORDER = tuple(name for names in GROUPS.values() for name in names.split())
+# the groups by subject, and in each its examples, stand once: in the gallery's first paragraph
+HEADER = Path(__file__).parents[2] / "examples" / "GALLERY_HEADER.rst"
+ORDER = tuple(re.findall(r"<(\w+)>`", HEADER.read_text(encoding="utf-8")))
 
 
 def place(name):

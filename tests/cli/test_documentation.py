@@ -186,3 +186,14 @@ def test_the_nodes_and_variables_of_a_diagram_are_all_there():
     assert set(first_cells(variables)) - {"releases", "rests"} == set(
         saltus.branch_of(tree, 0).data_vars
     )
+
+
+def test_the_gallery_lists_every_example_under_its_title():
+    header = (ROOT / "examples" / "GALLERY_HEADER.rst").read_text(encoding="utf-8")
+    listed = re.findall(r":doc:`([^<]+) <(\w+)>`", header)
+    titles = {
+        path.stem: inspect.cleandoc(path.read_text(encoding="utf-8").lstrip('"')).splitlines()[0]
+        for path in (ROOT / "examples").glob("*.py")
+    }
+    assert len(listed) == len(titles)
+    assert {name: title for title, name in listed} == titles
