@@ -194,6 +194,7 @@ def test_the_gallery_lists_every_example_under_its_title():
     titles = {
         path.stem: inspect.cleandoc(path.read_text(encoding="utf-8").lstrip('"')).splitlines()[0]
         for path in (ROOT / "examples").glob("*.py")
+        if path.stem != "in_jax"  # the site is built without JAX
     }
     assert len(listed) == len(titles)
     assert {name: title for title, name in listed} == titles
