@@ -62,7 +62,6 @@ def test_a_neuron_fires_at_the_instants_of_its_closed_form():
         coordinates=[u],
         first_order=[u],
         force=[(sympy.Rational(13, 10) - u) / 2],
-        parameters={},
         surfaces=[
             saltus.Surface(name="threshold", coordinate="u", position=1.0, after_event="fired")
         ],

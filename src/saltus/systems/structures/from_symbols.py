@@ -80,7 +80,7 @@ def from_sympy(
     velocities: Sequence[Any] = (),
     mass: Any = None,
     force: Any = (),
-    parameters: Mapping[Any, float],
+    parameters: Mapping[Any, float] | None = None,
     channels: Mapping[str, Any] | None = None,
     contacts: Sequence[Contact] = (),
     frictions: Sequence[Friction] = (),
@@ -115,7 +115,7 @@ def from_sympy(
     force
         f, an expression for each coordinate.
     parameters
-        The number of each other symbol.
+        The number of each other symbol; by default there is none.
     channels
         The symbols that are channels of the load, by the names of the channels: `{"force": F}`.
     contacts, frictions, surfaces
@@ -154,6 +154,7 @@ def from_sympy(
     4.0
     """
     sympy = _sympy()
+    parameters = {} if parameters is None else parameters
     for symbol in parameters:
         if not isinstance(symbol, sympy.Basic):
             raise ParameterError(
