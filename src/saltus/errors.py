@@ -80,11 +80,28 @@ class ParameterError(SaltusError, ValueError):
 class TraceError(SaltusError, TypeError):
     """A model uses an operation that cannot be expanded in a Taylor series.
 
+    The sentence begins with the method, and the file and line of what it refuses, where these are
+    in code of a user's own: "Pendulum.force (pendulum.py:12): ...".
+
     Examples
     --------
     >>> issubclass(saltus.TraceError, saltus.SaltusError)
     True
     """
+
+    has_place = False
+
+    def put_at(self, place: str) -> None:
+        """Begin the sentence with the place of what it refuses, unless it has one.
+
+        Parameters
+        ----------
+        place
+            The method, file and line, such as "Pendulum.force (pendulum.py:12)".
+        """
+        if not self.has_place:
+            self.args = (shortened(f"{place}: {self}"),)
+            self.has_place = True
 
 
 class MotionError(SaltusError, RuntimeError):

@@ -162,7 +162,7 @@ def test_a_model_that_cannot_be_traced_is_refused(refused, tmp_path):
     (tmp_path / "study.toml").write_text('[model]\ntype = "own.py:Own"\nstiffness = 3\n')
     sentence = refused("info", tmp_path / "study.toml")
     assert (
-        sentence == f"saltus: {tmp_path}/study.toml, model: Own.acceleration failed: "
+        sentence == f"saltus: {tmp_path}/study.toml, model: Own.acceleration (own.py:11) failed: "
         "ZeroDivisionError: by naught"
     )
 

@@ -45,11 +45,15 @@ LEAVES = (
 # coefficients of a record's piece: a cubic spline of velocity makes a quartic displacement
 RECORD_WIDTH = 5
 
+FUNCTION_NAMES = ", ".join(function.numpy.__name__ for function in FUNCTIONS.values())
 ALLOWED = (
-    "+ - * /, powers, NumPy's"
-    f" {', '.join(function.numpy.__name__ for function in FUNCTIONS.values())}, tan, and abs of the"
+    f"+ - * /, powers, NumPy's {FUNCTION_NAMES}, tan, and abs of the"
     " coordinate (the sign of the coordinate is `side`); in the force of a ContactModel also abs,"
     " sign, maximum, minimum, where, clip, heaviside and copysign of any value"
+)
+ALLOWED_IN_FORCES = (
+    f"+ - * /, powers, abs, and NumPy's {FUNCTION_NAMES}, tan, sign, maximum, minimum, where, clip,"
+    " heaviside and copysign"
 )
 BRANCH = (
     "only an impact law may compare: where the equations change at a contact, the model is a"
@@ -60,11 +64,16 @@ FRICTION = (
     " give the model a Friction; a smooth one, such as -tanh(velocity / w), can be, and the force"
     " of a ContactModel may have abs, sign, maximum, minimum and where, as in -v * abs(v)"
 )
+BRANCHING = "a traced model may not branch on its state or parameters (if, and, or, min, max)"
 BOTH_BRANCHES = (
     "write np.where(x > 0.0, a, b), np.maximum(x, 0.0), np.minimum, np.sign or abs, as in"
     " -v * abs(v), and join conditions as in (x > 0.0) & (v < 0.0)"
 )
-OF_ONE_CONTACT = "at the contact of another model use `side`"
+OF_ONE_CONTACT = (
+    "at the contact use `side`, as in -(1 + side) * x; elsewhere make it a ContactModel, whose force"
+    " may have np.where(x > 0.0, a, b), np.maximum(x, 0.0) and -v * abs(v)"
+)
+DRY_FRICTION = "; dry friction may be a Friction"
 # the names of the bounds of `np.clip`
 BOUNDS = {"a_min": "low", "min": "low", "a_max": "high", "max": "high"}
 COMPARISON = (
@@ -91,6 +100,8 @@ class _UsersCode(threading.local):
 
     runs = False
     switches = False
+    # whether refusals name what the force of a ContactModel may have
+    of_contacts = False
     # while expressions are written once each (`shared_text`)
     shared: Any = None
 
@@ -118,6 +129,17 @@ def switching() -> Iterator[None]:
         yield
     finally:
         _USERS_CODE.switches = before
+
+
+@contextmanager
+def told_of_switches(told: bool) -> Iterator[None]:
+    """Name switches in refusals, as in the force of a ContactModel, or not."""
+    before = _USERS_CODE.of_contacts
+    _USERS_CODE.of_contacts = told
+    try:
+        yield
+    finally:
+        _USERS_CODE.of_contacts = before
 
 
 class Expr:
@@ -237,22 +259,20 @@ class Expr:
         raise TraceError("~ of a comparison is no condition: write np.logical_not, or the opposite")
 
     def __bool__(self) -> bool:
-        other = "dry friction may be a Friction" if uses_velocity(self) else OF_ONE_CONTACT
-        raise TraceError(
-            "a traced model may not branch on its state or parameters (if, and, or, min, max); in the"
-            f" force of a ContactModel {BOTH_BRANCHES}; {other}"
-        )
+        instead = BOTH_BRANCHES if _may_switch() else OF_ONE_CONTACT
+        rubs = DRY_FRICTION if uses_velocity(self) else ""
+        raise TraceError(f"{BRANCHING}: {instead}{rubs}")
 
     def __float__(self) -> float:
         raise TraceError(
-            "a traced quantity has no number yet: use NumPy's functions, not math's; allowed are"
-            f" {ALLOWED}"
+            "a traced quantity has no number yet: use NumPy's functions, not math's;"
+            f" {_what_is_allowed()}"
         )
 
     __int__ = __index__ = __complex__ = __float__
 
     def _refuse(self, *_: Any) -> Any:
-        raise TraceError(f"%, //, @ and round cannot be traced; allowed are {ALLOWED}")
+        raise TraceError(f"%, //, @ and round cannot be traced; {_what_is_allowed()}")
 
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = (
         __rmatmul__
@@ -276,12 +296,12 @@ class Expr:
             return combine("where", *args)
         if func is np.clip and _USERS_CODE.switches and set(kwargs) <= set(BOUNDS):
             return _clipped(*args, **{BOUNDS[name]: value for name, value in kwargs.items()})
-        raise TraceError(f"np.{func.__name__} cannot be traced; allowed are {ALLOWED}")
+        raise TraceError(f"np.{func.__name__} cannot be traced; {_what_is_allowed()}")
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):  # NumPy and copy probe for these
             raise AttributeError(name)
-        raise TraceError(f"a traced quantity has no {name!r}; allowed are {ALLOWED}")
+        raise TraceError(f"a traced quantity has no {name!r}; {_what_is_allowed()}")
 
     def __repr__(self) -> str:
         if _USERS_CODE.shared is not None:
@@ -292,10 +312,17 @@ class Expr:
         return f"{self.op}({', '.join(map(repr, self.args))})"
 
 
+def _may_switch() -> bool:
+    """Whether the user's code that runs may have switches."""
+    return _USERS_CODE.switches or _USERS_CODE.of_contacts
+
+
 def _what_is_allowed(*operands: Any) -> str:
-    """A sentence that says what may be traced, and, for operands that depend on a velocity, that
-    its sign may not be used.
+    """A sentence that says what may be traced where the user's code runs, and, for operands that
+    depend on a velocity, that its sign may not be used.
     """
+    if _may_switch():
+        return f"allowed are {ALLOWED_IN_FORCES}"
     return FRICTION if uses_velocity(*operands) else f"allowed are {ALLOWED}"
 
 
@@ -344,7 +371,7 @@ def as_expr(value: Any) -> Expr:
     if hasattr(value, "refuse"):  # the time
         value.refuse()
     raise TraceError(
-        f"a traced model cannot use {value!r} of type {type(value).__name__}; allowed are {ALLOWED}"
+        f"a traced model cannot use {value!r} of type {type(value).__name__}; {_what_is_allowed()}"
     )
 
 

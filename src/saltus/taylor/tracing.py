@@ -12,6 +12,7 @@ import numpy as np
 
 from saltus.errors import ParameterError, TraceError, near
 from saltus.systems import (
+    ContactModel,
     DeclaredLoad,
     Harmonic,
     System,
@@ -40,6 +41,7 @@ from saltus.taylor.graph import (
     ordered,
     substitute,
     switching,
+    told_of_switches,
     uses_velocity,
 )
 from saltus.taylor.load_tables import CORNER, LoadTime
@@ -502,7 +504,7 @@ def trace(
     accelerations = (
         _trace_contacts(result, twin, t, q, v)
         if several
-        else ask_user(model, "acceleration", t, q, v, side, load)
+        else _trace_smooth(model, t, q, v, side, load)
     )
     if (
         dof > 1
@@ -681,6 +683,12 @@ def _known_number(expression: Expr) -> float | Fraction | None:
 def ask_user(model: Any, method: str, *arguments: Any) -> Any:
     """Call a model's method with symbols, which it may not compare."""
     return ask(model, method, *arguments)
+
+
+def _trace_smooth(model: Any, *arguments: Any) -> Any:
+    """Trace the accelerations of a model that nothing holds."""
+    with told_of_switches(isinstance(model, ContactModel)):
+        return ask_user(model, "acceleration", *arguments)
 
 
 @switching()

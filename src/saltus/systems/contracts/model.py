@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import StrEnum
+from pathlib import PurePath
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -631,23 +633,45 @@ def weighted(factors: Sequence[Any], values: Sequence[Any]) -> Any:
 
 
 def ask(model: Any, method: str, *arguments: Any) -> Any:
-    """Call a model's method; a mistake in a user's own code becomes a sentence that names it.
+    """Call a model's method; a mistake in a user's own code becomes a sentence that says where it
+    is.
 
     Raises
     ------
     TraceError
-        The method raised an exception that is not saltus's own; the message has its type and text,
-        and it is the cause.
+        The method uses what cannot be traced; or it raised an exception that is not saltus's own:
+        the message has its type and text, and it is the cause.
     """
     try:
         return getattr(model, method)(*arguments)
+    except TraceError as error:
+        error.put_at(_place_of(error, model, method))
+        raise
     except (SaltusError, KeyboardInterrupt):
         raise
     except BaseException as error:  # a user's own code may call exit
-        name = f"{type(model).__name__}.{method}"
+        place = _place_of(error, model, method)
         single = len(getattr(model, "coordinates", ())) == 1 and "not subscriptable" in str(error)
         hint = "; with one coordinate q and its velocity are numbers: write q, not q[0]" * single
-        raise TraceError(f"{name} failed: {type(error).__name__}: {error}{hint}") from error
+        raise TraceError(f"{place} failed: {type(error).__name__}: {error}{hint}") from error
+
+
+def _place_of(error: BaseException, model: Any, method: str) -> str:
+    """Where a user's own code raised an error, as "Pendulum.force (pendulum.py:12)"; the method
+    alone where no line of such code is known.
+    """
+    name = f"{type(model).__name__}.{method}"
+    line = ""
+    for frame, number in walk_tb(error.__traceback__):
+        package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        file = PurePath(frame.f_code.co_filename).name
+        # texts that were executed, and the cells of a notebook, are no files of a user
+        if package not in OTHERS_CODE and file.endswith(".py") and not file[:-3].isdigit():
+            line = f" ({file}:{number})"
+    return name + line
+
+
+OTHERS_CODE = ("saltus", "numpy")  # packages whose lines no user changes
 
 
 def is_zero(entry: Any) -> bool:
