@@ -44,6 +44,22 @@ test("ticks are round, lie inside, and are written with the decimals of their st
   assert.equal(tickLabel(-1.5, 0.5), "−1.5");
 });
 
+test("an axis has two ticks however narrow it is, of which neither is outside", () => {
+  const next = random(4);
+  for (let i = 0; i < 5000; i++) {
+    const middle = i % 2 ? 0 : (next() - 0.5) * 10 ** (6 * next() - 3);
+    const half = 10 ** (6 * next() - 4) + Math.abs(middle) * 1e-6;
+    for (const count of [1, 2, 3]) {
+      const { step, values } = ticks(middle - half, middle + half, count);
+      assert.ok(values.length >= 2 && values.length <= 5, `${middle} ${half} ${count} ${values}`);
+      assert.ok(["1", "2", "5"].includes(step.toExponential(0)[0]));
+      for (const value of values) assert.ok(Math.abs(value - middle) <= half * (1 + 1e-6));
+    }
+  }
+  assert.deepEqual(ticks(-1.9, 1.9, 3).values, [-1, 0, 1]); // where a step of 2 is the least above 3.8 / 3
+  assert.deepEqual(ticks(0, 10, 5).values, [0, 2, 4, 6, 8, 10]);
+});
+
 test("what is typed is a number with its unit, or is refused with a sentence", () => {
   const damping = { name: "damping" };
   const beta0 = { name: "beta0", angle: true, degrees: true };

@@ -100,6 +100,26 @@ def test_nothing_is_wider_than_the_screen(page, file, width):
         assert page.evaluate(f"document.querySelector({canvas!r}).width") > 200
 
 
+TICKS = """(() => { const plot = saltusPage.plotOf(%r); plot.top.scrollIntoView({block: "center"}); plot.drawNow();
+    const shown = []; const ctx = plot.base.getContext("2d"); const own = ctx.fillText;
+    ctx.fillText = (text, ...at) => shown.push([text, ...at]); plot.drawNow(); ctx.fillText = own;
+    const {left, top, width, height} = plot.painter(ctx, {}).box;
+    const numbers = shown.filter(([text]) => Number.isFinite(Number(text.replace("\\u2212", "-"))));
+    return [numbers.filter((t) => t[2] > top + height), numbers.filter((t) => t[1] < left)]; })()"""
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 640), (380, 800), (928, 800)])
+@pytest.mark.parametrize("view", ["phase", "history", "energy"])
+def test_an_axis_has_two_numbers_in_a_narrow_frame(page, file, width, height, view):
+    """That of a phone, and of the start page of the documentation, 928 pixels wide."""
+    page.open(file, width, height)
+    # multiples of 2 are the next round numbers where three have room, and 0 is the only one of them
+    page.evaluate(f"saltusPage.store.set({{windows: {{{view}: [-1.9, 1.9, -1.9, 1.9]}}}})")
+    page.evaluate(SETTLED)
+    for axis in page.evaluate(TICKS % view):
+        assert len({text for text, *_ in axis}) >= 2
+
+
 def test_a_typed_number_changes_the_motion_and_a_refused_one_says_why_beside_the_field(page):
     page.type(field("model.damping"), "0.25")
     assert state(page)["values"]["model.damping"] == 0.25

@@ -2,16 +2,26 @@
 
 const MINUS = "\u2212";
 
-/** Round numbers from `low` to `high`, about `count` of them. @param {number} low @param {number} high @param {number} count */
+/** Round numbers from `low` to `high`, about `count` of them, and at least two: one alone shows no scale. @param {number} low @param {number} high @param {number} count */
 export function ticks(low, high, count) {
-  const step = roundStep((high - low) / Math.max(count, 1));
+  let step = roundStep((high - low) / Math.max(count, 1));
   if (!(step > 0) || !Number.isFinite(step)) return { step: 0, values: [] };
+  let values = multiples(low, high, step);
+  for (let finer = 0; values.length < 2 && finer < 4; finer++) {
+    step = roundStep(step / 2.5); // the next lower of 1, 2, 5
+    values = multiples(low, high, step);
+  }
+  return { step, values };
+}
+
+/** The multiples of `step` from `low` to `high`, 100 at most. @param {number} low @param {number} high @param {number} step */
+function multiples(low, high, step) {
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);
   /** @type {number[]} */
   const values = [];
   for (let i = first; i <= last && values.length < 100; i++) values.push(i === 0 ? 0 : Number((i * step).toPrecision(12)));
-  return { step, values };
+  return values;
 }
 
 /** The least of 1, 2, 5 times a power of ten that is not below `size`. @param {number} size */
