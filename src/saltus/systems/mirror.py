@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from saltus.systems.contracts.contact_model import (
     normal_forces,
 )
 from saltus.systems.contracts.model import IMAGE_ROUNDING, Model
+from saltus.systems.gap_coordinates import InGapCoordinates
+from saltus.systems.gap_places import placed, terms_of
 from saltus.systems.loads.load import DeclaredLoad, Load
 from saltus.systems.loads.repeating import Repeating
 from saltus.systems.loads.signals import Constant, Harmonic, Signal, Sum, scaled
@@ -41,29 +43,34 @@ DECLARED_ROUNDING = 1e-9
 DECADES = 6.0  # their sizes lie so many powers of ten below and above the natural units
 # Distances from a mirror's centre are looked at down to so many powers of ten below its value.
 DIGITS = 4.0
+INSTANTS = 8  # of a period, at which walls that move are compared with their images
+INDEPENDENT = 1e-9  # parts whose directions differ by less have one direction
 NEWTON_STEPS = 30  # most steps in which a mirror's centre is found
 NEWTON_SHARE = 1e-4  # of a length, by which its derivatives are differences
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mirror:
-    """A mirror symmetry, under which 2 c - q(t), with some coordinates of q swapped, is a motion
-    under the load `load` wherever q(t) is one of the system.
+    """A mirror symmetry, under which c + R (q(t) - c) is a motion under the load `load` wherever
+    q(t) is one of the system.
+
+    In the coordinates of a model, R is the negative of a swap of some of them. Where gaps between
+    bodies are coordinates, it is any matrix: the gap between two bodies that are swapped stays.
 
     Attributes
     ----------
     load
         The load of the mirror image.
-    places
-        For each coordinate of an image, the index of the original one whose negative it is.
+    turn
+        The matrix R, (coordinates, coordinates).
     parts
         The number of the image of each contact, then of each friction, then of each surface.
     centre
-        The mirror's centre c, a value of each coordinate; equal for coordinates that are swapped.
+        The mirror's centre c, a value of each coordinate, with R c = -c.
     """
 
     load: Load
-    places: tuple[int, ...]
+    turn: np.ndarray
     parts: tuple[int, ...]
     centre: tuple[float, ...]
 
@@ -74,8 +81,11 @@ class Mirror:
 
     @property
     def middle(self) -> float | None:
-        """The centre of all coordinates; None where they have different ones."""
-        return self.centre[0] if len(set(self.centre)) == 1 else None
+        """The centre of all coordinates; None where they have different ones, or where an image is
+        not the negative of one coordinate."""
+        if len(set(self.centre)) > 1 or not is_swap(-self.turn):
+            return None
+        return self.centre[0]
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """The images of states (..., 2 coordinates), coordinates and then velocities.
@@ -98,13 +108,45 @@ class Mirror:
         directions
             The differences.
         """
-        return np.asarray(-np.take(directions, self.places_of_state, axis=-1))
+        n = len(self.centre)
+        halves = (directions[..., :n], directions[..., n:])
+        return np.concatenate([half @ self.turn.T for half in halves], axis=-1)
 
     @cached_property
-    def places_of_state(self) -> np.ndarray:
-        """For each number of an image's state, the place of the original one."""
-        n = len(self.places)
-        return np.array([*self.places, *(n + place for place in self.places)])
+    def turn_of_state(self) -> np.ndarray:
+        """R of coordinates and of velocities, (2 coordinates, 2 coordinates)."""
+        return np.kron(np.eye(2), self.turn)
+
+
+def is_swap(matrix: np.ndarray) -> bool:
+    """Whether a matrix of 0 and 1 swaps numbers.
+
+    Parameters
+    ----------
+    matrix
+        The matrix, (n, n).
+    """
+    ones = matrix == 1.0
+    return bool(
+        (ones | (matrix == 0.0)).all() and (ones.sum(axis=0) == 1).all() and (ones == ones.T).all()
+    )
+
+
+@dataclass(frozen=True)
+class _Swap:
+    """A mirror symmetry in the coordinates of a model, 2 c - q(t) with some coordinates of q
+    swapped: for each coordinate of an image, the index of the original one whose negative it is.
+    """
+
+    load: Load
+    places: tuple[int, ...]
+    parts: tuple[int, ...]
+    centre: tuple[float, ...]
+
+    def mirror(self) -> Mirror:
+        """The same as a matrix."""
+        turn = 0.0 - np.eye(len(self.places))[list(self.places)]
+        return Mirror(self.load, turn, self.parts, self.centre)
 
 
 def mirror_of(system: System) -> Mirror | None:
@@ -126,6 +168,16 @@ def mirror_of(system: System) -> Mirror | None:
     """
     found: Mirror | None = system._remembered(mirror_of, lambda: _mirror_of(system))
     return found
+
+
+def _mirror_of(system: System) -> Mirror | None:
+    model = system.model
+    if isinstance(model, InGapCoordinates):
+        own = system.with_(model=model.as_given())
+        swap = _swap_of(own)
+        return None if swap is None else _in_gaps(own, swap)
+    swap = _swap_of(system)
+    return None if swap is None else swap.mirror()
 
 
 def middle_of(system: System) -> float | None:
@@ -164,15 +216,15 @@ def is_its_image_later(system: System) -> bool:
     system
         What moves, with a mirror symmetry and under a load with a frequency.
     """
-    inner = system.in_gap_coordinates
-    mirror = mirror_of(inner)
+    swap = _swap_of(system)
     period = system.load.period
-    assert mirror is not None, "asked for a system with the symmetry alone"
+    assert swap is not None, "asked for a system with the symmetry alone"
     assert period is not None, "asked for a load with a frequency alone"
-    if declares_mirror(inner.model):
+    if declares_mirror(system.model):
         return True
-    same = Mirror(inner.load, mirror.places, mirror.parts, mirror.centre)
-    return _moves_as_image(inner, same, 0.5 * period)
+    same = replace(swap, load=system.load)
+    parts = _images_of_parts(system, swap.places, system.load, swap.centre, 0.5 * period)
+    return parts == swap.parts and _moves_as_image(system, same, 0.5 * period)
 
 
 def has_half_the_period(system: System) -> bool:
@@ -216,70 +268,84 @@ def has_half_the_period(system: System) -> bool:
     return True
 
 
-def _mirror_of(system: System) -> Mirror | None:
+def _swap_of(system: System) -> _Swap | None:
+    """The symmetry of a system in its own coordinates; it is found once."""
+    found: _Swap | None = system._remembered(_swap_of, lambda: _swap_found(system))
+    return found
+
+
+def _swap_found(system: System) -> _Swap | None:
     model = system.model
     if model.has_multipliers:  # images of distances and rates are not known
         return None
-    inner = system.in_gap_coordinates
+    if getattr(system.in_gap_coordinates.model, "is_nonlinear", False):
+        return None  # nor those of functions of coordinates
     origin = (0.0,) * len(model.coordinates)
     if declares_mirror(model):
         load = model.mirror(system.load)
         if load is None:
             return None
         places = tuple(model.coordinates.index(name) for name in model.images)
-        if inner is not system:
-            known = mirror_of(inner)
-            return None if known is None else Mirror(load, places, known.parts, origin)
-        parts = _images_of_parts(system, places, origin)
+        parts = _images_of_parts(system, places, load, origin)
         if parts is None:
             return None
         mirrored = system.with_(load=load)
         for side in model.every_side:
             _check_declared(system, mirrored, side)
-        mirror = Mirror(load, places, parts, origin)
+        swap = _Swap(load, places, parts, origin)
         is_simple = not (model.surfaces or (isinstance(model, ContactModel) and model.jumps))
-        return mirror if is_simple or _moves_as_image(system, mirror) else None
-    if inner is not system:
-        return _of_given(system, inner)
+        return swap if is_simple or _moves_as_image(system, swap) else None
     for places in _pairings(model):
         for load in _loads(system.load):
             for centre in _centres(system, places, load):
-                parts = _images_of_parts(system, places, centre)
+                parts = _images_of_parts(system, places, load, centre)
                 if parts is None:
                     continue
-                mirror = Mirror(load, places, parts, centre)
-                if _moves_as_image(system, mirror):
-                    return mirror
+                swap = _Swap(load, places, parts, centre)
+                if _moves_as_image(system, swap):
+                    return swap
     return None
 
 
-def _of_given(system: System, inner: System) -> Mirror | None:
-    """The mirror symmetry of a system in its own coordinates, from that of its gaps."""
-    known = None if getattr(inner.model, "is_nonlinear", False) else mirror_of(inner)
-    if known is None:
-        return None
-    n = len(system.model.coordinates)
-    random = np.random.default_rng(2)
-    twin = system.with_(load=known.load)
-    states = list[np.ndarray]()
-    images = list[np.ndarray]()
-    for _ in range(2):
-        gaps = random.normal(size=2 * len(inner.model.coordinates))
-        state = np.concatenate(system.from_gaps(0.3, *np.split(gaps, 2)))
-        # the sums that follow from others are those of this state
-        gaps = np.concatenate(system.to_gaps(0.3, *np.split(state, 2)))
-        states.append(state)
-        images.append(np.concatenate(twin.from_gaps(0.3, *np.split(known.of(gaps), 2))))
-    rounding = IMAGE_ROUNDING * n * np.abs([*states, *images]).max()
-    for places in _pairings(system.model):
-        mirror = Mirror(known.load, places, known.parts, (0.0,) * n)
-        centre = 0.5 * (images[0] - mirror.turned(states[0]))[:n]
-        centre = np.where(np.abs(centre) < rounding, 0.0, centre)
-        mirror = replace(mirror, centre=tuple(centre.tolist()))
-        pairs = zip(states, images, strict=True)
-        if all(np.abs(image - mirror.of(state)).max() < rounding for state, image in pairs):
-            return mirror
-    return None
+def _in_gaps(own: System, swap: _Swap) -> Mirror:
+    """The symmetry of a system in the coordinates of its gaps, z = A q + m(t), from that in its own
+    ones: R = -A P A^-1.
+
+    Where m moves, it does so as its image: 2 c in z is A (2 c + P A^-1 m) + m' at all times.
+    """
+    model: Any = own.in_gap_coordinates.model
+    mirror = swap.mirror()
+    sums = np.array(model.gap_sums()[0])
+    turned = sums @ mirror.turn  # of the own coordinates
+    n = len(mirror.centre)
+    if is_swap(-mirror.turn) and swap.places == tuple(range(n)):
+        turn = 0.0 - np.eye(len(sums))  # what follows from others turns with them
+    else:
+        turn = np.zeros((len(sums), len(sums)))
+        turn[:, :n] = turned @ np.linalg.inv(sums[:n])
+        whole = np.rint(turn)
+        turn = np.where(np.abs(turn - whole) <= IMAGE_ROUNDING, whole, turn)
+    walls, images = (_walls(model, load, own) for load in (own.load, swap.load))
+    twice = (2.0 * sums @ np.array(mirror.centre))[:, None] - turn @ walls + images
+    centre = 0.5 * twice.mean(axis=1)
+    size = np.abs(twice).max(axis=1) + np.abs(walls).max(axis=1)
+    lengths = natural_units(own.in_gap_coordinates).lengths
+    centre = np.where(np.abs(centre) <= IMAGE_ROUNDING * (lengths + size), 0.0, centre)
+    return Mirror(swap.load, turn, swap.parts, tuple(centre.tolist()))
+
+
+def _walls(model: Any, load: Load, own: System) -> np.ndarray:
+    """m at some times over a period, (sums, times); half a period later it is at others of them."""
+    declared = DeclaredLoad(load, own.model)
+    columns = [model.walls_at(time, declared) for time in _instants(own).tolist()]
+    return np.array(columns, dtype=float).T
+
+
+def _instants(system: System) -> np.ndarray:
+    """Times over a forcing period, or over natural times without one."""
+    period = system.load.period
+    span = natural_units(system).time if period is None else period
+    return span * np.arange(INSTANTS) / INSTANTS
 
 
 def declares_mirror(model: Model) -> bool:
@@ -355,9 +421,8 @@ def _half_a_period_later(signal: Signal) -> Signal:
 
 
 def _centres(system: System, places: tuple[int, ...], load: Load) -> Iterator[tuple[float, ...]]:
-    """Centres about which a system may be its image: 0, then the middle of the contacts and
-    surfaces of each coordinate, and where others have none, the place where the forces are those
-    of the image.
+    """Centres about which a system may be its image: 0, then the middle of contacts and surfaces,
+    and where these leave it open, the place where the forces are those of the image.
     """
     model: Any = system.model
     n = len(model.coordinates)
@@ -367,46 +432,144 @@ def _centres(system: System, places: tuple[int, ...], load: Load) -> Iterator[tu
         if float(model.contact):
             yield (float(model.contact),)
         return
-    centre, is_known = _middles(model, places)
+    lengths = natural_units(system).lengths
+    centre, free = _middle_of_parts(system, places, load, lengths)
     # parts have their middle as centre, whatever that of the others is, which takes long to find
-    if _images_of_parts(system, places, tuple(centre.tolist())) is None:
+    if _images_of_parts(system, places, load, tuple(centre.tolist())) is None:
         return
-    if not is_known.all():
-        balanced = _balanced(system, places, load, centre, ~is_known)
+    if len(free):
+        balanced = _balanced(system, places, load, centre, NEWTON_SHARE * free)
         if balanced is None:
             return
         centre = balanced
-    lengths = natural_units(system).lengths
     centre = np.where(np.abs(centre) < IMAGE_ROUNDING * lengths, 0.0, centre)
     found = tuple(float(value) for value in centre)
     if found != origin:
         yield found
 
 
-def _middles(model: Any, places: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """The middle of all contacts, or surfaces, of each coordinate and of its image, (n,), and where
-    there is one, (n,)."""
-    n = len(places)
-    middles = np.zeros(n)
-    is_known = np.zeros(n, dtype=bool)
-    for parts in (model.surfaces, model.contacts):
-        positions = [
-            [float(part.position) for part in parts if part.coordinate == name]
-            for name in model.coordinates
-        ]
-        for i, place in enumerate(places):
-            both = positions[i] + positions[place]
-            if both:
-                middles[i] = math.fsum(both) / len(both)
-                is_known[i] = True
-    return middles, is_known
+def _middle_of_parts(
+    system: System, places: tuple[int, ...], load: Load, lengths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A centre in the middle of all contacts, and surfaces, and of their images, (n,), and the
+    directions in which they leave it open, (directions, n), in natural units.
+
+    The plane u q = p of a part has the image (u P) q = 2 u c - p. The mean of all planes of one
+    direction is that of their images.
+    """
+    order = list(places)
+    n = len(order)
+    # coordinates that are swapped have one centre
+    directions = np.zeros((n, n))
+    for i in range(n):
+        directions[i, [i, order[i]]] = lengths[i]
+    directions = directions[[i for i in range(n) if i <= order[i]]]
+    model: Any = system.model
+    equations = list[np.ndarray]()
+    values = list[float]()
+    for parts in (model.contacts, placed(model.surfaces)):
+        planes = [_Plane.of(part, system, load) for part in parts]
+        for plane in planes:
+            alike, images = (
+                [(other, factor) for other in planes if (factor := other.along(row)) is not None]
+                for row in (plane.row, plane.row[order])
+            )
+            if not images:
+                continue
+            here = np.mean([factor * (other.position - other.image) for other, factor in alike])
+            there = np.mean([factor * (other.position - other.wall) for other, factor in images])
+            equations.append(2.0 * directions @ plane.row)
+            values.append(float(here + there))
+    if not equations:
+        return np.zeros(n), directions
+    matrix = np.array(equations)
+    scale = np.linalg.norm(matrix, axis=1)
+    used = np.abs(matrix).max(axis=0) > 0.0
+    known = scale > 0.0  # a gap between two that are swapped stays, wherever the centre is
+    matrix = matrix[known][:, used] / scale[known, None]
+    shares = np.zeros(len(directions))
+    if not used.any():
+        return np.zeros(n), directions
+    left, sizes, right = np.linalg.svd(matrix)
+    rank = int(np.count_nonzero(sizes > INDEPENDENT * sizes[0]))
+    scaled = left[:, :rank].T @ (np.array(values)[known] / scale[known])
+    shares[used] = right[:rank].T @ (scaled / sizes[:rank])
+    open_ = np.concatenate([right[rank:] @ directions[used], directions[~used]])
+    return shares @ directions, open_
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """The plane of a part, row q + m(t) = position."""
+
+    row: np.ndarray
+    position: float
+    walls: np.ndarray  # m at some times of a period
+    images: np.ndarray  # m of the image's load, at times that may be later
+
+    @classmethod
+    def of(cls, part: Any, system: System, load: Load, later: float = 0.0) -> Self:
+        """That of a contact or surface, or with the position 0 of a friction."""
+        names = system.model.coordinates
+        row = np.zeros(len(names))
+        walls, images = np.zeros((2, INSTANTS))
+        times = _instants(system)
+        for name, factor in terms_of(part).items():
+            if name in names:
+                row[names.index(name)] = float(factor)
+                continue
+            for moved, signals, at in ((walls, system.load, times), (images, load, times + later)):
+                channel = getattr(DeclaredLoad(signals, system.model), name)
+                moved += float(factor) * np.array([float(channel(t)) for t in at.tolist()])
+        return cls(row, float(getattr(part, "position", 0.0)), walls, images)
+
+    @property
+    def wall(self) -> float:
+        """The mean of m."""
+        return float(self.walls.mean())
+
+    @property
+    def image(self) -> float:
+        """The mean of m of the image's load."""
+        return float(self.images.mean())
+
+    def is_in_image(
+        self,
+        other: _Plane,
+        factor: float,
+        centre: np.ndarray,
+        lengths: np.ndarray,
+        is_placed: bool,
+    ) -> bool:
+        """Whether 2 c - P q is on this plane under the image's load where q is on the other one,
+        of whose sum -P q's sum here is the `factor`; of planes that are not placed, whether both
+        move alike.
+        """
+        apart = self.images - factor * other.walls
+        size = float(np.abs(self.images).max() + np.abs(factor * other.walls).max())
+        if is_placed:
+            position = self.position - factor * other.position
+            apart = apart + 2.0 * float(self.row @ centre) - position
+            size += abs(self.position) + abs(factor * other.position)
+            size += 2.0 * float(np.abs(self.row) @ np.abs(centre))
+        else:
+            apart = apart - apart.mean()
+        size += IMAGE_ROUNDING * float(np.abs(self.row) @ lengths)
+        return bool(np.abs(apart).max() <= IMAGE_ROUNDING * size)
+
+    def along(self, row: np.ndarray) -> float | None:
+        """The factor of this plane's row that another row is; None where it is in another
+        direction."""
+        factor = float(row @ self.row) / float(self.row @ self.row)
+        apart = np.abs(row - factor * self.row).max()
+        return factor if factor and apart <= IMAGE_ROUNDING * np.abs(row).max() else None
 
 
 def _balanced(
-    system: System, places: tuple[int, ...], load: Load, centre: np.ndarray, is_free: np.ndarray
+    system: System, places: tuple[int, ...], load: Load, centre: np.ndarray, steps: np.ndarray
 ) -> np.ndarray | None:
-    """A centre about which the forces of images are images of the forces, by Newton's method in
-    the coordinates that `is_free`; None where they cannot be evaluated."""
+    """A centre about which the forces of images are images of the forces, by Newton's method along
+    `steps`, (steps, n); None where they cannot be evaluated."""
     model: Any = system.model
     n = len(places)
     units = natural_units(system)
@@ -417,11 +580,6 @@ def _balanced(
     v = random.normal(size=(n, PROBES)) * units.speeds[:, None]
     own, turned = (DeclaredLoad(one, model) for one in (system.load, load))
     order = list(places)
-    # coordinates that are swapped have one centre
-    free = [i for i in np.flatnonzero(is_free).tolist() if i <= order[i]]
-    steps = np.zeros((len(free), n))
-    for row, i in enumerate(free):
-        steps[row, [i, order[i]]] = NEWTON_SHARE * units.lengths[i]
 
     def unbalanced(middle: np.ndarray) -> np.ndarray:
         at = middle[:, None]
@@ -438,7 +596,7 @@ def _balanced(
                 size = np.linalg.norm(slopes, axis=1)
                 if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
                     return None
-                # a coordinate that no force depends on stays where it is
+                # what no force depends on stays where it is
                 moved = np.linalg.lstsq(slopes.T, -residual, rcond=IMAGE_ROUNDING)[0]
                 moved = np.where(size > 0.0, moved, 0.0)
                 centre = centre + moved @ steps
@@ -456,10 +614,14 @@ def _balanced(
 
 
 def _images_of_parts(
-    system: System, places: tuple[int, ...], centre: tuple[float, ...]
+    system: System,
+    places: tuple[int, ...],
+    load: Load,
+    centre: tuple[float, ...],
+    later: float = 0.0,
 ) -> tuple[int, ...] | None:
-    """The number of the mirror image of each contact, friction and surface; None if one has no
-    image or the laws differ."""
+    """The number of the mirror image, a time `later`, of each contact, friction and surface; None
+    if one has no image or the laws differ."""
     model: Any = system.model
     if not (model.contacts or model.frictions or model.surfaces):
         return ()
@@ -468,24 +630,28 @@ def _images_of_parts(
     if model.resets:
         return None  # nor those of resets
     lengths = natural_units(system).lengths
-    names = model.coordinates
+    order = list(places)
+    middle = np.array(centre)
 
     def same(a: Any, b: Any, size: float) -> bool:
         rounding = IMAGE_ROUNDING * (abs(float(a)) + abs(float(b)) + IMAGE_ROUNDING * size)
         return abs(float(a) - float(b)) <= rounding
 
-    def images_of(parts: Any, is_image: Callable[[Any, Any, int], bool]) -> list[int] | None:
-        """Each of the parts has another image; `is_image` knows the place of the coordinate."""
+    def images_of(
+        parts: Any, is_image: Callable[[Any, Any, float], bool], is_placed: bool = True
+    ) -> list[int] | None:
+        """Each of the parts has another image, on whose sum it depends by a factor that `is_image`
+        is told; its plane is that of the image, or moves as that does."""
+        planes = [_Plane.of(part, system, load, later) for part in parts]
         found = list[int]()
-        for part in parts:
-            # `places` is its own inverse: what acts on q_i acts on the coordinate of its image
-            place = places[names.index(part.coordinate)]
+        for part, plane in zip(parts, planes, strict=True):
             alike = (
                 number
-                for number, other in enumerate(parts)
+                for number, (other, image) in enumerate(zip(parts, planes, strict=True))
                 if number not in found
-                and names.index(other.coordinate) == place
-                and is_image(part, other, place)
+                and (factor := image.along(-plane.row[order])) is not None
+                and plane.is_in_image(image, factor, middle, lengths, is_placed)
+                and is_image(part, other, factor)
             )
             number = next(alike, None)
             if number is None:
@@ -493,18 +659,11 @@ def _images_of_parts(
             found.append(number)
         return found
 
-    def is_mirrored(one: Any, other: Any, place: int) -> bool:
-        """Whether the positions of two parts lie in each other's place in the mirror."""
-        image = 2.0 * centre[place] - float(one.position)
-        # the image of a position at 0 has the rounding of the centre
-        size = max(lengths[place], 2.0 * abs(centre[place]) / IMAGE_ROUNDING)
-        return same(image, other.position, size)
+    def is_image_of_contact(one: Any, other: Any, factor: float) -> bool:
+        return bool(one.sign * factor * other.sign > 0.0)
 
-    def is_image_of_contact(one: Any, other: Any, place: int) -> bool:
-        return bool(one.sign == -other.sign) and is_mirrored(one, other, place)
-
-    def is_image_of_surface(one: Any, other: Any, place: int) -> bool:
-        return is_mirrored(one, other, place)
+    def is_image_of_surface(one: Any, other: Any, factor: float) -> bool:
+        return True
 
     contacts = images_of(model.contacts, is_image_of_contact)
     surfaces = images_of(model.surfaces, is_image_of_surface)
@@ -513,7 +672,7 @@ def _images_of_parts(
     speed = natural_units(system).speed
     contact_names = [contact.name for contact in model.contacts]
 
-    def is_image_of_friction(one: Any, other: Any, place: int) -> bool:
+    def is_image_of_friction(one: Any, other: Any, factor: float) -> bool:
         pressed = [
             contact_names.index(friction.contact) if friction.contact else None
             for friction in (one, other)
@@ -522,14 +681,15 @@ def _images_of_parts(
         stribeck = [friction.stribeck_speed for friction in (one, other)]
         return (
             image == pressed[1]
+            and same(abs(factor), 1.0, 0.0)
             and same(one.kinetic, other.kinetic, 0.0)
             and same(one.most, other.most, 0.0)
-            and same(-one.ground_speed, other.ground_speed, speed)
+            and same(factor * one.ground_speed, other.ground_speed, speed)
             and (stribeck[0] is None) == (stribeck[1] is None)
             and (stribeck[0] is None or same(stribeck[0], stribeck[1], 0.0))
         )
 
-    frictions = images_of(model.frictions, is_image_of_friction)
+    frictions = images_of(model.frictions, is_image_of_friction, is_placed=False)
     if frictions is None:
         return None
     count = len(contacts)
@@ -544,7 +704,7 @@ def _images_of_parts(
 # --- equations ---------------------------------------------------------------
 
 
-def _moves_as_image(system: System, mirror: Mirror, later: float = 0.0) -> bool:
+def _moves_as_image(system: System, mirror: _Swap, later: float = 0.0) -> bool:
     """Whether the equations at images of states, a time `later`, are the images of those at the
     states, at many states of all sizes."""
     try:
@@ -562,7 +722,7 @@ def _moves_as_image(system: System, mirror: Mirror, later: float = 0.0) -> bool:
         return False
 
 
-def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: float) -> bool:
+def _is_image(system: System, twin: System, mirror: _Swap, side: int, later: float) -> bool:
     model: Any = system.model
     n = len(model.coordinates)
     units = natural_units(system)
@@ -575,7 +735,7 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
     ):
         return False  # the contact of an image is another one
     least = -DECADES * np.ones(PROBES)
-    if not mirror.is_about_origin:
+    if any(mirror.centre):
         # distances from the centre are known up to its rounding alone
         share = float(np.max(np.abs(around) / units.lengths))
         least = np.maximum(least, math.log10(share) - DIGITS)
@@ -642,7 +802,7 @@ def _is_image(system: System, twin: System, mirror: Mirror, side: int, later: fl
     )
 
 
-def _jumps_are_images(model: Any, mirror: Mirror, there: Any, image: Any) -> bool:
+def _jumps_are_images(model: Any, mirror: _Swap, there: Any, image: Any) -> bool:
     """Whether coordinates of first order jump as their images at the impacts of all contacts."""
     moving = len(model.moving)
     later = [place - moving for place in mirror.places[moving:]]

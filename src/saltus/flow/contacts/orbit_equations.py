@@ -52,7 +52,7 @@ def add_phases(end, column, span, frequency, phase, place, at_end):
 
 
 @cached_jit(
-    "void(Tuple((i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8, i8)), "
+    "void(Tuple((i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8, i8)), "
     "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])), "
     "Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])))"
 )
@@ -62,9 +62,8 @@ def contact_equations(request, followed, equations):
 
     `request` begins with the places of the free coordinates and velocities in the state at the
     start. The times of the segments' ends, (n + 1,), and the state asked for at the end follow.
-    Two arrays are for orbits that a mirror image closes, else empty: of each number of an image the
-    place of the original one, and what is added to the negative of this. The frequency and its
-    place among the parameters, or -1, are last. `followed` is what `follow_contact_segments` fills.
+    The state at the end is turned by a matrix, (2 own, 2 own), and moved by a vector, as the mirror
+    image is that closes an orbit. The frequency and its place among the parameters, or -1, are last. `followed` is what `follow_contact_segments` fills.
     """
     free, times, asked, image, shift, frequency, place = request
     ends, columns, maps, _ = followed
@@ -97,18 +96,17 @@ def contact_equations(request, followed, equations):
     after = SegmentEnd.NUMBERS + (8 if events > 0 else 4) * own
     for k in range(first):
         row = events + k
-        source = free[k]
-        sign = 1.0
-        moved = 0.0
-        if image.size > 0:
-            source = image[free[k]]
-            sign = -1.0
-            moved = shift[free[k]]
-        residual[row] = sign * ends[-1, after + source] + moved - asked[free[k]]
-        for j in range(later):
-            here[row, j] = sign * slope[source, j]
+        turned = 0.0
         there[row, k] = -1.0
-        if events > 0:
-            there[row, first] = sign * slope[source, later]
-        for j in range(count):
-            by_parameters[row, j] = sign * slope[source, later + 1 + j]
+        for source in range(2 * own):
+            factor = image[free[k], source]
+            if factor == 0.0:
+                continue
+            turned += factor * ends[-1, after + source]
+            for j in range(later):
+                here[row, j] += factor * slope[source, j]
+            if events > 0:
+                there[row, first] += factor * slope[source, later]
+            for j in range(count):
+                by_parameters[row, j] += factor * slope[source, later + 1 + j]
+        residual[row] = turned + shift[free[k]] - asked[free[k]]

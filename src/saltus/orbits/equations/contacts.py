@@ -749,12 +749,12 @@ class ContactsEquations(OrbitEquations):
 
     @cached_property
     def _image(self) -> tuple[np.ndarray, np.ndarray]:
-        """The mirror image that closes an orbit, as `contact_equations` takes it; empty arrays
-        without one."""
+        """The map of the state at the end that closes an orbit, as `contact_equations` takes it:
+        that of a mirror image, or none."""
         if not self.signature.symmetric:
-            return np.empty(0, dtype=np.int64), np.empty(0)
+            return np.eye(2 * self.own), np.zeros(2 * self.own)
         assert self.mirror is not None, "asked for where the symmetry is known alone"
-        return self.mirror.places_of_state, self.mirror.of(np.zeros(2 * self.own))
+        return self.mirror.turn_of_state, self.mirror.of(np.zeros(2 * self.own))
 
     def _extremes(self, seen: np.ndarray) -> np.ndarray:
         """The extremes along the segments, in the columns that orbits with one contact use

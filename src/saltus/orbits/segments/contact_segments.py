@@ -201,9 +201,14 @@ class _Maker:
         """E of an impact."""
         held = self.traced.contact_coordinates[contact]
         sign = float(self.traced.signs[contact])
-        first = held if mirror is None else mirror.places[held]
-        others = self._others(first)
+        first = held
         state = [number(0.0)] * (2 * self.dof)  # the held coordinate has equations of its own
+        if mirror is not None:
+            image = mirror.parts[contact]
+            first = self.traced.contact_coordinates[image]
+            state[first] = self.traced.positions[image]
+            state[self.dof + first] = -float(self.traced.signs[image]) * self.unknowns[1]
+        others = self._others(first)
         for k, i in enumerate(others):
             state[i] = self.unknowns[2 + k]
             state[self.dof + i] = self.unknowns[2 + len(others) + k]
@@ -217,12 +222,21 @@ class _Maker:
 
 def _image(mirror: Mirror, state: tuple[Expr, ...]) -> tuple[Expr, ...]:
     """The image of a state, coordinates and then velocities, in symbols."""
-    n = len(mirror.places)
-    positions = [
-        2.0 * centre - state[place]
-        for centre, place in zip(mirror.centre, mirror.places, strict=True)
-    ]
-    return (*positions, *(-1.0 * state[n + place] for place in mirror.places))
+    n = len(mirror.centre)
+    halves = (state[:n], state[n:])
+    positions, velocities = ([_sum(row, half) for row in mirror.turn.tolist()] for half in halves)
+    moved = [2.0 * centre + place for centre, place in zip(mirror.centre, positions, strict=True)]
+    return (*moved, *velocities)
+
+
+def _sum(factors: Sequence[float], values: Sequence[Expr]) -> Expr:
+    """A sum of values times factors, of which those that are 0 are left out."""
+    total = None
+    for factor, value in zip(factors, values, strict=True):
+        if factor:
+            term = factor * value
+            total = term if total is None else total + term
+    return number(0.0) if total is None else total
 
 
 def _solved(rows: list[list[Expr]]) -> list[Expr]:
