@@ -11,6 +11,8 @@ from typing import Any, ClassVar
 
 from saltus import (
     BeltOscillator,
+    Contact,
+    ContactModel,
     EnergyRestitution,
     Harmonic,
     InelasticImpact,
@@ -184,3 +186,38 @@ class Falling(BeltOscillator):
     def normal_forces(self, t, x, velocity, load):
         sliding = velocity - self.belt_speed
         return (self.normal_force / (1.0 + 2.0 * sliding * sliding),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row(ContactModel):
+    """Two alike bodies between two walls, which hit each other too: the mirror swaps them, and the
+    gap between them stays. The last gap follows from the others.
+    """
+
+    length: float = 2.0
+    second: float = 1.0
+    between: bool = True
+    walls: bool = True
+    bend: float = 0.0
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        walls = (
+            Contact(name="low", coordinate="a"),
+            Contact(name="high", coordinate="b", position=self.length, sign=-1),
+        )
+        middle = Contact(name="middle", coordinate={"b": 1.0, "a": -1.0})
+        return (*walls[: 2 * self.walls], *(middle,) * self.between)
+
+    def mass_matrix(self, q: Any) -> Any:
+        return [[1.0, 0.0], [0.0, self.second]]
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        (a, b), push = q, load.force(t)
+        low, high = a - 0.25 * self.length, b - 0.75 * self.length
+        return (
+            push - low - self.bend * low**2 - 0.1 * v[0],
+            push - high + self.bend * high**2 - 0.1 * v[1],
+        )

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from shared_systems import Row
 
 import saltus
 import saltus.systems.mirror as mirror_module
@@ -125,37 +126,6 @@ class Walls(saltus.ContactModel):
 
     def force(self, t: Any, x: Any, velocity: Any, load: Any) -> Any:
         return -0.1 * velocity - x
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row(saltus.ContactModel):
-    """Two alike bodies between two walls, which hit each other too: the mirror swaps them, and the
-    gap between them stays. The last gap follows from the others.
-    """
-
-    length: float = 2.0
-    second: float = 1.0
-    between: bool = True
-    walls: bool = True
-    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
-    channels: ClassVar[tuple[str, ...]] = ("force",)
-
-    @property
-    def contacts(self) -> tuple[saltus.Contact, ...]:
-        walls = (
-            saltus.Contact(name="low", coordinate="a"),
-            saltus.Contact(name="high", coordinate="b", position=self.length, sign=-1),
-        )
-        middle = saltus.Contact(name="middle", coordinate={"b": 1.0, "a": -1.0})
-        return (*walls[: 2 * self.walls], *(middle,) * self.between)
-
-    def mass_matrix(self, q: Any) -> Any:
-        return [[1.0, 0.0], [0.0, self.second]]
-
-    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
-        (a, b), push = q, load.force(t)
-        low = push - (a - 0.25 * self.length) - 0.1 * v[0]
-        return low, push - (b - 0.75 * self.length) - 0.1 * v[1]
 
 
 @dataclass(frozen=True, kw_only=True)

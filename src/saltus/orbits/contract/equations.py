@@ -727,14 +727,25 @@ class OrbitEquations(ABC):
         return () if self.mirror is None else self.mirror.parts
 
     def image_of(self, states: np.ndarray) -> np.ndarray:
-        """The mirror images of states (..., 2 coordinates)."""
+        """The mirror images of states (..., 2 coordinates); sums that follow from others are 0 in
+        them, as in the unknowns."""
         assert self.mirror is not None, "asked for where the symmetry is known alone"
-        return self.mirror.of(states)
+        images = self.mirror.of(states)
+        images[..., self._sums] = 0.0
+        return images
 
     def turned(self, directions: np.ndarray) -> np.ndarray:
         """The mirror images of differences of states (..., 2 coordinates)."""
         assert self.mirror is not None, "asked for where the symmetry is known alone"
-        return self.mirror.turned(directions)
+        images = self.mirror.turned(directions)
+        images[..., self._sums] = 0.0
+        return images
+
+    @cached_property
+    def _sums(self) -> np.ndarray:
+        """The places of sums that follow from other coordinates, and of their rates."""
+        first = self.own - self.system.dependent
+        return np.array([*range(first, self.own), *range(self.own + first, 2 * self.own)], int)
 
     @cached_property
     def halved(self) -> Self:
