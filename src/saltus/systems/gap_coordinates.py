@@ -130,16 +130,6 @@ class InGapCoordinates(ContactModel):
         """The coordinates: mirror images that swap some are not looked for."""
         return self.coordinates
 
-    def mirror(self, load: Any) -> Any:
-        """That of the model as it was given, unless its mirror images swap coordinates or functions
-        of them are in sums.
-        """
-        return (
-            None
-            if self.is_nonlinear or self.own_class.images is not ContactModel.images
-            else super().mirror(load)
-        )
-
     @property
     def stops(self) -> tuple[str, ...]:  # type: ignore[override]
         """Those of the model as it was given, and where functions that stand for coordinates
