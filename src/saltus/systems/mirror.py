@@ -503,6 +503,7 @@ class _Plane:
     """The plane of a part, row q + m(t) = position."""
 
     row: np.ndarray
+    lengths: np.ndarray  # of the coordinates, by which the entries of rows can be compared
     position: float
     walls: np.ndarray  # m at some times of a period
     images: np.ndarray  # m of the image's load, at times that may be later
@@ -521,7 +522,8 @@ class _Plane:
             for moved, signals, at in ((walls, system.load, times), (images, load, times + later)):
                 channel = getattr(DeclaredLoad(signals, system.model), name)
                 moved += float(factor) * np.array([float(channel(t)) for t in at.tolist()])
-        return cls(row, float(getattr(part, "position", 0.0)), walls, images)
+        position = float(getattr(part, "position", 0.0))
+        return cls(row, natural_units(system).lengths, position, walls, images)
 
     @property
     def wall(self) -> float:
@@ -534,12 +536,7 @@ class _Plane:
         return float(self.images.mean())
 
     def is_in_image(
-        self,
-        other: _Plane,
-        factor: float,
-        centre: np.ndarray,
-        lengths: np.ndarray,
-        is_placed: bool,
+        self, other: _Plane, factor: float, centre: np.ndarray, is_placed: bool
     ) -> bool:
         """Whether 2 c - P q is on this plane under the image's load where q is on the other one,
         of whose sum -P q's sum here is the `factor`; of planes that are not placed, whether both
@@ -554,15 +551,20 @@ class _Plane:
             size += 2.0 * float(np.abs(self.row) @ np.abs(centre))
         else:
             apart = apart - apart.mean()
-        size += IMAGE_ROUNDING * float(np.abs(self.row) @ lengths)
+        size += IMAGE_ROUNDING * float(np.abs(self.row) @ self.lengths)
         return bool(np.abs(apart).max() <= IMAGE_ROUNDING * size)
 
     def along(self, row: np.ndarray) -> float | None:
         """The factor of this plane's row that another row is; None where it is in another
         direction."""
-        factor = float(row @ self.row) / float(self.row @ self.row)
-        apart = np.abs(row - factor * self.row).max()
-        return factor if factor and apart <= IMAGE_ROUNDING * np.abs(row).max() else None
+        own = self.lengths * self.row
+        other = self.lengths * row
+        size = float(own @ own)
+        if not size:
+            return None
+        factor = float(other @ own) / size
+        apart = np.abs(other - factor * own).max()
+        return factor if factor and apart <= IMAGE_ROUNDING * np.abs(other).max() else None
 
 
 def _balanced(
@@ -629,7 +631,6 @@ def _images_of_parts(
         return None  # images of functions are not looked for, nor those of relays
     if model.resets:
         return None  # nor those of resets
-    lengths = natural_units(system).lengths
     order = list(places)
     middle = np.array(centre)
 
@@ -650,7 +651,7 @@ def _images_of_parts(
                 for number, (other, image) in enumerate(zip(parts, planes, strict=True))
                 if number not in found
                 and (factor := image.along(-plane.row[order])) is not None
-                and plane.is_in_image(image, factor, middle, lengths, is_placed)
+                and plane.is_in_image(image, factor, middle, is_placed)
                 and is_image(part, other, factor)
             )
             number = next(alike, None)
