@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -71,6 +71,33 @@ class Swapped(saltus.ContactModel):
     def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
         (a, b), push = q, load.force(t)
         return push - a + 0.3 * (b - a) - 0.1 * v[0], push - b + 0.3 * (a - b) - 0.1 * v[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupled(saltus.ContactModel):
+    """The same on springs of their own and one between them, far from the origin."""
+
+    rest: float = 0.0
+    stiffness: float = 1.0
+    second: float | None = None  # the other spring's stiffness, where it differs
+    coupling: float = 0.0
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        return (
+            saltus.Contact(name="low", coordinate="a", position=self.rest - 1.0),
+            saltus.Contact(name="high", coordinate="b", position=self.rest + 1.0, sign=-1),
+        )
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        a, b, push = q[0] - self.rest, q[1] - self.rest, load.force(t)
+        second = self.stiffness if self.second is None else self.second
+        return (
+            push - self.stiffness * a - self.coupling * b - 0.1 * v[0],
+            push - second * b - self.coupling * a - 0.1 * v[1],
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,6 +263,16 @@ def test_units_do_not_matter(scale: float) -> None:
     assert is_symmetric(under(model, amplitude=0.3 * scale))
     assert not is_symmetric(under(model, amplitude=0.3 * scale, mean=0.3e-9 * scale))
     assert not is_symmetric(under(saltus.TwoStops(left=-scale, right=1.001 * scale)))
+
+
+@pytest.mark.parametrize("rest", [1.0, 1e3, 3e4])
+def test_rounding_far_from_the_origin_does_not_break_a_symmetry(rest: float) -> None:
+    """There, places have the rounding of their origin, of which springs may leave all."""
+    random = np.random.default_rng(8)
+    for stiffness, coupling in random.uniform((1.0, -0.5), (3.0, 0.5), (60, 2)).tolist():
+        model = Coupled(rest=rest, stiffness=stiffness, coupling=coupling)
+        assert is_symmetric(under(model, amplitude=0.1)), model
+    assert not is_symmetric(under(replace(model, second=stiffness * (1.0 + 1e-6))))
 
 
 def test_a_mirror_that_is_found_is_the_one_that_is_declared() -> None:

@@ -43,6 +43,7 @@ DECLARED_ROUNDING = 1e-9
 DECADES = 6.0  # their sizes lie so many powers of ten below and above the natural units
 # Distances from a mirror's centre are looked at down to so many powers of ten below its value.
 DIGITS = 4.0
+ROUNDED_BY = 2.0**-49  # relative changes of places by which their rounding is known
 INSTANTS = 8  # of a period, at which walls that move are compared with their images
 INDEPENDENT = 1e-9  # parts whose directions differ by less have one direction
 NEWTON_STEPS = 30  # most steps in which a mirror's centre is found
@@ -754,18 +755,19 @@ def _is_image(system: System, twin: System, mirror: _Swap, side: int, later: flo
     image = (t + later, _of(middle - q[places]), _of(-v[places]))
     image_side = -side if model.sides else side
     # M and r say what M^-1 r does, which takes seconds for hundreds of coordinates
-    by_force = isinstance(model, ContactModel) and not system.dependent
-    if by_force:
-        forces = [
-            _rows(mass_and_force(model, *at, own_load)[1], n)
-            for at, own_load in ((there, load), (image, image_load))
-        ]
-    else:
-        forces = [
-            _rows(model.acceleration(*at, own_side, own_load), n)
-            for at, own_side, own_load in ((there, side, load), (image, image_side, image_load))
-        ]
-    if not _alike(forces[0][places], -forces[1]):
+    by_force = isinstance(model, ContactModel)
+
+    def force(at: Any, own_side: int, own_load: Any) -> np.ndarray:
+        if by_force:
+            return _rows(mass_and_force(model, at[0], at[1], at[2], own_load)[1], n)
+        return _rows(model.acceleration(at[0], at[1], at[2], own_side, own_load), n)
+
+    forces = [force(there, side, load), force(image, image_side, image_load)]
+    # Far from the origin the places themselves have rounding, which may leave little of a force.
+    ulps = ROUNDED_BY * random.choice([-1.0, 1.0], size=q.shape)
+    moved = force((t, _of((middle + q) * (1.0 + ulps)), there[2]), side, load)
+    rounding = np.where(np.isfinite(moved), np.abs(moved - forces[0]), 0.0)
+    if not _alike(forces[0][places], -forces[1], rounding[places]):
         return False
     if isinstance(model, ContactModel):
         masses = [
@@ -823,9 +825,9 @@ def _margins_are_alike(model: Any, there: Any, image: Any) -> bool:
     return all(_alike(_rows(own[name], 1), _rows(other[name], 1)) for name in own)
 
 
-def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+def _alike(one: np.ndarray, other: np.ndarray, rounding: np.ndarray | None = None) -> bool:
     """Whether values (..., probes) are equal up to rounding of the largest one at each probe, and
-    nearly everywhere up to their own. Probes that are not finite do not count, but half of them
+    nearly everywhere up to their own; `rounding` is what comes from elsewhere. Probes that are not finite do not count, but half of them
     must be."""
     if not one.size:
         return True
@@ -833,7 +835,10 @@ def _alike(one: np.ndarray, other: np.ndarray) -> bool:
     sound = np.isfinite(one).all(axis=0) & np.isfinite(other).all(axis=0)
     if 2 * np.count_nonzero(sound) < len(sound):
         return False
-    apart = np.abs(one - other)[:, sound]
+    apart = np.abs(one - other)
+    if rounding is not None:
+        apart = np.maximum(apart - rounding, 0.0)
+    apart = apart[:, sound]
     size = np.abs(one)[:, sound]
     # a value that is a small difference of large ones has their rounding
     by_own = np.count_nonzero(apart <= IMAGE_ROUNDING * size, axis=1)
