@@ -90,6 +90,44 @@ def test_angles_are_drawn_in_degrees_where_they_are(given):
     plt.close("all")
 
 
+def written(axis):
+    """The places of the ticks of an axis that are seen, and the numbers beside them."""
+    low, high = sorted(axis.get_view_interval())
+    ticks = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+    texts = [tick.label1.get_text() or tick.label2.get_text() for tick in ticks]
+    numbers = [float(text.replace("\N{MINUS SIGN}", "-")) for text in texts]
+    return np.array([tick.get_loc() for tick in ticks]), np.array(numbers)
+
+
+def test_angles_of_sweeps_starts_and_colour_bars_are_in_degrees():
+    cell = saltus.System(
+        model=saltus.Metainterface(beta0=1.4, damping=0.1),
+        load=saltus.Load(frequency=1.0, horizontal=saltus.Harmonic(0.5), vertical=-0.5),
+    )
+    sweep = saltus.frequency_sweep(
+        cell, np.linspace(0.0, 1.2, 3), path="load.horizontal.phase", periods=4, theta=0.3
+    )
+    many = saltus.simulate_many(
+        cell,
+        theta=np.linspace(-0.5, 0.5, 4)[:, None],
+        velocity=np.linspace(0.0, 0.3, 3),
+        periods=1,
+    )
+    response = saltus.plot(sweep, degrees=True)
+    shaded = saltus.plot(many, quantity="theta", degrees=True)
+    (bar,) = [mesh.colorbar.ax for mesh in shaded.collections if mesh.colorbar is not None]
+    for axis in (response.xaxis, response.yaxis, shaded.xaxis, shaded.yaxis, bar.yaxis):
+        assert axis.label.get_text().endswith(" (deg)")
+        plots.figure_of(axis.axes).draw_without_rendering()
+        places, numbers = written(axis)
+        assert len(numbers) >= 2
+        np.testing.assert_allclose(numbers, np.degrees(places), rtol=5e-3, atol=1e-9)
+    plain = saltus.plot(sweep)
+    assert plain.get_xlabel() == "phase of the horizontal (rad)"
+    assert saltus.plot(many, quantity="theta").figure.axes[1].get_ylabel().endswith("(rad)")
+    plt.close("all")
+
+
 def test_a_branch_is_drawn_by_the_extreme_of_a_coordinate(branch):
     ax = saltus.plot(branch, quantity="highest")
     ax.figure.draw_without_rendering()  # which reads the mathematical text

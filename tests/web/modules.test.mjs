@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { allDigits, degreesOf, radians, roundStep, tickLabel, ticks, typedNumber } from "../../src/saltus/web/page/numbers.js";
 import { asText, symbolOf } from "../../src/saltus/web/page/symbols.js";
 import { linkOf, stateOf } from "../../src/saltus/web/page/link.js";
-import { firstState, goesOn, prepared, tamed } from "../../src/saltus/web/page/description.js";
+import { firstState, goesOn, prepared, startEntries, tamed } from "../../src/saltus/web/page/description.js";
 import { cellPoints } from "../../src/saltus/web/page/cell_drawing.js";
 import { amplitudeOf } from "../../src/saltus/web/page/settling.js";
 import { changesOf, halve } from "../../src/saltus/web/page/sweep.js";
@@ -86,6 +86,16 @@ test("names are set as symbols", () => {
   assert.equal(asText(symbolOf("beta0")), "β₀");
   assert.equal(asText(symbolOf("x_velocity")), "x\u0307");
   assert.equal(asText(symbolOf("<img src=x>")), "<img src=x>");
+});
+
+test("sliders of a start reach as far as the system moves, or 2 where no such distance is given", () => {
+  const ends = (coordinate, start) => {
+    const described = prepared({ ...description, start: { time: 0, ...start }, model: { ...description.model, coordinates: [coordinate] } });
+    return startEntries(described, firstState(described), true).slice(0, 2).map(({ low, high }) => [low, high]);
+  };
+  const x = { name: "x", velocity: "x_velocity", unit: "1" };
+  assert.deepEqual(ends(x, { x: 0, x_velocity: 3 }), [[-2, 2], [-6, 6]]);
+  assert.deepEqual(ends({ ...x, reach: [0.002, 0.5] }, { x: 0.005, x_velocity: 0 }), [[-0.01, 0.01], [-0.5, 0.5]]);
 });
 
 test("a link holds the whole state", () => {

@@ -211,3 +211,80 @@ def test_numbers_that_can_have_one_value_here():
         ],
         "structure": [],
     }
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_sliders_of_systems_without_dimensions_reach_1_or_twice_the_value(name):
+    for entry in ENTRIES[name].values():
+        reach = math.pi if entry["unit"] == "rad" else max(1.0, 2.0 * abs(entry["value"]))
+        ends = entry["value"] - reach, entry["value"] + reach
+        assert (entry["low"], entry["high"]) == pytest.approx(ends), entry["path"]
+
+
+def stiff(length=1.0, **changes):
+    """A mass of 1 kg on a spring of 1e4 N/m at a wall, under 5 N at 120 rad/s, where a metre is
+    `length`: the force moves it by 0.7 mm.
+    """
+    numbers = {"wall": 2e-3 * length, "damping": 0.1, "stiffness": 1e4} | changes
+    return saltus.System(
+        model=saltus.WallOscillator(**numbers),
+        load=saltus.Load(frequency=120.0, force=Harmonic(5.0 * length)),
+        impact=saltus.NewtonImpact(e=0.1),
+    )
+
+
+def entries_of(system):
+    return {entry["path"]: entry for entry in description(PortableMotion(system))["numbers"]}
+
+
+def ends(entry):
+    return entry["low"], entry["high"]
+
+
+def test_sliders_in_si_units_reach_twice_the_value():
+    found = entries_of(stiff())
+    assert ends(found["model.wall"]) == pytest.approx((-2e-3, 6e-3))
+    assert ends(found["model.damping"]) == pytest.approx((-0.1, 0.3))
+    assert ends(found["load.frequency"]) == pytest.approx((-120.0, 360.0))
+    assert ends(found["load.force.mean"]) == pytest.approx(
+        (-5.0, 5.0)
+    )  # as the amplitude beside it
+    assert ends(found["impact.e"]) == pytest.approx((-0.9, 1.1))  # which its bounds cut, as ever
+
+
+def test_a_slider_of_0_reaches_as_far_as_the_system_moves_in_any_unit():
+    for length in (1.0, 1e3, 1e6):  # m, mm, um
+        system = stiff(length, wall=0.0)
+        low, high = ends(entries_of(system)["model.wall"])
+        # the load moves the equilibrium by 2 F / (m Omega^2), from one end of its swing to the other
+        assert (low, high) == (-high, pytest.approx(2.0 * 5.0 / 120.0**2 * length, rel=0.06))
+        (coordinate,) = description(PortableMotion(system))["model"]["coordinates"]
+        assert coordinate["reach"] == pytest.approx(
+            [2.0 * high, 2.0 * high * 120.0], rel=0.1
+        )  # two digits
+
+
+def test_a_declared_unit_says_what_a_slider_of_0_measures():
+    @dataclass(frozen=True, kw_only=True)
+    class Offset(saltus.ContactModel):
+        stiffness: float = 1e4
+        offset: float = field(default=0.0, metadata=saltus.number_range(unit="m"))
+        speed: float = field(default=0.0, metadata=saltus.number_range(unit="m/s"))
+        unknown: float = 0.0
+        coordinates = ("x",)
+        channels = ("force",)
+        contacts = (saltus.Contact(name="wall", coordinate="x", position=-2e-3),)
+
+        def force(self, t, x, velocity, load):
+            drag = 2.0 * (velocity - self.speed) + self.unknown
+            return load.force(t) - self.stiffness * (x - self.offset) - drag
+
+    system = saltus.System(
+        model=Offset(), load=saltus.Load(frequency=120.0, force=Harmonic(5.0)), impact=HARD
+    )
+    found = entries_of(system)
+    length = saltus.systems.natural_units(system).length
+    assert length < 0.01
+    assert found["model.offset"]["high"] == pytest.approx(length, rel=0.06)
+    assert found["model.speed"]["high"] == pytest.approx(length * 120.0, rel=0.06)
+    assert ends(found["model.unknown"]) == (-1.0, 1.0)

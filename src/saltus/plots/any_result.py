@@ -21,7 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
 from saltus.checks import check_number
 from saltus.errors import ParameterError, near, shown
@@ -340,7 +340,7 @@ def plot(
     style
         A style of Matplotlib on top of the conventions: a name, a file or a dictionary.
     degrees
-        Whether axes of angles have degrees in place of radians.
+        Whether axes and colour bars of angles have degrees in place of radians.
     options
         Options of the function that draws it, such as `ax=` (or `figure=` for several panels) and
         `width=`, in mm.
@@ -401,14 +401,33 @@ class DegreeTicks(MaxNLocator):
 
 
 def in_degrees(axes: Any) -> None:
-    """Write the numbers of axes in rad as degrees; what is drawn stays where it is."""
+    """Write the numbers of axes in rad, and of their colour bars, as degrees; what is drawn stays
+    where it is."""
     for ax in np.ravel(axes):
         for axis in (ax.xaxis, ax.yaxis):
-            text = axis.label.get_text()
-            if text.endswith(" (rad)"):
-                axis.label.set_text(text.removesuffix("(rad)") + "(deg)")
-                axis.set_major_locator(DegreeTicks(nbins=6, steps=[1, 1.5, 2, 3, 4.5, 5, 9, 10]))
+            if _say_degrees(axis.label):
+                axis.set_major_locator(DegreeTicks(nbins=6, steps=DEGREE_STEPS))
                 axis.set_major_formatter(lambda value, place: f"{math.degrees(value):.10g}")
+        for shaded in (*ax.collections, *ax.images):
+            bar = getattr(shaded, "colorbar", None)
+            if bar is None or not _say_degrees(bar.ax.yaxis.label):
+                continue
+            if not isinstance(bar.locator, FixedLocator):  # that of the edges of its colours
+                bar.locator = DegreeTicks(nbins=6, steps=DEGREE_STEPS)
+            bar.formatter = FuncFormatter(lambda value, place: f"{math.degrees(value):.3g}")
+            bar.update_ticks()
+
+
+def _say_degrees(label: Any) -> bool:
+    """Whether the name of an axis has the unit rad, which becomes deg."""
+    text = label.get_text()
+    if text.endswith(" (rad)"):
+        label.set_text(text.removesuffix("(rad)") + "(deg)")
+        return True
+    return False
+
+
+DEGREE_STEPS = (1, 1.5, 2, 3, 4.5, 5, 9, 10)
 
 
 LETTER = 1.75  # mm, the mean width of a letter of that size

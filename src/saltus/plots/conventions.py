@@ -424,10 +424,11 @@ def parameter_name(path: str) -> str:
         return PARAMETERS.get(path, path)
     owner, _, own = path.rpartition(".")
     whose = owner.removeprefix("load.").replace("_", " ").replace(".", " ")
+    unit = " (rad)" if owner.startswith("load.") and own == "phase" else ""
     return (
         own.replace("_", " ")
         if owner in ("model", "impact", "load")
-        else f"{own.replace('_', ' ')} of the {whose}"
+        else f"{own.replace('_', ' ')} of the {whose}{unit}"
     )
 
 

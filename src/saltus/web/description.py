@@ -31,6 +31,7 @@ from saltus.systems import (
     stops_of,
 )
 from saltus.web.objects import KERNEL_DATA, KERNEL_FUNCTIONS, kernel_code, structure_code
+from saltus.web.slider_ranges import reach_of, start_reaches
 
 FREQUENCY = "load.frequency"
 # How far beside its value a number is tried, odd in its digits so that no sentence has them.
@@ -77,6 +78,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
     states = state_names(model.coordinates)
     size = len(model.coordinates)
     units = [model.unit_of(name) for name in model.coordinates]
+    reaches = start_reaches(system)
 
     def below(part: Any, where: str) -> list[str]:
         return [path for path, _ in numbers(part, where, given=True)]
@@ -96,6 +98,7 @@ def description(motion: PortableMotion) -> dict[str, Any]:
                     "velocity": f"{name}_velocity",
                     "python_velocity": states[size + i],
                     "unit": units[i],
+                    **({"reach": reaches[i]} if reaches else {}),
                 }
                 for i, name in enumerate(model.coordinates)
             ],
@@ -192,10 +195,11 @@ def _numbers(system: System) -> Iterator[dict[str, Any]]:
     """Each number of a system, in the order in which compiled code has them."""
     given = {path for path, _ in numbers(system, given=True)}
     for path, value in numbers(system):
-        where, called, declared = _declared(system, path)
+        holder, field, where = _holder(system, path)
+        called, declared = _declared(holder, field)
         unit = declared.unit
         whole = declared.whole
-        reach = math.pi if unit == "rad" else max(1.0, 2.0 * abs(value))
+        reach = reach_of(system, path, value, holder, field, declared)
         yield {
             "path": path,
             "name": path.rpartition(".")[2],
@@ -210,10 +214,8 @@ def _numbers(system: System) -> Iterator[dict[str, Any]]:
         }
 
 
-def _declared(system: System, path: str) -> tuple[str, str, NumberRange]:
-    """Of a number: the path of the part that holds it, how refusals call a part that has a name of
-    its own, and the range that its field declares.
-    """
+def _holder(system: System, path: str) -> tuple[Any, str, str]:
+    """The part of a system that holds a number, the name of its field there, and the part's path."""
     node: Any = system
     field = where = ""
     holder: Any = system
@@ -223,13 +225,20 @@ def _declared(system: System, path: str) -> tuple[str, str, NumberRange]:
             field = name
             where = ".".join(names[:number])
         node = children(node).get(name)
+    return holder, field, where
+
+
+def _declared(holder: Any, field: str) -> tuple[str, NumberRange]:
+    """How refusals call a part that has a name of its own, and the range that a field of it
+    declares.
+    """
     kind: Any = type(holder)
     called = f" of {called_part(holder)}" if "coordinate" in fields_of(kind) else ""
     if field in ranges_of(kind):
-        return where, called, ranges_of(kind)[field]
+        return called, ranges_of(kind)[field]
     # a constant of a load has its channel's path; a field may declare its unit alone
     units = {f.name: f.metadata.get("unit", "") for f in dataclasses.fields(holder)}
-    return where, called, NumberRange(unit=str(units.get(field, "")))
+    return called, NumberRange(unit=str(units.get(field, "")))
 
 
 def _range(

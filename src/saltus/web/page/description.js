@@ -67,13 +67,13 @@ export function firstState(description) {
 
 /** The initial state and the duration as numbers with sliders. @param {Description} description @param {State} first @param {boolean} periodic @returns {NumberEntry[]} */
 export function startEntries(description, first, periodic) {
-  const reach = (/** @type {number} */ value) => Math.max(2, 2 * Math.abs(value));
-  const states = description.model.coordinates.flatMap(({ name, velocity, unit }) => {
+  const states = description.model.coordinates.flatMap(({ name, velocity, unit, reach: [far, fast] = [2, 2] }) => {
     const angle = unit === "rad";
     const [x, v] = [first.start[name] ?? 0, first.start[velocity] ?? 0];
+    const [dx, dv] = [Math.max(far, 2 * Math.abs(x)), Math.max(fast, 2 * Math.abs(v))];
     return [
-      { path: `start.${name}`, unit, value: x, low: -reach(x), high: reach(x), angle, symbol: name },
-      { path: `start.${velocity}`, unit: "1", value: v, low: -reach(v), high: reach(v), symbol: `${name}_velocity` },
+      { path: `start.${name}`, unit, value: x, low: -dx, high: dx, angle, symbol: name },
+      { path: `start.${velocity}`, unit: "1", value: v, low: -dv, high: dv, symbol: `${name}_velocity` },
     ];
   });
   const time = { path: "start.time", unit: "1", value: first.start.time ?? 0, low: 0, high: 2 * Math.PI, symbol: "tau" };

@@ -6,7 +6,7 @@
  *   range?: import("./checks.js").Range}} NumberEntry  One number of the system, by the path that Python uses.
  * @typedef {{channel: string, kind: string, parameters: NumberEntry[]}} LoadEntry
  * @typedef {{name: string, kind: string, meaning?: string}} MarginEntry  `kind`: "landmark", "assumption" or "limit".
- * @typedef {{name: string, velocity: string, unit: string}} CoordinateEntry
+ * @typedef {{name: string, velocity: string, unit: string, reach?: [number, number]}} CoordinateEntry
  *
  * @typedef {{coordinate: number, side: number, position: number, slopes: Record<string, number>, base: Record<string, number>}} Stop  A wall in a
  *   drawing: `side` is +1 to the right of the mass; the position changes with numbers by slopes from their base.
