@@ -165,6 +165,47 @@ def grow_faster(coefficients, first, last, size, rate):
     return False
 
 
+# `surely_slower` looks at series of this order at least, and allows for this much rounding; the
+# factors are below those by which `step_size` lets earlier terms exceed the last ones.
+LEAST_ORDER = 16
+BY_ROUNDING = 1.0 - 1e-9
+BY_HALF = math.exp(GAP)
+BY_PAIR = math.exp(PAIR_GAP * (1.0 - 3.0 / LEAST_ORDER))
+BY_SECOND_PAIR = math.exp(2.0 * PAIR_GAP * (1.0 - 5.0 / LEAST_ORDER))
+
+
+@lean_jit
+def surely_slower(coefficients, order, size, largest):
+    """Whether `grow_faster` is certainly false wherever `step_size` asks it: mostly so, and found by
+    a single exponential.
+    """
+    if order < LEAST_ORDER:
+        return False
+    half = order // 2
+    pairs = order - 5
+    rate = math.exp(largest)
+    faster = rate * BY_HALF
+    of_half = BY_ROUNDING * size * faster**half
+    of_pairs = BY_ROUNDING * size * rate**pairs
+    for i in range(coefficients.shape[0]):
+        bound = of_half
+        for k in range(half, pairs):
+            if not abs(coefficients[i, k]) <= bound:
+                return False
+            bound *= faster
+        bound = of_pairs * BY_SECOND_PAIR
+        if not abs(coefficients[i, pairs]) <= bound:
+            return False
+        if not abs(coefficients[i, pairs + 1]) <= bound * rate:
+            return False
+        bound = of_pairs * BY_PAIR * rate * rate
+        if not abs(coefficients[i, pairs + 2]) <= bound:
+            return False
+        if not abs(coefficients[i, pairs + 3]) <= bound * rate:
+            return False
+    return True
+
+
 @lean_jit
 def step_size(coefficients, order, size, tol):
     """The step h at which the last two terms of the series are tol, relative to `size`.
@@ -177,12 +218,14 @@ def step_size(coefficients, order, size, tol):
     before_end = growth(coefficients, order - 1, order - 1, size)
     step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
     largest = max(at_end, before_end)
-    for pair in range(1, 3):
-        k = order - 2 * pair
-        if grow_faster(coefficients, k - 1, k, size, largest + pair * PAIR_GAP / order):
-            step = min(step, math.log(tol) / order - growth(coefficients, k - 1, k, size))
-    if grow_faster(coefficients, order // 2, order - 2, size, largest + GAP):
-        step = min(step, math.log(tol) / order - growth(coefficients, order // 2, order - 2, size))
+    if not surely_slower(coefficients, order, size, largest):
+        for pair in range(1, 3):
+            k = order - 2 * pair
+            if grow_faster(coefficients, k - 1, k, size, largest + pair * PAIR_GAP / order):
+                step = min(step, math.log(tol) / order - growth(coefficients, k - 1, k, size))
+        half = order // 2
+        if grow_faster(coefficients, half, order - 2, size, largest + GAP):
+            step = min(step, math.log(tol) / order - growth(coefficients, half, order - 2, size))
     return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
 
@@ -476,15 +519,19 @@ def is_away(motion, gap, place, position, tau):
     """Whether the distance of a coordinate from a position, at the end of a step, is more than the
     rounding of the terms of their sums.
     """
-    terms = 0.0
+    share = PENETRATED + 10.0 * motion.tolerance
     series = motion.coordinate_series[place]
+    # mostly the distance is far less than the rounding of one of the terms
+    if abs(gap) <= share * max(abs(position), abs(series[0]), abs(series[1]) * tau):
+        return False
+    terms = 0.0
     for k in range(motion.order, -1, -1):
         terms = terms * tau + abs(series[k])
     # a gap that opens from rest has an acceleration of 0 up to the rounding of what pressed, and no
     # time is told from another one below its rounding
     span = max(tau, UNTOLD * INSTANT * max(time_scale(motion), abs(motion.time)))
     terms += abs(position) + max(motion.press, motion.pull) * span * span
-    return abs(gap) > (PENETRATED + 10.0 * motion.tolerance) * terms
+    return abs(gap) > share * terms
 
 
 @lean_jit
