@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from saltus.flow.contacts.parts import hold_sides, is_to_read, states_before
 from saltus.flow.kernel.contact_layout import PartColumn
-from saltus.flow.kernel.steps import column_step, expand, shortest_step, step_size
+from saltus.flow.kernel.steps import column_step, expand, log_of_tolerance, shortest_step, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -37,7 +37,8 @@ def has_series(motion, t):
             total += 0.0 * motion.margin_series[row, k]
     if total != 0.0:
         return False
-    step = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    log_tol = log_of_tolerance(motion)
+    step = step_size(motion.velocity_series[: motion.own], motion.order, size, log_tol)
     if motion.columns > 0 and motion.eigenmodes.size == 0:
         step = min(step, column_step(motion))
     return step > LONG_ENOUGH * shortest_step(motion)

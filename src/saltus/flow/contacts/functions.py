@@ -35,7 +35,7 @@ from saltus.flow.kernel.contact_layout import (
     is_function,
     is_remembered,
 )
-from saltus.flow.kernel.steps import expand, state_size, step_size, time_scale
+from saltus.flow.kernel.steps import expand, log_of_tolerance, state_size, step_size, time_scale
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -69,7 +69,8 @@ def span_of_terms(motion):
     """A time in which the terms of the present series are told from rounding: the natural one, if
     the series reach as far."""
     size = state_size(motion, 0, motion.own)
-    span = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    log_tol = log_of_tolerance(motion)
+    span = step_size(motion.velocity_series[: motion.own], motion.order, size, log_tol)
     unit = time_scale(motion)
     return min(unit, span) if unit > 0.0 else span if span < np.inf else 1.0
 

@@ -33,7 +33,7 @@ from saltus.flow.kernel.contact_layout import (
     is_surface,
 )
 from saltus.flow.kernel.layout import Mode
-from saltus.flow.kernel.steps import state_size, step_size, time_scale
+from saltus.flow.kernel.steps import log_of_tolerance, state_size, step_size, time_scale
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -126,7 +126,8 @@ def stays_idle(motion, r):
     first = 2 if r < motion.contacts.shape[0] else 1
     series = motion.margin_series[row_series(motion, r)]
     size = state_size(motion, 0, motion.own)
-    span = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    log_tol = log_of_tolerance(motion)
+    span = step_size(motion.velocity_series[: motion.own], motion.order, size, log_tol)
     span = min(span, time_scale(motion))
     power = 1.0
     for k in range(first, motion.order):
@@ -358,7 +359,7 @@ def guard_step(motion, place, natural, longest):
             size = size_along(series, span, order // 2)
         if not size > 0.0:
             break
-        shorter = step_size(series, order, size, motion.tolerance)
+        shorter = step_size(series, order, size, log_of_tolerance(motion))
         if not shorter < span:
             break
         natural = shorter

@@ -33,7 +33,7 @@ from saltus.flow.kernel.contact_layout import (
     restitution,
 )
 from saltus.flow.kernel.layout import EXACT, LEAST_LOSS, Mode
-from saltus.flow.kernel.steps import column_step, leaps, slow_share, step_size
+from saltus.flow.kernel.steps import column_step, leaps, log_of_tolerance, slow_share, step_size
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -128,12 +128,12 @@ def contact_step_size(motion, t, target, size, with_columns):
     """The step that the series of the free coordinates and of the reactions allow, and those of the
     tangent's columns if they are followed in them."""
     order = motion.order
-    tol = motion.tolerance
-    own = motion.own
-    natural = step_size(motion.velocity_series[:own], order, size, tol)
+    log_tol = log_of_tolerance(motion)
+    natural = step_size(motion.velocity_series[: motion.own], order, size, log_tol)
     if with_columns and motion.columns > 0:
         natural = min(natural, column_step(motion))
-    sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
+    resting = motion.mode == Mode.REST
+    sharp = math.log(min(motion.tolerance, EXACT)) if resting else log_tol
     for i in range(motion.contacts.shape[0]):
         row = motion.contacts[i]
         if row[PartColumn.STATE] == Touch.CLOSED and row[PartColumn.IDLE] == 0:

@@ -7,6 +7,8 @@ Its compiled part goes into one module with that of `kernel.py`; the words of `m
 
 from __future__ import annotations
 
+import math
+
 from saltus.flow.contacts.complementarity import friction_rate
 from saltus.flow.contacts.frictions import is_lifted, leans, margin_size, rounding_of_speed
 from saltus.flow.contacts.held_rows import guard_step, stop_row
@@ -26,7 +28,13 @@ from saltus.flow.kernel.contact_layout import (
 )
 from saltus.flow.kernel.layout import EXACT, ZERO, EventCode, Mode
 from saltus.flow.kernel.roots import NEVER, SIMPLE, contact_root, nudged_share
-from saltus.flow.kernel.steps import columns_at_event, expand, move_columns, step_size
+from saltus.flow.kernel.steps import (
+    columns_at_event,
+    expand,
+    log_of_tolerance,
+    move_columns,
+    step_size,
+)
 from saltus.taylor import lean_jit
 
 # --- compiled from here on ---------------------------------------------------
@@ -37,8 +45,8 @@ def sided_step_size(motion, count, natural, longest):
     """The step, at most `natural`, that the series of the friction forces of sticking coordinates
     and of functions allow, where no step is longer than `longest`.
     """
-    tol = motion.tolerance
-    sharp = min(tol, EXACT) if motion.mode == Mode.REST else tol
+    resting = motion.mode == Mode.REST
+    sharp = math.log(min(motion.tolerance, EXACT)) if resting else log_of_tolerance(motion)
     for k in range(motion.sided.shape[0]):
         if is_function(motion, k):
             slides = motion.sided[k, PartColumn.STATE] == Side.HELD

@@ -54,6 +54,7 @@ MOTION = np.dtype(
         ("fastest", _REAL),
         ("press", _REAL),
         ("swiftest", _REAL),
+        ("log_tolerance", _REAL),  # of the tolerance, for the length of every step
         ("recorded_steps", _WHOLE),  # in the buffer
         ("recorded_events", _WHOLE),  # in the buffer
         (

@@ -166,48 +166,62 @@ def grow_faster(coefficients, first, last, size, rate):
 
 
 # `surely_slower` looks at series of this order at least, and allows for this much rounding; the
-# factors are below those by which `step_size` lets earlier terms exceed the last ones.
-LEAST_ORDER = 16
+# other factors are not above those by which `step_size` lets earlier terms exceed the last ones.
+LEAST_ORDER = 18
 BY_ROUNDING = 1.0 - 1e-9
-BY_HALF = math.exp(GAP)
-BY_PAIR = math.exp(PAIR_GAP * (1.0 - 3.0 / LEAST_ORDER))
-BY_SECOND_PAIR = math.exp(2.0 * PAIR_GAP * (1.0 - 5.0 / LEAST_ORDER))
+BY_PAIR = BY_ROUNDING * math.exp(PAIR_GAP * (1.0 - 3.0 / LEAST_ORDER))
+BY_SECOND_PAIR = BY_ROUNDING * math.exp(2.0 * PAIR_GAP * (1.0 - 5.0 / LEAST_ORDER))
+BY_HALF = BY_ROUNDING * math.exp(GAP * (LEAST_ORDER - 6.0))
+PER_TERM = math.exp(GAP)
 
 
 @lean_jit
-def surely_slower(coefficients, order, size, largest):
-    """Whether `grow_faster` is certainly false wherever `step_size` asks it: mostly so, and found by
-    a single exponential.
+def surely_slower(coefficients, order, largest):
+    """Whether `grow_faster` is certainly false wherever `step_size` asks it, as it mostly is: found
+    by products, from the last terms to the earlier ones, instead of an exponential for each.
     """
     if order < LEAST_ORDER:
         return False
-    half = order // 2
-    pairs = order - 5
-    rate = math.exp(largest)
-    faster = rate * BY_HALF
-    of_half = BY_ROUNDING * size * faster**half
-    of_pairs = BY_ROUNDING * size * rate**pairs
+    inverse = math.exp(-largest)
+    level = 0.0
     for i in range(coefficients.shape[0]):
-        bound = of_half
-        for k in range(half, pairs):
+        at_end = abs(coefficients[i, order]) * inverse
+        level = max(level, at_end, abs(coefficients[i, order - 1]))
+    level *= inverse
+    square = inverse * inverse
+    pair = level * BY_PAIR
+    second_pair = level * square * BY_SECOND_PAIR
+    upper = level * square * square * BY_HALF
+    for _ in range(LEAST_ORDER, order):
+        upper *= PER_TERM
+    narrower = inverse / PER_TERM
+    for i in range(coefficients.shape[0]):
+        # so that what is not a number is not slower
+        if not (
+            abs(coefficients[i, order - 2]) <= pair
+            and abs(coefficients[i, order - 3]) <= pair * inverse
+            and abs(coefficients[i, order - 4]) <= second_pair
+            and abs(coefficients[i, order - 5]) <= second_pair * inverse
+        ):
+            return False
+        bound = upper
+        for k in range(order - 6, order // 2 - 1, -1):
             if not abs(coefficients[i, k]) <= bound:
                 return False
-            bound *= faster
-        bound = of_pairs * BY_SECOND_PAIR
-        if not abs(coefficients[i, pairs]) <= bound:
-            return False
-        if not abs(coefficients[i, pairs + 1]) <= bound * rate:
-            return False
-        bound = of_pairs * BY_PAIR * rate * rate
-        if not abs(coefficients[i, pairs + 2]) <= bound:
-            return False
-        if not abs(coefficients[i, pairs + 3]) <= bound * rate:
-            return False
+            bound *= narrower
     return True
 
 
 @lean_jit
-def step_size(coefficients, order, size, tol):
+def log_of_tolerance(motion):
+    """The logarithm of the tolerance, which is computed once."""
+    if motion.log_tolerance == 0.0:
+        motion.log_tolerance = math.log(motion.tolerance)
+    return motion.log_tolerance
+
+
+@lean_jit
+def step_size(coefficients, order, size, log_tol):
     """The step h at which the last two terms of the series are tol, relative to `size`.
 
     By symmetry both terms may be far too small: for x'' = -x^3 from x = 0 only every fourth
@@ -216,16 +230,16 @@ def step_size(coefficients, order, size, tol):
     """
     at_end = growth(coefficients, order, order, size)
     before_end = growth(coefficients, order - 1, order - 1, size)
-    step = min(math.log(tol) / order - at_end, math.log(tol) / (order - 1) - before_end)
+    step = min(log_tol / order - at_end, log_tol / (order - 1) - before_end)
     largest = max(at_end, before_end)
-    if not surely_slower(coefficients, order, size, largest):
+    if not surely_slower(coefficients, order, largest):
         for pair in range(1, 3):
             k = order - 2 * pair
             if grow_faster(coefficients, k - 1, k, size, largest + pair * PAIR_GAP / order):
-                step = min(step, math.log(tol) / order - growth(coefficients, k - 1, k, size))
+                step = min(step, log_tol / order - growth(coefficients, k - 1, k, size))
         half = order // 2
         if grow_faster(coefficients, half, order - 2, size, largest + GAP):
-            step = min(step, math.log(tol) / order - growth(coefficients, half, order - 2, size))
+            step = min(step, log_tol / order - growth(coefficients, half, order - 2, size))
     return SAFETY * math.exp(step) if step < 700.0 else np.inf
 
 
@@ -336,11 +350,11 @@ def column_step(motion):
     step = np.inf
     own = motion.own
     order = motion.order
-    tol = ROUGHER * motion.tolerance
+    log_tol = math.log(ROUGHER * motion.tolerance)
     for first in range(own, motion.dof, own):
         size = state_size(motion, first, first + own)
         if size < np.inf:
-            step = min(step, step_size(v[first : first + own], order, size, tol))
+            step = min(step, step_size(v[first : first + own], order, size, log_tol))
     return step
 
 

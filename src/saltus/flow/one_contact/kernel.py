@@ -52,6 +52,7 @@ from saltus.flow.kernel.steps import (
     forget,
     is_away,
     leaps,
+    log_of_tolerance,
     move,
     natural_speed,
     note_impact,
@@ -80,7 +81,8 @@ from saltus.taylor import jit, lean_jit
 @lean_jit
 def arc_step(motion, t, target, size):
     """The step that the series of an arc allow, beyond `target` or not."""
-    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    log_tol = log_of_tolerance(motion)
+    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, log_tol)
     if motion.columns > 0:
         natural = min(natural, column_step(motion))
     side = float(motion.side)
@@ -211,7 +213,8 @@ def wait_at_contact(motion, target):
     for i in range(motion.sides):
         size = max(motion.press, abs(b[i, 0]))
         if size > 0.0:
-            h = min(h, step_size(b[i : i + 1], order, size, min(motion.tolerance, EXACT)))
+            log_tol = math.log(min(motion.tolerance, EXACT))
+            h = min(h, step_size(b[i : i + 1], order, size, log_tol))
     first, released = first_release(motion, b, order, h, motion.polynomial)
     tau = min(first, 1.0) * h
     if motion.mode == Mode.CHATTER and tau > 0.0:

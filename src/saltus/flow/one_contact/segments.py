@@ -42,6 +42,7 @@ from saltus.flow.kernel.steps import (
     columns_at_event,
     expand,
     leaps,
+    log_of_tolerance,
     move,
     state_arrays,
     step_arrays,
@@ -178,7 +179,8 @@ def start_from_state(motion, t, side, given):
 @lean_jit
 def segment_step(motion, t, end, side, size):
     """The absolute length of the step that the series of a segment allow."""
-    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, motion.tolerance)
+    log_tol = log_of_tolerance(motion)
+    natural = step_size(motion.velocity_series[: motion.own], motion.order, size, log_tol)
     natural = min(natural, column_step(motion))
     while motion.checked > 0 and end >= t:
         terms = largest_terms(motion, side)
