@@ -652,11 +652,26 @@ def only_open(contacts):
 
 
 @lean_jit
+def bounces_slowly(motion):
+    """Whether a contact has just impacted so slowly that its next impact may end an accumulation."""
+    slow = slow_impacts(motion)
+    for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
+        row = motion.contacts[i]
+        if row[PartColumn.STATE] == Touch.OPEN and row[PartColumn.SKIP] == 1:
+            rate = motion.signs[i] * motion.velocities[row[PartColumn.COORDINATE]]
+            if 0.0 < rate <= slow * lost_share(motion, i):
+                return True
+    return False
+
+
+@lean_jit
 def is_smooth(motion):
     """Whether a motion without friction, and not in eigenmodes, is on a smooth arc, with no guards
-    known to be 0 but those of `only_open`."""
+    known to be 0 but those of `only_open`. Between slow impacts it is not: lanes would give each of
+    them back."""
     together = motion.sided.shape[0] == 0 and motion.eigenmodes.size == 0
-    return motion.mode == Mode.ARC and together and only_open(motion.contacts)
+    smooth = motion.mode == Mode.ARC and together and only_open(motion.contacts)
+    return smooth and not bounces_slowly(motion)
 
 
 @lean_jit
