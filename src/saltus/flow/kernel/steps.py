@@ -167,11 +167,11 @@ def grow_faster(coefficients, first, last, size, rate):
 
 # `surely_slower` looks at series of this order at least, and allows for this much rounding; the
 # other factors are not above those by which `step_size` lets earlier terms exceed the last ones.
-LEAST_ORDER = 18
+LONG_SERIES = 18
 BY_ROUNDING = 1.0 - 1e-9
-BY_PAIR = BY_ROUNDING * math.exp(PAIR_GAP * (1.0 - 3.0 / LEAST_ORDER))
-BY_SECOND_PAIR = BY_ROUNDING * math.exp(2.0 * PAIR_GAP * (1.0 - 5.0 / LEAST_ORDER))
-BY_HALF = BY_ROUNDING * math.exp(GAP * (LEAST_ORDER - 6.0))
+BY_PAIR = BY_ROUNDING * math.exp(PAIR_GAP * (1.0 - 3.0 / LONG_SERIES))
+BY_SECOND_PAIR = BY_ROUNDING * math.exp(2.0 * PAIR_GAP * (1.0 - 5.0 / LONG_SERIES))
+BY_HALF = BY_ROUNDING * math.exp(GAP * (LONG_SERIES - 6.0))
 PER_TERM = math.exp(GAP)
 
 
@@ -180,7 +180,7 @@ def surely_slower(coefficients, order, largest):
     """Whether `grow_faster` is certainly false wherever `step_size` asks it, as it mostly is: found
     by products, from the last terms to the earlier ones, instead of an exponential for each.
     """
-    if order < LEAST_ORDER:
+    if order < LONG_SERIES:
         return False
     inverse = math.exp(-largest)
     level = 0.0
@@ -192,7 +192,7 @@ def surely_slower(coefficients, order, largest):
     pair = level * BY_PAIR
     second_pair = level * square * BY_SECOND_PAIR
     upper = level * square * square * BY_HALF
-    for _ in range(LEAST_ORDER, order):
+    for _ in range(LONG_SERIES, order):
         upper *= PER_TERM
     narrower = inverse / PER_TERM
     for i in range(coefficients.shape[0]):
