@@ -68,14 +68,15 @@ def read_start(
         value is no finite number.
     """
     model: Any = system.model
-    names = {*model.coordinates}
-    given = {*coordinates}
-    own_names = {*model.own_class.coordinates} if isinstance(model, InGapCoordinates) else names
-    if given & own_names - names or (own_names < names and given == own_names):
-        own = system.with_(model=model.as_given())
-        return np.concatenate(
-            own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2))
-        )
+    if isinstance(model, InGapCoordinates):
+        names = {*model.coordinates}
+        given = {*coordinates}
+        own_names = {*model.own_class.coordinates}
+        if given & own_names - names or (own_names < names and given == own_names):
+            own = system.with_(model=model.as_given())
+            return np.concatenate(
+                own.to_gaps(time, *np.split(read_start(own, velocity, coordinates, arguments), 2))
+            )
     most = LIMITS.value
     in_order = model.coordinates
     positions = (

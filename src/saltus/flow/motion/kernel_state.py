@@ -204,7 +204,9 @@ class KernelState:
         where = (at.local, at.first, mode, side, piece, leave_by, dense)
         span = at.length, natural_time(request.system, at.length, run)
         AT_START.pack_into(self._memory, 0, *where, at.last, at.end, *span, request.tol)
-        self.array["nudged"], self.array["nudge"] = NUDGE or request.nudge
+        nudge = NUDGE or request.nudge
+        if nudge[0]:  # NumPy takes long for a field
+            self.array["nudged"], self.array["nudge"] = nudge
 
     @property
     def numbers(self) -> Any:

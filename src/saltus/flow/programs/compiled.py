@@ -636,6 +636,8 @@ def contact_rows_at(run: Program, time: float, length: float, state: np.ndarray)
 def piece_at(run: Program, time: float, local: float, length: float) -> int:
     """The piece of the load's records at a time, which is `local` within a period."""
     breaks: np.ndarray = run.env[2]
+    if not breaks.size:
+        return 0
     if run.structure.sizes.repeats:
         return int((breaks * length).searchsorted(local, side="right"))
     return int(breaks.searchsorted(time, side="right"))
