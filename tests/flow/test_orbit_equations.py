@@ -14,6 +14,12 @@ FREE = np.array([1, 2, 3])
 TIMES = np.array([0.3, 1.1, 1.9, 5.0])
 PARAMETERS = 2  # of which the second one is the frequency
 RANDOM = np.random.default_rng(45)
+# A mirror that swaps two coordinates, and one of two bodies that are swapped in the coordinates of
+# the first one and of the gap between them.
+NONE = np.eye(2)
+SWAP = np.array([[0.0, -1.0], [-1.0, 0.0]])
+BODIES = np.array([[-1.0, -1.0], [0.0, 1.0]])
+SHIFT = np.array([0.4, 0.4, 0.0, 0.0])
 
 
 def followed(segments):
@@ -27,14 +33,19 @@ def followed(segments):
     )
 
 
-def equations(results, events, image=(), shift=()):
+def of_state(turn):
+    """The matrix that turns coordinates and velocities."""
+    return np.kron(np.eye(2), turn)
+
+
+def equations(results, events, turn):
     """The residual, and its derivatives to the unknowns, to the later ones, and to parameters."""
     size = len(FREE) + events
     arrays = np.zeros(size), *np.zeros((2, size, size)), np.zeros((size, PARAMETERS))
     asked = np.array([0.5, -0.2, 0.7, 0.1])
     times = TIMES[: len(results[0]) + 1].copy()
     request = (
-        *(FREE, times, asked, np.array(image, dtype=np.int64), np.array(shift, dtype=float)),
+        *(FREE, times, asked, of_state(turn), np.zeros(2 * OWN) if turn is NONE else SHIFT),
         *(FREQUENCY, 1),
     )
     load_contact_equations()(request, results, arrays)
@@ -64,14 +75,11 @@ def carried(results, events, state, phases, parameters):
     return np.array(guards[:events]), state
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("turn", [NONE, SWAP, BODIES], ids=["none", "swap", "bodies"])
 @pytest.mark.parametrize("events", [0, SEGMENTS])
-def test_a_perturbation_is_carried_from_event_to_event(events, mirrored):
+def test_a_perturbation_is_carried_from_event_to_event(events, turn):
     results = followed(events or 1)
-    image = [1, 0, 3, 2] if mirrored else []
-    _, here, there, by_parameters = equations(
-        results, events, image, [0.4, 0.4, 0.0, 0.0][: len(image)]
-    )
+    _, here, there, by_parameters = equations(results, events, turn)
     unknowns = RANDOM.normal(size=len(FREE) + events)
     later = RANDOM.normal(size=len(unknowns))
     parameters = RANDOM.normal(size=PARAMETERS)
@@ -79,7 +87,7 @@ def test_a_perturbation_is_carried_from_event_to_event(events, mirrored):
     state[FREE] = unknowns[: len(FREE)]
     phases = np.append(unknowns[len(FREE) :], later[len(FREE) :][:1])
     guards, end = carried(results, events, state, phases, parameters)
-    end = -end[image] if mirrored else end
+    end = of_state(turn) @ end
     expected = np.append(guards, end[FREE] - later[: len(FREE)])
     found = here @ unknowns + there @ later + by_parameters @ parameters
     assert found == pytest.approx(expected, abs=1e-12)
@@ -88,7 +96,7 @@ def test_a_perturbation_is_carried_from_event_to_event(events, mirrored):
 def test_the_residual_is_the_guards_and_the_state_that_is_not_met():
     results = followed(SEGMENTS)
     ends = results[0]
-    residual, *_ = equations(results, SEGMENTS, [1, 0, 3, 2], [0.4, 0.4, 0.0, 0.0])
+    residual, *_ = equations(results, SEGMENTS, SWAP)
     after = ends[-1, SegmentEnd.NUMBERS + 8 * OWN :]
     image = np.array([0.4 - after[1], 0.4 - after[0], -after[3], -after[2]])
     met = (image - [0.5, -0.2, 0.7, 0.1])[FREE]
