@@ -140,19 +140,61 @@ class Rubbing(saltus.ContactModel):
 class Walls(saltus.ContactModel):
     """A mass between two walls that move with the ground."""
 
+    right: float = 1.0  # by which share of its displacement the right one does
     coordinates: ClassVar[tuple[str, ...]] = ("x",)
     channels: ClassVar[tuple[str, ...]] = ("ground",)
 
     @property
     def contacts(self) -> tuple[saltus.Contact, ...]:
-        apart = {"x": 1.0, "ground": -1.0}
+        left, right = ({"x": 1.0, "ground": -share} for share in (1.0, self.right))
         return (
-            saltus.Contact(name="left", coordinate=apart, position=-1.0),
-            saltus.Contact(name="right", coordinate=apart, position=1.0, sign=-1),
+            saltus.Contact(name="left", coordinate=left, position=-1.0),
+            saltus.Contact(name="right", coordinate=right, position=1.0, sign=-1),
         )
 
     def force(self, t: Any, x: Any, velocity: Any, load: Any) -> Any:
         return -0.1 * velocity - x
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeclaredWalls(Walls):
+    """The same with a mirror of its own, about 0."""
+
+    def mirror(self, load: Any) -> Any:
+        return reversed_load(load, "ground")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rubbed(saltus.ContactModel):
+    """Two bodies, of which one rubs on a floor, and the other on a ceiling whose reaction acts on
+    a sum with a factor."""
+
+    factor: float = 1.0
+    above: float = 0.3  # coefficient of friction
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "u", "w")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self) -> tuple[saltus.Contact, ...]:
+        high = {"w": self.factor}
+        return (
+            saltus.Contact(name="low", coordinate="y", position=-0.4),
+            saltus.Contact(name="high", coordinate=high, position=0.4 * self.factor, sign=-1),
+        )
+
+    @property
+    def frictions(self) -> tuple[saltus.Friction, ...]:
+        return (
+            saltus.Friction(name="floor", coordinate="x", kinetic=0.3, contact="low"),
+            saltus.Friction(name="ceiling", coordinate="u", kinetic=self.above, contact="high"),
+        )
+
+    def force(self, t: Any, q: Any, v: Any, load: Any) -> Any:
+        push = load.force(t)
+        return tuple(
+            share * push - x - 0.1 * rate
+            for share, x, rate in zip((1.0, 3.0, 1.0, 3.0), q, v, strict=True)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,6 +254,8 @@ SYMMETRIC = {
     "small bodies between walls": under(Row(length=2e-3), amplitude=3e-4),
     "bodies that hit each other": under(Row(walls=False)),
     "friction between two that are swapped": under(Joint()),
+    "friction by a reaction on a multiple": under(Rubbed(factor=2.0, above=0.6)),
+    "walls whose mirror is declared": under(DeclaredWalls(), "ground"),
 }
 OTHER = {
     "stops": under(Absorber(left=0.41)),
@@ -224,6 +268,9 @@ OTHER = {
     "force far away": under(Smooth(far=1.0)),
     "belt that moves": under(Rubbing(speed=1e-3)),
     "walls beside the middle": under(Walls(), "ground", mean=0.2),
+    "declared walls beside the middle": under(DeclaredWalls(), "ground", mean=0.2),
+    "walls that shake eight times": under(Walls(), "ground", order=8),
+    "friction by another reaction": under(Rubbed(factor=2.0)),
     "other mass in a row": under(Row(second=1.1)),
     "other spring behind a joint": under(Joint(bend=0.21)),
     "soft stops": under(structure(stiffness=0.31)),
@@ -273,6 +320,13 @@ def test_rounding_far_from_the_origin_does_not_break_a_symmetry(rest: float) -> 
         model = Coupled(rest=rest, stiffness=stiffness, coupling=coupling)
         assert is_symmetric(under(model, amplitude=0.1)), model
     assert not is_symmetric(under(replace(model, second=stiffness * (1.0 + 1e-6))))
+
+
+def test_walls_that_move_towards_each_other_have_no_known_mirror() -> None:
+    """In coordinates of gaps the image of one gap is the other one, and moves beside its negative."""
+    system = under(Walls(right=-1.0), "ground", order=2)
+    assert not is_symmetric(system)
+    assert mirror_of(system.in_gap_coordinates) is None
 
 
 def test_a_mirror_that_is_found_is_the_one_that_is_declared() -> None:

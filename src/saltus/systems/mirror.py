@@ -44,7 +44,10 @@ DECADES = 6.0  # their sizes lie so many powers of ten below and above the natur
 # Distances from a mirror's centre are looked at down to so many powers of ten below its value.
 DIGITS = 4.0
 ROUNDED_BY = 2.0**-49  # relative changes of places by which their rounding is known
-INSTANTS = 8  # of a period, at which walls that move are compared with their images
+# Parts of half a period at which walls that move are compared with their images, and of each piece
+# between corners of the load: no harmonic has one value at all of them.
+INSTANTS = 0.5 * (np.arange(8) * math.sqrt(2.0) % 1.0)
+OF_PIECES = np.array([0.2, 0.5, 0.83])
 INDEPENDENT = 1e-9  # parts whose directions differ by less have one direction
 NEWTON_STEPS = 30  # most steps in which a mirror's centre is found
 NEWTON_SHARE = 1e-4  # of a length, by which its derivatives are differences
@@ -221,11 +224,10 @@ def is_its_image_later(system: System) -> bool:
     period = system.load.period
     assert swap is not None, "asked for a system with the symmetry alone"
     assert period is not None, "asked for a load with a frequency alone"
-    if declares_mirror(system.model):
-        return True
-    same = replace(swap, load=system.load)
     parts = _images_of_parts(system, swap.places, system.load, swap.centre, 0.5 * period)
-    return parts == swap.parts and _moves_as_image(system, same, 0.5 * period)
+    if parts != swap.parts or declares_mirror(system.model):
+        return parts == swap.parts
+    return _moves_as_image(system, replace(swap, load=system.load), 0.5 * period)
 
 
 def has_half_the_period(system: System) -> bool:
@@ -271,7 +273,15 @@ def has_half_the_period(system: System) -> bool:
 
 def _swap_of(system: System) -> _Swap | None:
     """The symmetry of a system in its own coordinates; it is found once."""
-    found: _Swap | None = system._remembered(_swap_of, lambda: _swap_found(system))
+
+    def look() -> _Swap | None:
+        found = _swap_found(system)
+        walls_move = getattr(system.in_gap_coordinates.model, "has_moving_walls", False)
+        if found is not None and walls_move and _in_gaps(system, found) is None:
+            return None
+        return found
+
+    found: _Swap | None = system._remembered(_swap_of, look)
     return found
 
 
@@ -308,11 +318,12 @@ def _swap_found(system: System) -> _Swap | None:
     return None
 
 
-def _in_gaps(own: System, swap: _Swap) -> Mirror:
+def _in_gaps(own: System, swap: _Swap) -> Mirror | None:
     """The symmetry of a system in the coordinates of its gaps, z = A q + m(t), from that in its own
     ones: R = -A P A^-1.
 
-    Where m moves, it does so as its image: 2 c in z is A (2 c + P A^-1 m) + m' at all times.
+    Where m moves, it does so as its image: 2 c in z is A (2 c + P A^-1 m) + m' at all times. None
+    where that changes, as between two walls of one coordinate that move towards each other.
     """
     model: Any = own.in_gap_coordinates.model
     mirror = swap.mirror()
@@ -331,6 +342,8 @@ def _in_gaps(own: System, swap: _Swap) -> Mirror:
     centre = 0.5 * twice.mean(axis=1)
     size = np.abs(twice).max(axis=1) + np.abs(walls).max(axis=1)
     lengths = natural_units(own.in_gap_coordinates).lengths
+    if (np.ptp(twice, axis=1) > IMAGE_ROUNDING * (lengths + size)).any():
+        return None
     centre = np.where(np.abs(centre) <= IMAGE_ROUNDING * (lengths + size), 0.0, centre)
     return Mirror(swap.load, turn, swap.parts, tuple(centre.tolist()))
 
@@ -346,7 +359,9 @@ def _instants(system: System) -> np.ndarray:
     """Times over a forcing period, or over natural times without one."""
     period = system.load.period
     span = natural_units(system).time if period is None else period
-    return span * np.arange(INSTANTS) / INSTANTS
+    corners = np.unique([0.0, *system.load.corners, 1.0])
+    within = corners[:-1, None] + np.diff(corners)[:, None] * OF_PIECES
+    return span * np.concatenate([INSTANTS, INSTANTS + 0.5, within.ravel()])
 
 
 def declares_mirror(model: Model) -> bool:
@@ -514,8 +529,8 @@ class _Plane:
         """That of a contact or surface, or with the position 0 of a friction."""
         names = system.model.coordinates
         row = np.zeros(len(names))
-        walls, images = np.zeros((2, INSTANTS))
         times = _instants(system)
+        walls, images = np.zeros((2, len(times)))
         for name, factor in terms_of(part).items():
             if name in names:
                 row[names.index(name)] = float(factor)
@@ -673,6 +688,9 @@ def _images_of_parts(
         return None
     speed = natural_units(system).speed
     contact_names = [contact.name for contact in model.contacts]
+    pressing = model.contacts if model.frictions else ()
+    rows = [_Plane.of(contact, system, load).row for contact in pressing]
+    sizes = [float(np.linalg.norm(row)) for row in rows]
 
     def is_image_of_friction(one: Any, other: Any, factor: float) -> bool:
         pressed = [
@@ -681,11 +699,14 @@ def _images_of_parts(
         ]
         image = None if pressed[0] is None else contacts[pressed[0]]
         stribeck = [friction.stribeck_speed for friction in (one, other)]
+        # the reaction of an image on a sum with another factor is another one
+        numbers = () if image is None or pressed[0] is None else (pressed[0], image)
+        pressed_by = sizes[numbers[0]] / sizes[numbers[1]] if numbers else 1.0
         return (
             image == pressed[1]
             and same(abs(factor), 1.0, 0.0)
-            and same(one.kinetic, other.kinetic, 0.0)
-            and same(one.most, other.most, 0.0)
+            and same(one.kinetic, pressed_by * other.kinetic, 0.0)
+            and same(one.most, pressed_by * other.most, 0.0)
             and same(factor * one.ground_speed, other.ground_speed, speed)
             and (stribeck[0] is None) == (stribeck[1] is None)
             and (stribeck[0] is None or same(stribeck[0], stribeck[1], 0.0))

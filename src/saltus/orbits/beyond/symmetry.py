@@ -119,8 +119,8 @@ CENTRE_ROUNDING = 1e-9
 
 
 def keeps_symmetry(system: System, path: str) -> bool:
-    """Whether a system is symmetric and stays so, about the same centre, as the parameter at `path`
-    changes."""
+    """Whether a system is symmetric and stays so, about the same centre and with the same images in
+    coordinates of gaps, as the parameter at `path` changes."""
     if not has_symmetry(system):
         return False
     inner = mirror_of(system.in_gap_coordinates)
@@ -134,6 +134,8 @@ def keeps_symmetry(system: System, path: str) -> bool:
         except ParameterError:  # on one side of a limit of the parameter
             continue
         other = mirror_of(beside.in_gap_coordinates) if has_symmetry(beside) else None
+        if other is not None and not np.array_equal(other.turn, inner.turn):
+            return False  # as where it changes a factor in a sum
         if other is not None and other.centre == inner.centre:
             return True
         if other is not None:
