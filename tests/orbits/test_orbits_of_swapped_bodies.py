@@ -2,6 +2,9 @@
 image of a state in coordinates of gaps is no swap of these.
 """
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from shared_systems import Row
@@ -74,3 +77,50 @@ def test_bodies_that_do_not_touch_have_the_orbits_of_each_between_walls():
     np.testing.assert_allclose(
         np.sort_complex(both.multipliers), np.sort_complex(apart.multipliers), rtol=0, atol=1e-10
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Between(saltus.ContactModel):
+    """A body m between a and b, which the mirror swaps: m - factor a and m - factor b are gaps."""
+
+    factor: float = 1.0
+
+    coordinates: ClassVar[tuple[str, ...]] = ("a", "b", "m")
+    channels: ClassVar[tuple[str, ...]] = ("force",)
+
+    @property
+    def contacts(self):
+        low, high = ({"m": 1.0, name: -self.factor} for name in "ab")
+        return (
+            saltus.Contact(name="low", coordinate=low, position=-0.2),
+            saltus.Contact(name="high", coordinate=high, position=0.2, sign=-1),
+        )
+
+    def force(self, t, q, velocity, load):
+        a, b, m = q
+        return (
+            0.1 * (m - a) - a - 0.1 * velocity[0],
+            0.1 * (m - b) - b - 0.1 * velocity[1],
+            load.force(t) - 0.5 * m - 0.1 * velocity[2] + 0.1 * (a + b - 2.0 * m),
+        )
+
+
+def test_a_factor_of_a_gap_moves_the_image_along_a_branch():
+    """Every orbit closes; where gaps would take the places of other coordinates the branch ends."""
+    system = saltus.System(
+        model=Between(),
+        load=saltus.Load(frequency=1.1, force=saltus.Harmonic(0.5)),
+        impact=saltus.NewtonImpact(e=0.5),
+    )
+    orbit = saltus.find_orbit(system, a=0.0, b=0.0, m=0.0, velocity=(0.0, 0.0, 0.1))
+    assert orbit.symmetric
+    branch = saltus.continue_orbit(orbit, "model.factor", bounds=(0.95, 1.05))
+    assert branch.orbits[0].system.model.factor == 0.95
+    for member in (branch.orbits[0], branch.orbits[len(branch.orbits) // 2], branch.orbits[-1]):
+        state = member.section_state
+        a, b, m, *velocity = state.tolist()
+        motion = saltus.simulate(
+            member.system, a=a, b=b, m=m, velocity=tuple(velocity), periods=1, tol=1e-14
+        )
+        np.testing.assert_allclose(motion.final_state, state, rtol=0, atol=1e-10)
+    assert "outgrows" in str(branch.ends[1])

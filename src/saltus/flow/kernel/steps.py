@@ -180,7 +180,7 @@ def surely_slower(coefficients, order, largest):
     """Whether `grow_faster` is certainly false wherever `step_size` asks it, as it mostly is: found
     by products, from the last terms to the earlier ones, instead of an exponential for each.
     """
-    if order < LONG_SERIES:
+    if order < LONG_SERIES or not largest > -np.inf:
         return False
     inverse = math.exp(-largest)
     level = 0.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -23,7 +23,7 @@ from saltus.continuation import (
     Zero,
     arithmetic,
 )
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 from saltus.flow import Motion, SegmentFollower, program, simulate
 from saltus.orbits.segments.segments import CannotProve, OrbitSegments
 from saltus.orbits.signature import Signature
@@ -698,9 +698,46 @@ class OrbitEquations(ABC):
         Raises
         ------
         ParameterError
-            Where it refuses them.
+            Where it refuses them, or where gaps take the places of other coordinates than in these
+            equations.
         """
-        return self.given_at(values).in_gap_coordinates
+        system = self.given_at(values).in_gap_coordinates
+        if not _same_places(system.model, self.system.model):
+            names = ", ".join(system.model.coordinates)
+            raise ParameterError(
+                f"a factor in a contact's sum outgrows another one, and gaps are {names} from here"
+                " on: begin the branch anew behind it"
+            )
+        return system
+
+    def keeps_gaps(self, values: np.ndarray) -> bool:
+        """Whether the given parameters are accepted and gaps take the places of the same
+        coordinates, where a parameter is a factor in their sums."""
+        if not self._moves_gaps:
+            return True
+        try:
+            self.system_at(values)
+        except SaltusError:
+            return False
+        return True
+
+    @cached_property
+    def _moves_gaps(self) -> bool:
+        """Whether a parameter is a factor in the sums of gaps."""
+        model: Any = self.system.model
+        if self.system is self.given or not hasattr(model, "gap_sums"):
+            return False
+        for path in self.paths:
+            value = float(self.given.get(path))
+            try:
+                # a share of the value, as its unit is not known; of 0 any number is beside it
+                beside = self.given.with_({path: value * (1.0 + 1e-3) if value else 1e-3})
+            except SaltusError:  # on one side of a limit of the parameter
+                continue
+            other: Any = beside.in_gap_coordinates.model
+            if not _same_places(other, model) or other.gap_sums()[0] != model.gap_sums()[0]:
+                return True
+        return False
 
     def given_at(self, values: np.ndarray) -> System:
         """The system as the user gave it, with the given parameters; an orbit's states are given in
@@ -760,3 +797,11 @@ class OrbitEquations(ABC):
         return self.with_signature(self.signature.over_full_period(self.images)), self.repeated(
             unknowns
         )
+
+
+def _same_places(one: Any, other: Any) -> bool:
+    """Whether gaps take the places of the same coordinates in two models; their names may differ,
+    as those of y - x and y - 1.1 x do."""
+    places = [getattr(model, "gap_places", None) for model in (one, other)]
+    unnamed = [part and replace(part, names=()) for part in places]
+    return bool(unnamed[0] == unnamed[1])

@@ -30,6 +30,7 @@ from saltus.flow import (
     SegmentPlan,
     load_contact_equations,
 )
+from saltus.orbits.beyond.events import refused_beyond
 from saltus.orbits.beyond.orbit_curve import (
     GRAZING,
     OrbitPoint,
@@ -536,6 +537,8 @@ class ContactsEquations(OrbitEquations):
             return Cut(point, _vanishing_excursion(point, points, duration))
         if self._shortest_excursion_of_cells(point) < 2.0 * SHORTEST_EXCURSION:
             return End(OrbitEnd.TWO_AT_ONCE, point.parameter)
+        if self._moves_gaps and (refused := refused_beyond(point, step, bounds)) is not None:
+            return refused
         limit = point.orbit.motion().limit
         return None if limit is None else End(OrbitEnd.REFUSED, point.parameter, detail=limit)
 
@@ -625,7 +628,9 @@ class ContactsEquations(OrbitEquations):
         frequency, later = self.frequency(values), unknowns if later is None else later
         given = (unknowns, values) if later is unknowns else (unknowns, later, values)
         if not (
-            frequency > 0.0 and all(map(math.isfinite, (x for one in given for x in one.tolist())))
+            frequency > 0.0
+            and all(map(math.isfinite, (x for one in given for x in one.tolist())))
+            and self.keeps_gaps(values)
         ):
             return None
         state, phases = self.split(unknowns)
