@@ -848,8 +848,11 @@ def _margins_are_alike(model: Any, there: Any, image: Any) -> bool:
 
 def _alike(one: np.ndarray, other: np.ndarray, rounding: np.ndarray | None = None) -> bool:
     """Whether values (..., probes) are equal up to rounding of the largest one at each probe, and
-    nearly everywhere up to their own; `rounding` is what comes from elsewhere. Probes that are not finite do not count, but half of them
-    must be."""
+    nearly everywhere up to their own.
+
+    `rounding` is what comes from elsewhere. Probes that are not finite do not count, but half of
+    them must be.
+    """
     if not one.size:
         return True
     one, other = (values.reshape(-1, values.shape[-1]) for values in (one, other))

@@ -70,8 +70,8 @@ BOTH_BRANCHES = (
     " -v * abs(v), and join conditions as in (x > 0.0) & (v < 0.0)"
 )
 OF_ONE_CONTACT = (
-    "at the contact use `side`, as in -(1 + side) * x; elsewhere make it a ContactModel, whose force"
-    " may have np.where(x > 0.0, a, b), np.maximum(x, 0.0) and -v * abs(v)"
+    "at the contact use `side`, as in -(1 + side) * x; elsewhere make it a ContactModel, whose"
+    " force may have np.where(x > 0.0, a, b), np.maximum(x, 0.0) and -v * abs(v)"
 )
 DRY_FRICTION = "; dry friction may be a Friction"
 # the names of the bounds of `np.clip`

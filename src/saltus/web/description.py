@@ -215,7 +215,7 @@ def _numbers(system: System) -> Iterator[dict[str, Any]]:
 
 
 def _holder(system: System, path: str) -> tuple[Any, str, str]:
-    """The part of a system that holds a number, the name of its field there, and the part's path."""
+    """The part of a system that holds a number, its field's name there, and the part's path."""
     node: Any = system
     field = where = ""
     holder: Any = system

@@ -653,7 +653,7 @@ def only_open(contacts):
 
 @lean_jit
 def bounces_slowly(motion):
-    """Whether a contact has just impacted so slowly that its next impact may end an accumulation."""
+    """Whether a contact has just impacted so slowly that its next one may end an accumulation."""
     slow = slow_impacts(motion)
     for i in range(motion.contacts.shape[0] if motion.multipliers == 0 else 0):
         row = motion.contacts[i]

@@ -63,7 +63,8 @@ def contact_equations(request, followed, equations):
     `request` begins with the places of the free coordinates and velocities in the state at the
     start. The times of the segments' ends, (n + 1,), and the state asked for at the end follow.
     The state at the end is turned by a matrix, (2 own, 2 own), and moved by a vector, as the mirror
-    image is that closes an orbit. The frequency and its place among the parameters, or -1, are last. `followed` is what `follow_contact_segments` fills.
+    image is that closes an orbit. The frequency and its place among the parameters, or -1, are
+    last. `followed` is what `follow_contact_segments` fills.
     """
     free, times, asked, image, shift, frequency, place = request
     ends, columns, maps, _ = followed
